@@ -1,0 +1,53 @@
+"""`LoadedSystem` → findings. The rules, a function each, in one table."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.checks.behaviours import check_behaviour_sources
+from composer.checks.context import CheckContext
+from composer.checks.fields import check_messages
+from composer.checks.names import check_names
+from composer.checks.parameters import check_parameters
+from composer.checks.references import check_publish, check_qos, check_types
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import LoadedSystem, load_system
+from composer.python_source import ModuleFinder, project_search_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
+
+    from composer.diagnostics import Diagnostic
+
+RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+    check_names,
+    check_qos,
+    check_publish,
+    check_types,
+    check_messages,
+    check_parameters,
+    check_behaviour_sources,
+)
+
+
+def create_context(system: LoadedSystem, catalogue: InterfaceCatalogue) -> CheckContext | None:
+    """Return what the rules look at; `None` if the file could not be read at all."""
+    if system.spec is None:
+        return None
+    modules = ModuleFinder(project_search_path(system.path))
+    return CheckContext(system, system.spec, catalogue, modules)
+
+
+def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
+    """Return all that is wrong with a system, by its place in the file."""
+    context = create_context(system, catalogue)
+    found = [finding for rule in RULES for finding in rule(context)] if context else []
+    return sorted([*system.diagnostics, *found], key=lambda finding: finding.sort_key)
+
+
+def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:
+    """Yield each file with all that is wrong with it."""
+    catalogue = InterfaceCatalogue()
+    for path in paths:
+        yield path, check_system(load_system(path), catalogue)

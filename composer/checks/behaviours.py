@@ -1,0 +1,142 @@
+"""Behaviours: that they exist, can be called, and take what they will be given."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING
+
+from composer.language.bindings import Binding, node_bindings
+from composer.names import did_you_mean
+from composer.python_source import FunctionKind, MissingModule, ModuleSource
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+
+
+def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check all behaviours by the text of their modules; none is imported."""
+    for node in context.spec.nodes.values():
+        for binding in node_bindings(node):
+            yield from _check_source(context, binding)
+
+
+def check_behaviour_call(
+    context: CheckContext,
+    binding: Binding,
+    kind: FunctionKind | None,
+    signature: inspect.Signature | None,
+) -> Iterator[Diagnostic]:
+    """Check that a function can be bound where it is; what is `None` cannot be told."""
+    behaviour = binding.behaviour
+    if kind is not None and kind.is_generator and not binding.may_yield:
+        yield context.at_value(
+            behaviour.path,
+            'generator-not-allowed',
+            f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
+            part=behaviour.function,
+            help='only timers take generators here; return the value instead',
+        )
+    if signature is not None:
+        yield from _check_signature(context, binding, signature)
+
+
+def _check_source(context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
+    module = context.modules.find(behaviour.module)
+    if isinstance(module, MissingModule):
+        yield _explain_missing_module(context, binding, module)
+    elif module.syntax_error:
+        yield context.at_value(
+            behaviour.path,
+            'broken-module',
+            f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
+            part=behaviour.module,
+        )
+    elif function := module.functions.get(behaviour.function):
+        yield from check_behaviour_call(context, binding, function.kind, function.signature)
+    elif not module.is_open:
+        yield _explain_missing_function(context, binding, module)
+
+
+def _explain_missing_module(
+    context: CheckContext, binding: Binding, module: MissingModule
+) -> Diagnostic:
+    behaviour = binding.behaviour
+    if module.nearest:
+        help_text = f"did you mean '{module.nearest}'?"
+    else:
+        path = behaviour.module.replace('.', '/')
+        help_text = f'write {path}.py beside the project, or install the package it is in'
+    return context.at_value(
+        behaviour.path,
+        'unknown-behaviour',
+        f"there is no module '{module.missing}'",
+        part=behaviour.module,
+        help=help_text,
+    )
+
+
+def _explain_missing_function(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    behaviour = binding.behaviour
+    what = module.constants.get(behaviour.function)
+    if what:
+        return context.at_value(
+            behaviour.path,
+            'uncallable-behaviour',
+            f"'{behaviour.name}' is {what}, and cannot be called",
+            part=behaviour.function,
+        )
+    return context.at_value(
+        behaviour.path,
+        'unknown-behaviour',
+        f"{behaviour.module} has no function '{behaviour.function}'",
+        part=behaviour.function,
+        help=did_you_mean(behaviour.function, _public(module.functions), 'it has'),
+    )
+
+
+def _public(names: Mapping[str, object]) -> list[str]:
+    return [name for name in names if not name.startswith('_')]
+
+
+def _check_signature(
+    context: CheckContext, binding: Binding, signature: inspect.Signature
+) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
+    by_keyword = _keyword_parameters(signature)
+    taken = list(signature.parameters)[: len(binding.parameters)]
+    for keyword in behaviour.arguments:
+        if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
+            options = [name for name in by_keyword if name not in taken]
+            yield context.at_key(
+                (*behaviour.path[:-1], 'with', keyword),
+                'bad-argument',
+                f"{behaviour.name} takes no argument '{keyword}'",
+                help=did_you_mean(keyword, options, 'it takes') or 'it takes no more arguments',
+            )
+    try:
+        known = {k: None for k in behaviour.arguments if by_keyword is None or k in by_keyword}
+        free = {key: None for key in known if key not in taken}
+        signature.bind(*binding.parameters, **free)
+    except TypeError as error:
+        shown = str(signature).replace('=Ellipsis', '=…')
+        yield context.at_value(
+            behaviour.path,
+            'bad-signature',
+            f'{behaviour.function}{shown} is called as {binding.call}: {error}',
+            part=behaviour.function,
+        )
+
+
+def _keyword_parameters(signature: inspect.Signature) -> list[str] | None:
+    """Return the names that can be given by keyword, `None` if any can."""
+    parameters = signature.parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return None
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return [parameter.name for parameter in parameters if parameter.kind in kinds]

@@ -1,0 +1,56 @@
+"""What the rules look at, and how they say what they found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Diagnostic, Severity, diagnostic_at
+
+if TYPE_CHECKING:
+    from composer.interfaces.catalogue import InterfaceCatalogue
+    from composer.language import LoadedSystem
+    from composer.language.positions import DataPath
+    from composer.language.specs import SystemSpec
+    from composer.python_source import ModuleFinder
+
+
+@dataclass(frozen=True, slots=True)
+class CheckContext:
+    """A system and what there is to hold it against."""
+
+    system: LoadedSystem
+    spec: SystemSpec
+    catalogue: InterfaceCatalogue
+    modules: ModuleFinder
+
+    def was_dropped(self, path: DataPath) -> bool:
+        """Return whether an entry is missing only because its own fault was reported already."""
+        return path in self.system.dropped
+
+    def at_value(
+        self,
+        path: DataPath,
+        rule: str,
+        message: str,
+        *,
+        part: str = '',
+        help: str | None = None,  # noqa: A002 - the word that the finding shows
+        severity: Severity = Severity.ERROR,
+    ) -> Diagnostic:
+        """Return a finding at a value, or at the last `part` of its text."""
+        span = self.system.positions.value(path).narrowed_to(part)
+        return diagnostic_at(span, rule, message, help=help, severity=severity)
+
+    def at_key(
+        self,
+        path: DataPath,
+        rule: str,
+        message: str,
+        *,
+        help: str | None = None,  # noqa: A002 - the word that the finding shows
+        severity: Severity = Severity.ERROR,
+    ) -> Diagnostic:
+        """Return a finding at a key."""
+        span = self.system.positions.key(path)
+        return diagnostic_at(span, rule, message, help=help, severity=severity)

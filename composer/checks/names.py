@@ -1,0 +1,84 @@
+"""Names of nodes, namespaces, topics and parameters, by ROS's own rules."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.names import (
+    find_namespace_fault,
+    find_node_name_fault,
+    find_parameter_name_fault,
+    find_topic_name_fault,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.positions import DataPath
+    from composer.language.specs import NodeSpec, PublisherSpec, SubscriptionSpec
+
+_RULE = 'bad-name'
+_NAMES_ITS_TOPIC = "give the topic's name with 'topic:', and let this be a plain word"
+
+
+def check_names(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check every name that ROS will see."""
+    yield from _check_namespaces(context)
+    for name, node in context.spec.nodes.items():
+        fault = find_node_name_fault(name)
+        if fault:
+            yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
+        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+            yield from _check_topic(context, entity)
+        for parameter in node.parameters.values():
+            fault = find_parameter_name_fault(parameter.name)
+            if fault:
+                yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {fault}")
+        yield from _check_remap(context, node)
+
+
+def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
+    reported: set[DataPath] = set()
+    for node in context.spec.nodes.values():
+        fault = find_namespace_fault(node.namespace)
+        own = (*node.path, 'namespace')
+        path = own if own in context.system.positions.values else ('defaults', 'namespace')
+        if fault and path not in reported:
+            reported.add(path)
+            yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
+
+
+def _check_topic(
+    context: CheckContext, entity: PublisherSpec | SubscriptionSpec
+) -> Iterator[Diagnostic]:
+    fault = find_topic_name_fault(entity.topic)
+    if not fault:
+        return
+    message = f"'{entity.topic}' cannot name a topic: {fault}"
+    path = (*entity.path, 'topic')
+    if path in context.system.positions.values:
+        yield context.at_value(path, _RULE, message)
+    else:
+        yield context.at_key(entity.path, _RULE, message, help=_NAMES_ITS_TOPIC)
+
+
+def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    for source, target in node.remap:
+        path = (*node.path, 'remap', source)
+        if source.startswith('__'):
+            key = {'__node': 'the key of the node', '__ns': "'namespace:'"}.get(source)
+            help_text = f'{key} says it' if key else None
+            message = f"'{source}' is not remapped here"
+            yield context.at_key(path, 'bad-remap', message, help=help_text)
+            continue
+        scheme, separator, bare = source.rpartition('://')
+        if separator and scheme not in ('rostopic', 'rosservice'):
+            message = f"'{scheme}://' is no scheme of a remapping rule"
+            yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
+            continue
+        for name, at in ((bare, context.at_key), (target, context.at_value)):
+            fault = find_topic_name_fault(name)
+            if fault:
+                yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")

@@ -1,0 +1,115 @@
+"""Declarations of parameters: types, ranges, choices and the values that they start with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.language.parameters import find_type_fault
+from composer.language.specs import ParameterSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.positions import DataPath
+
+_RULE = 'bad-parameter'
+_NUMERIC = ('integer', 'double')
+_HAS_CHOICES = (*_NUMERIC, 'string')
+
+# rclpy compares steps of doubles with this relative tolerance (`Node._apply_floating_point_range`).
+_STEP_TOLERANCE = 1e-6
+
+
+def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check each declaration against itself."""
+    for node in context.spec.nodes.values():
+        for parameter in node.parameters.values():
+            yield from _check_parameter(context, parameter)
+
+
+def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
+    path = _value_path(context, parameter)
+    if parameter.name == 'use_sim_time':
+        message = "'use_sim_time' is a key of the node, not one of its parameters"
+        yield context.at_key(parameter.path, _RULE, message, help="move it out of 'parameters:'")
+        return
+    if parameter.type is None:
+        yield context.at_value(
+            path,
+            _RULE,
+            'the type of this list cannot be told',
+            help="write {default: [], type: string_array}, with the type that is meant",
+        )
+        return
+    fault = None if parameter.value is None else find_type_fault(parameter.value, parameter.type)
+    if fault:
+        yield context.at_value(path, _RULE, f"parameter '{parameter.name}': {fault}")
+        return
+    limits = list(_check_limits(context, parameter))
+    yield from limits
+    if not limits and parameter.value is not None:
+        refusal = find_refusal(parameter, parameter.value)
+        if refusal:
+            yield context.at_value(path, _RULE, f"parameter '{parameter.name}': {refusal}")
+
+
+def _value_path(context: CheckContext, parameter: ParameterSpec) -> DataPath:
+    inner = (*parameter.path, 'default')
+    return inner if inner in context.system.positions.values else parameter.path
+
+
+def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
+    assert parameter.type is not None  # noqa: S101 - told by the caller, for the type checker
+    for key in ('minimum', 'maximum', 'step'):
+        limit = getattr(parameter, key)
+        if limit is None:
+            continue
+        path = (*parameter.path, key)
+        if parameter.type not in _NUMERIC:
+            message = f"'{key}' is for integers and doubles, and this is a {parameter.type}"
+            yield context.at_key(path, _RULE, message)
+        elif fault := find_type_fault(limit, parameter.type):
+            yield context.at_value(path, _RULE, f"'{key}': {fault}")
+    low, high = parameter.minimum, parameter.maximum
+    if low is not None and high is not None and low > high:
+        path = (*parameter.path, 'maximum')
+        yield context.at_value(path, _RULE, f'the maximum {high} is below the minimum {low}')
+    if parameter.step is not None and (low is None or high is None):
+        message = "'step' needs 'minimum' and 'maximum' beside it"
+        yield context.at_key((*parameter.path, 'step'), _RULE, message)
+    yield from _check_choices(context, parameter)
+
+
+def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
+    if parameter.choices is None or parameter.type is None:
+        return
+    path = (*parameter.path, 'choices')
+    if parameter.type not in _HAS_CHOICES:
+        message = f'choices are for integers, doubles and strings, and this is a {parameter.type}'
+        yield context.at_key(path, _RULE, message)
+        return
+    for index, choice in enumerate(parameter.choices):
+        fault = find_type_fault(choice, parameter.type)
+        if fault:
+            yield context.at_value((*path, index), _RULE, f'choice {index}: {fault}')
+
+
+def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:
+    """Return why a value of the right type would be refused, or `None` if it would be taken."""
+    if parameter.choices is not None and value not in parameter.choices:
+        return f'{value!r} is none of its choices: {", ".join(map(str, parameter.choices))}'
+    if parameter.type not in _NUMERIC:
+        return None
+    low, high, step = parameter.minimum, parameter.maximum, parameter.step
+    if low is not None and not value >= low:
+        return f'{value} is below the minimum {low}'
+    if high is not None and not value <= high:
+        return f'{value} is above the maximum {high}'
+    if step is None or low is None or value == high:
+        return None
+    steps = (value - low) / step
+    if abs(steps - round(steps)) > _STEP_TOLERANCE * max(1.0, abs(steps)):
+        return f'{value} is not minimum + n * step ({low} + n * {step})'
+    return None

@@ -1,0 +1,134 @@
+"""What names something else: publishers, QoS profiles, interface types."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.language.qos import BUILTIN_PROFILES, QosError, UnknownProfileError, resolve_qos
+from composer.names import did_you_mean, split_type
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.positions import DataPath
+    from composer.language.specs import NodeSpec, QosSpec
+
+
+def check_publish(context: CheckContext) -> Iterator[Diagnostic]:
+    """`publish:` names a publisher of the same node; a relay's types are the same on both ends."""
+    for node in context.spec.nodes.values():
+        for entity in (*node.timers.values(), *node.subscriptions.values()):
+            if entity.publish is not None:
+                yield from _check_publisher(context, node, entity.path, entity.publish)
+        yield from _check_relays(context, node)
+
+
+def _check_publisher(
+    context: CheckContext, node: NodeSpec, path: DataPath, publisher: str
+) -> Iterator[Diagnostic]:
+    section = (*node.path, 'publishers')
+    dropped = context.was_dropped((*section, publisher)) or context.was_dropped(section)
+    if publisher in node.publishers or dropped:
+        return
+    yield context.at_value(
+        (*path, 'publish'),
+        'unknown-publisher',
+        f"node '{node.name}' declares no publisher '{publisher}'",
+        help=did_you_mean(publisher, node.publishers, 'it declares')
+        or "declare it under 'publishers:'",
+    )
+
+
+def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    for subscription in node.subscriptions.values():
+        publisher = node.publishers.get(subscription.publish or '')
+        relays = subscription.behaviour is None and not context.was_dropped(
+            (*subscription.path, 'behaviour')
+        )
+        if relays and publisher and publisher.type != subscription.type:
+            yield context.at_value(
+                (*subscription.path, 'publish'),
+                'type-mismatch',
+                f"a {subscription.type} cannot be passed on to '{publisher.name}', "
+                f'which publishes {publisher.type}',
+                help='give both the same type, or convert in a behaviour',
+            )
+
+
+def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
+    """Every profile exists and leads to a built-in one."""
+    profiles = context.spec.qos
+    for name, profile in profiles.items():
+        if name in BUILTIN_PROFILES:
+            message = f"'{name}' is a profile of ROS and cannot be declared again"
+            yield context.at_key(profile.path, 'bad-name', message)
+    declared: dict[DataPath, QosSpec] = {profile.path: profile for profile in profiles.values()}
+    for node in context.spec.nodes.values():
+        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+            declared[entity.qos.path] = entity.qos
+    reported: set[DataPath] = set()
+    for spec in declared.values():
+        try:
+            resolve_qos(spec, profiles)
+        except QosError as error:
+            if error.spec.path not in reported:
+                reported.add(error.spec.path)
+                yield from _explain_qos(context, error)
+
+
+def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]:
+    name = error.spec.profile
+    if context.was_dropped(('qos', name)):
+        return
+    inner = (*error.spec.path, 'profile')
+    path = inner if inner in context.system.positions.values else error.spec.path
+    if isinstance(error, UnknownProfileError):
+        options = {*context.spec.qos, *BUILTIN_PROFILES}
+        help_text = did_you_mean(name, options, 'the profiles are')
+        yield context.at_value(path, 'unknown-qos-profile', str(error), help=help_text)
+    else:
+        yield context.at_value(path, 'cyclic-qos-profile', str(error))
+
+
+def check_types(context: CheckContext) -> Iterator[Diagnostic]:
+    """Every message type is one of an installed package."""
+    catalogue = context.catalogue
+    if not catalogue.available:
+        return
+    for node in context.spec.nodes.values():
+        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+            package = entity.type.partition('/')[0]
+            if entity.type in catalogue.names('msg', package):
+                continue
+            path = (*entity.path, 'type')
+            inner = path if path in context.system.positions.values else entity.path
+            yield _explain_type(context, inner, entity.type)
+
+
+def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diagnostic:
+    parts = split_type(full_name)
+    packages = context.catalogue.packages()
+    package, name = (parts[0], parts[2]) if parts else ('', '')
+    if package not in packages:
+        return context.at_value(
+            path,
+            'unknown-type',
+            f"no interface package '{package}' is installed",
+            part=package,
+            help=_nearest(package, packages) or 'install it, or mend its name',
+        )
+    names = [known.rpartition('/')[2] for known in context.catalogue.names('msg', package)]
+    return context.at_value(
+        path,
+        'unknown-type',
+        f"the package '{package}' has no message '{name}'",
+        part=name,
+        help=did_you_mean(name, names, 'its messages are'),
+    )
+
+
+def _nearest(word: str, options: list[str]) -> str | None:
+    found = did_you_mean(word, options)
+    return found if found and found.startswith('did') else None

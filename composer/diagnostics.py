@@ -1,0 +1,122 @@
+"""Findings as data: what is wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class Severity(Enum):
+    """How much a finding weighs: an error stops `composer up`, a warning does not."""
+
+    ERROR = 'error'
+    WARNING = 'warning'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceFile:
+    """The text of a file as it was read.
+
+    Attributes:
+        name: The path as the user wrote it, for display.
+        lines: The lines without their ends.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+
+    def line(self, number: int) -> str:
+        """Return line `number`, counted from 1; an empty string past the end."""
+        return self.lines[number - 1] if 0 < number <= len(self.lines) else ''
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of one line.
+
+    Attributes:
+        source: The file it lies in.
+        line: Counted from 1.
+        column: Of its first character, counted from 1.
+        length: In characters; 0 where a value is missing.
+    """
+
+    source: SourceFile
+    line: int
+    column: int
+    length: int = 1
+
+    @property
+    def text(self) -> str:
+        """The characters that the span covers."""
+        start = self.column - 1
+        return self.source.line(self.line)[start : start + self.length]
+
+    def narrowed_to(self, part: str) -> Span:
+        """Return the span of the last `part` within this one, or this one if it has none."""
+        start = self.text.rfind(part) if part else -1
+        if start < 0:
+            return self
+        return Span(self.source, self.line, self.column + start, len(part))
+
+    def __str__(self) -> str:
+        """Return `file:line:column`."""
+        return f'{self.source.name}:{self.line}:{self.column}'
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that a finding speaks of."""
+
+    message: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding.
+
+    Attributes:
+        rule: The rule's stable name, as in `unknown-key`.
+        message: What is wrong and what was expected, in one line.
+        file: The file's name; also there when the fault has no line (an unreadable file).
+        span: Where it is.
+        help: What to do about it.
+        related: Other places that take part in it.
+    """
+
+    rule: str
+    message: str
+    file: str
+    span: Span | None = None
+    severity: Severity = Severity.ERROR
+    help: str | None = None
+    related: tuple[Related, ...] = field(default=())
+
+    @property
+    def sort_key(self) -> tuple[str, int, int, str, str]:
+        """Files by name, then from top to bottom."""
+        line, column = (self.span.line, self.span.column) if self.span else (0, 0)
+        return self.file, line, column, self.rule, self.message
+
+
+def diagnostic_at(
+    span: Span,
+    rule: str,
+    message: str,
+    *,
+    help: str | None = None,  # noqa: A002 - the word that the finding shows
+    severity: Severity = Severity.ERROR,
+    related: Iterable[Related] = (),
+) -> Diagnostic:
+    """Return a finding whose file is that of its span."""
+    return Diagnostic(rule, message, span.source.name, span, severity, help, tuple(related))
+
+
+def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Return whether any of the findings is an error."""
+    return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)

@@ -1,0 +1,1 @@
+"""ROS interface types: find them, describe them, import them."""

@@ -1,0 +1,192 @@
+"""YAML text → a tree of nodes with spans, in constant stack whatever the input nests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import yaml
+
+from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
+
+# No system needs more; the bound keeps all later walks over the data safe from deep recursion.
+MAX_DEPTH = 100
+
+# libyaml's parser is ten times faster; wheels of PyYAML bring it, source builds may not.
+_Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+@dataclass(frozen=True, slots=True)
+class ScalarNode:
+    """A scalar as written; `plain` if it has neither quotes nor a block style."""
+
+    text: str
+    tag: str | None
+    plain: bool
+    span: Span
+
+
+@dataclass(slots=True, eq=False)
+class SequenceNode:
+    """A list; nodes may stand in several places through aliases."""
+
+    tag: str | None
+    span: Span
+    items: list[TreeNode] = field(default_factory=list)
+
+
+@dataclass(slots=True, eq=False)
+class MappingNode:
+    """A mapping, with its keys in the order of the text, duplicates included."""
+
+    tag: str | None
+    span: Span
+    pairs: list[tuple[TreeNode, TreeNode]] = field(default_factory=list)
+    pending_key: TreeNode | None = None
+
+
+TreeNode: TypeAlias = ScalarNode | SequenceNode | MappingNode
+
+
+class CompositionError(Exception):
+    """The text cannot be read to its end.
+
+    Attributes:
+        diagnostic: Why.
+    """
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
+    """Return the one document of a text, or `None` if it is empty.
+
+    Raises:
+        CompositionError: The text is not YAML, nests too deep, holds several documents, or an
+            alias that is unknown or contains itself.
+    """
+    composer = _TreeBuilder(source)
+    try:
+        for event in yaml.parse(text, Loader=_Loader):
+            composer.take(event)
+    except yaml.MarkedYAMLError as error:
+        raise CompositionError(_syntax_fault(error, source)) from error
+    except yaml.reader.ReaderError as error:
+        raise CompositionError(_character_fault(error, text, source)) from error
+    except yaml.YAMLError as error:
+        raise CompositionError(
+            diagnostic_at(Span(source, 1, 1, 0), 'yaml-syntax', f'this is not YAML: {error}')
+        ) from error
+    return composer.root
+
+
+class _TreeBuilder:
+    """Takes the parser's events one by one."""
+
+    def __init__(self, source: SourceFile) -> None:
+        self.root: TreeNode | None = None
+        self._source = source
+        self._open: list[SequenceNode | MappingNode] = []
+        self._anchors: dict[str, TreeNode] = {}
+        self._documents = 0
+
+    def take(self, event: Any) -> None:
+        if isinstance(event, yaml.ScalarEvent):
+            plain = event.implicit[0] and not event.style
+            tag = None if event.implicit[0] or event.implicit[1] else event.tag
+            self._add(ScalarNode(event.value, tag, plain, self._span(event)), event.anchor)
+        elif isinstance(event, yaml.MappingStartEvent):
+            self._enter(MappingNode(event.tag, self._span(event)), event)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            self._enter(SequenceNode(event.tag, self._span(event)), event)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            self._open.pop()
+        elif isinstance(event, yaml.AliasEvent):
+            self._add(self._aliased(event), None)
+        elif isinstance(event, yaml.DocumentStartEvent):
+            self._documents += 1
+            if self._documents > 1:
+                self._stop(event, 'several-documents', 'a file holds one YAML document, not more')
+
+    def _enter(self, node: SequenceNode | MappingNode, event: Any) -> None:
+        self._add(node, event.anchor)
+        self._open.append(node)
+        if len(self._open) > MAX_DEPTH:
+            self._stop(event, 'too-deep', f'the data nest more than {MAX_DEPTH} levels deep')
+
+    def _add(self, node: TreeNode, anchor: str | None) -> None:
+        if anchor is not None:
+            self._anchors[anchor] = node
+        if not self._open:
+            self.root = node
+            return
+        parent = self._open[-1]
+        if isinstance(parent, SequenceNode):
+            parent.items.append(node)
+        elif parent.pending_key is None:
+            parent.pending_key = node
+        else:
+            parent.pairs.append((parent.pending_key, node))
+            parent.pending_key = None
+
+    def _aliased(self, event: Any) -> TreeNode:
+        node = self._anchors.get(event.anchor)
+        if node is None:
+            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} stands before this alias')
+        if node in self._open:
+            self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
+        return node
+
+    def _span(self, event: Any) -> Span:
+        start, end = event.start_mark, event.end_mark
+        if not isinstance(event, yaml.ScalarEvent | yaml.AliasEvent):
+            return Span(self._source, start.line + 1, start.column + 1)
+        if start.line == end.line:
+            length = end.column - start.column
+        else:
+            length = max(len(self._source.line(start.line + 1).rstrip()) - start.column, 1)
+        return Span(self._source, start.line + 1, start.column + 1, length)
+
+    def _stop(self, event: Any, rule: str, message: str) -> Any:
+        raise CompositionError(diagnostic_at(self._span(event), rule, message))
+
+
+def _syntax_fault(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
+    mark = error.problem_mark or error.context_mark
+    span = Span(source, mark.line + 1, mark.column + 1) if mark else Span(source, 1, 1, 0)
+    problem = error.problem or error.context or 'it cannot be parsed'
+    begun = error.context_mark
+    context = f' {error.context}' if error.context and error.problem else ''
+    if context and begun and mark and begun.line != mark.line:
+        context += f' that begins in line {begun.line + 1}'
+    return diagnostic_at(
+        span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
+    )
+
+
+def _syntax_help(span: Span) -> str | None:
+    line = span.source.line(span.line)
+    indent = line[: len(line) - len(line.lstrip())]
+    if '\t' in indent or span.text == '\t':
+        return 'YAML is indented with spaces, never with tabs'
+    if line.count(': ') > 1:
+        return "put a value that contains ': ' in quotes"
+    return None
+
+
+def _character_fault(
+    error: yaml.reader.ReaderError, text: str, source: SourceFile
+) -> Diagnostic:
+    position = error.position if isinstance(error.position, int) else 0
+    before = text[:position]
+    line = before.count('\n') + 1
+    column = position - (before.rfind('\n') + 1) + 1
+    code = error.character if isinstance(error.character, int) else ord(str(error.character)[:1])
+    return diagnostic_at(
+        Span(source, line, column),
+        'yaml-syntax',
+        f'YAML does not allow the character U+{code:04X}',
+        help='remove it, or write it as an escape in double quotes',
+    )

@@ -1,0 +1,74 @@
+"""The types of ROS parameters, and which one a value of YAML has.
+
+Source: `rcl_interfaces/msg/ParameterType`; the names are those of `rclpy.parameter.Parameter.Type`
+in lower case.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+_SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
+PARAMETER_TYPES = (*_SCALARS.values(), *(f'{name}_array' for name in ('byte', *_SCALARS.values())))
+
+INT64_MIN = -(2**63)
+INT64_MAX = 2**63 - 1
+_BYTE_MAX = 255
+
+
+def infer_parameter_type(value: Any) -> str | None:
+    """Return the type of a value; `None` for an empty list and for lists of mixed types.
+
+    Integers and doubles together are doubles.
+    """
+    if not isinstance(value, list):
+        return _SCALARS.get(type(value))
+    types = {_SCALARS.get(type(item)) for item in value}
+    if types == {'integer', 'double'}:
+        return 'double_array'
+    only = types.pop() if len(types) == 1 else None
+    return f'{only}_array' if only else None
+
+
+def convert_parameter_value(value: Any, type_name: str | None) -> Any:
+    """Return the value with integers made doubles where the type wants doubles.
+
+    A value that does not fit its type comes back as it is.
+    """
+    if type_name == 'double' and type(value) is int:
+        return float(value)
+    if type_name == 'double_array' and isinstance(value, list):
+        return [float(item) if type(item) is int else item for item in value]
+    return value
+
+
+def find_type_fault(value: Any, type_name: str) -> str | None:
+    """Return why a value is not of a parameter type, or `None` if it is."""
+    if type_name.endswith('_array'):
+        return _find_array_fault(value, type_name.removesuffix('_array'))
+    if _SCALARS.get(type(convert_parameter_value(value, type_name))) != type_name:
+        return f'expected {_with_article(type_name)}, got {value!r}'
+    return _find_width_fault(value, type_name)
+
+
+def _find_array_fault(value: Any, item_type: str) -> str | None:
+    if not isinstance(value, list):
+        return f'expected a list, of {item_type} values, got {value!r}'
+    for index, item in enumerate(value):
+        wanted = 'integer' if item_type == 'byte' else item_type
+        fault = find_type_fault(item, wanted)
+        if fault is None and item_type == 'byte' and not 0 <= item <= _BYTE_MAX:
+            fault = f'expected a byte (0 to {_BYTE_MAX}), got {item}'
+        if fault:
+            return f'item {index}: {fault}'
+    return None
+
+
+def _find_width_fault(value: Any, type_name: str) -> str | None:
+    if type_name == 'integer' and not INT64_MIN <= value <= INT64_MAX:
+        return f'{value} does not fit 64 bits'
+    return None
+
+
+def _with_article(type_name: str) -> str:
+    return f'an {type_name}' if type_name[0] in 'aeiou' else f'a {type_name}'

@@ -1,0 +1,205 @@
+"""Plain data that satisfy the schema → specs. Nothing is checked here that the schema checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from composer.language.parameters import convert_parameter_value, infer_parameter_type
+from composer.language.qos import DEFAULT_PROFILE
+from composer.language.specs import (
+    DEFAULT_SHUTDOWN_TIMEOUT_SEC,
+    DEFAULT_THREADS,
+    BehaviourSpec,
+    NodeSpec,
+    ParameterSpec,
+    PublisherSpec,
+    QosSpec,
+    SubscriptionSpec,
+    SystemSpec,
+    TimerSpec,
+)
+from composer.names import expand_namespace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from composer.language.positions import DataPath
+
+Spec = TypeVar('Spec')
+Data = dict[str, Any]
+
+
+def parse_system(data: Data, name: str) -> SystemSpec:
+    """Return the system that the data describe.
+
+    Args:
+        data: As the schema wants them.
+        name: The file's name without its ending.
+    """
+    executor = data.get('executor', {})
+    defaults = _parse_defaults(data.get('defaults', {}))
+    return SystemSpec(
+        name=name,
+        description=data.get('description', ''),
+        qos=_parse_entries(data, (), 'qos', _parse_named_qos),
+        threads=int(executor.get('threads', DEFAULT_THREADS)),
+        shutdown_timeout_sec=float(
+            executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)
+        ),
+        nodes=_parse_entries(
+            data, (), 'nodes', lambda name, node, path: _NodeParser(defaults, node, path).parse(name)
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Defaults:
+    namespace: str
+    qos: QosSpec
+    node: Data
+
+
+def _parse_defaults(data: Data) -> _Defaults:
+    inherited = {'log_level', 'use_sim_time', 'on_error'}
+    return _Defaults(
+        namespace=expand_namespace(data.get('namespace', '')),
+        qos=_parse_qos(data['qos'], ('defaults', 'qos'))
+        if 'qos' in data
+        else QosSpec(DEFAULT_PROFILE, {}, ()),
+        node={key: value for key, value in data.items() if key in inherited},
+    )
+
+
+class _NodeParser:
+    """Parses one node; what all its entities share is kept here."""
+
+    def __init__(self, defaults: _Defaults, data: Data, path: DataPath) -> None:
+        self._defaults = defaults
+        self._data = defaults.node | data
+        self._path = path
+        self._on_error = self._data.get('on_error', 'log')
+
+    def parse(self, name: str) -> NodeSpec:
+        data, path = self._data, self._path
+        return NodeSpec(
+            name=name,
+            namespace=expand_namespace(data.get('namespace', ''), self._defaults.namespace),
+            description=data.get('description', ''),
+            log_level=data.get('log_level'),
+            use_sim_time=data.get('use_sim_time', False),
+            on_error=self._on_error,
+            parameters=_parse_entries(data, path, 'parameters', _parse_parameter),
+            state=MappingProxyType(data.get('state', {})),
+            remap=tuple(data.get('remap', {}).items()),
+            publishers=_parse_entries(data, path, 'publishers', self._parse_publisher),
+            subscriptions=_parse_entries(data, path, 'subscriptions', self._parse_subscription),
+            timers=_parse_entries(data, path, 'timers', self._parse_timer),
+            on_start=self._parse_hook('on_start'),
+            on_stop=self._parse_hook('on_stop'),
+            on_parameters=self._parse_hook('on_parameters'),
+            path=path,
+        )
+
+    def _parse_publisher(self, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
+        if isinstance(data, str):
+            return PublisherSpec(name, data, name, self._defaults.qos, path)
+        return PublisherSpec(
+            name, data['type'], data.get('topic', name), self._parse_entity_qos(data, path), path
+        )
+
+    def _parse_subscription(self, name: str, data: Data, path: DataPath) -> SubscriptionSpec:
+        return SubscriptionSpec(
+            name=name,
+            type=data['type'],
+            topic=data.get('topic', name),
+            qos=self._parse_entity_qos(data, path),
+            behaviour=_parse_behaviour(data, path),
+            publish=data.get('publish'),
+            group=data.get('group'),
+            on_error=data.get('on_error', self._on_error),
+            path=path,
+        )
+
+    def _parse_timer(self, name: str, data: Data, path: DataPath) -> TimerSpec:
+        return TimerSpec(
+            name=name,
+            period_sec=float(data['period']) if 'period' in data else 1.0 / data['rate'],
+            behaviour=_parse_behaviour(data, path),
+            publish=data.get('publish'),
+            message=data.get('message'),
+            clock=data.get('clock', 'ros'),
+            group=data.get('group'),
+            on_error=data.get('on_error', self._on_error),
+            path=path,
+        )
+
+    def _parse_entity_qos(self, data: Data, path: DataPath) -> QosSpec:
+        return _parse_qos(data['qos'], (*path, 'qos')) if 'qos' in data else self._defaults.qos
+
+    def _parse_hook(self, key: str) -> BehaviourSpec | None:
+        data = self._data.get(key)
+        if isinstance(data, str):
+            data = {'behaviour': data}
+            return _parse_behaviour(data, self._path, (*self._path, key))
+        return _parse_behaviour(data, (*self._path, key)) if data else None
+
+
+def _parse_entries(
+    data: Data, path: DataPath, key: str, parse: Callable[[str, Any, DataPath], Spec]
+) -> Mapping[str, Spec]:
+    entries = data.get(key, {})
+    return MappingProxyType(
+        {name: parse(name, entry, (*path, key, name)) for name, entry in entries.items()}
+    )
+
+
+def _parse_behaviour(
+    data: Data, path: DataPath, own_path: DataPath | None = None
+) -> BehaviourSpec | None:
+    if 'behaviour' not in data:
+        return None
+    module, _, function = data['behaviour'].partition(':')
+    return BehaviourSpec(
+        module,
+        function,
+        MappingProxyType(data.get('with', {})),
+        own_path or (*path, 'behaviour'),
+    )
+
+
+def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa: ARG001 - a parser of entries
+    return _parse_qos(data, path)
+
+
+def _parse_qos(data: int | float | str | Data, path: DataPath) -> QosSpec:
+    if isinstance(data, str):
+        return QosSpec(data, {}, path)
+    if not isinstance(data, dict):
+        return QosSpec(DEFAULT_PROFILE, {'depth': int(data)}, path)
+    policies = {key: value for key, value in data.items() if key != 'profile'}
+    if 'depth' in policies:
+        policies['depth'] = int(policies['depth'])
+    return QosSpec(data.get('profile', DEFAULT_PROFILE), policies, path)
+
+
+def _parse_parameter(name: str, data: Any, path: DataPath) -> ParameterSpec:
+    declaration = data if isinstance(data, dict) else {'default': data}
+    value = declaration.get('default')
+    type_name = declaration.get('type') or infer_parameter_type(value)
+    choices = declaration.get('choices')
+    return ParameterSpec(
+        name=name,
+        type=type_name,
+        value=convert_parameter_value(value, type_name),
+        description=declaration.get('description', ''),
+        read_only=declaration.get('read_only', False),
+        minimum=declaration.get('minimum'),
+        maximum=declaration.get('maximum'),
+        step=declaration.get('step'),
+        choices=None
+        if choices is None
+        else tuple(convert_parameter_value(choice, type_name) for choice in choices),
+        path=path,
+    )

@@ -1,0 +1,93 @@
+"""QoS profiles by name, and what a declared one comes to.
+
+The built-in profiles are those of rmw (`rmw/qos_profiles.h`), with rclpy's names.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.language.specs import QosSpec
+
+DEFAULT_PROFILE = 'default'
+
+_DEFAULT = {
+    'history': 'keep_last',
+    'depth': 10,
+    'reliability': 'reliable',
+    'durability': 'volatile',
+    'liveliness': 'system_default',
+}
+
+# Durations that are not named are not limited.
+BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
+    DEFAULT_PROFILE: _DEFAULT,
+    'sensor_data': _DEFAULT | {'depth': 5, 'reliability': 'best_effort'},
+    'services_default': _DEFAULT,
+    'parameters': _DEFAULT | {'depth': 1000},
+    'parameter_events': _DEFAULT | {'depth': 1000},
+    'action_status_default': _DEFAULT | {'depth': 1, 'durability': 'transient_local'},
+    'system_default': {
+        'history': 'system_default',
+        'reliability': 'system_default',
+        'durability': 'system_default',
+        'liveliness': 'system_default',
+    },
+    'best_available': {
+        'history': 'keep_last',
+        'depth': 10,
+        'reliability': 'best_available',
+        'durability': 'best_available',
+        'liveliness': 'best_available',
+        'deadline': 'best_available',
+        'liveliness_lease_duration': 'best_available',
+    },
+}
+
+
+class QosError(ComposerError):
+    """A profile that does not exist, or that leads back to itself.
+
+    Attributes:
+        spec: The QoS that names the profile.
+    """
+
+    def __init__(self, message: str, spec: QosSpec) -> None:
+        super().__init__(message)
+        self.spec = spec
+
+
+class UnknownProfileError(QosError):
+    """No profile of the file or of ROS has the name."""
+
+
+def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
+    """Return the policies of a QoS, those of the profiles that it starts from included.
+
+    Args:
+        profiles: The named profiles of the file.
+
+    Raises:
+        UnknownProfileError: A profile does not exist.
+        QosError: A profile leads back to itself.
+    """
+    chain = [spec]
+    while chain[-1].profile in profiles:
+        following = profiles[chain[-1].profile]
+        if following in chain:
+            message = f"the QoS profile '{chain[-1].profile}' leads back to itself"
+            raise QosError(message, chain[-1])
+        chain.append(following)
+    base = BUILTIN_PROFILES.get(chain[-1].profile)
+    if base is None:
+        message = f"no QoS profile is called '{chain[-1].profile}'"
+        raise UnknownProfileError(message, chain[-1])
+    policies = dict(base)
+    for link in reversed(chain):
+        policies |= link.policies
+    return policies

@@ -1,0 +1,95 @@
+"""The core schema of YAML 1.2.2 (section 10.3.2): which type a plain scalar has."""
+
+from __future__ import annotations
+
+import re
+from typing import TypeAlias
+
+Scalar: TypeAlias = str | int | float | bool | None
+
+_NULL = frozenset({'', '~', 'null', 'Null', 'NULL'})
+_BOOL = {'true': True, 'True': True, 'TRUE': True, 'false': False, 'False': False, 'FALSE': False}
+_INT = re.compile(r'[-+]?[0-9]+')
+_OCT = re.compile(r'0o[0-7]+')
+_HEX = re.compile(r'0x[0-9a-fA-F]+')
+_FLOAT = re.compile(r'[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?')
+_INF = re.compile(r'[-+]?\.(inf|Inf|INF)')
+_NAN = frozenset({'.nan', '.NaN', '.NAN'})
+_NUMBER_START = frozenset('+-.0123456789')
+
+# Python refuses to read longer decimal numbers (sys.set_int_max_str_digits); no ROS field or
+# parameter holds more than 20 digits.
+_MAX_DIGITS = 400
+
+_TAG_PREFIX = 'tag:yaml.org,2002:'
+TAG_STR = _TAG_PREFIX + 'str'
+TAG_MAP = _TAG_PREFIX + 'map'
+TAG_SEQ = _TAG_PREFIX + 'seq'
+_TAGGED_TYPES: dict[str, tuple[type, ...]] = {
+    _TAG_PREFIX + 'null': (type(None),),
+    _TAG_PREFIX + 'bool': (bool,),
+    _TAG_PREFIX + 'int': (int,),
+    _TAG_PREFIX + 'float': (float, int),
+}
+
+
+class ScalarError(ValueError):
+    """The text is no scalar of its tag, or a number beyond all bounds."""
+
+
+def parse_plain_scalar(text: str) -> Scalar:
+    """Return the value of an untagged plain scalar.
+
+    Raises:
+        ScalarError: A number is longer than 400 digits.
+    """
+    if text in _NULL:
+        return None
+    if text in _BOOL:
+        return _BOOL[text]
+    if text[0] not in _NUMBER_START:
+        return text
+    return _parse_number(text)
+
+
+def parse_tagged_scalar(text: str, tag: str) -> Scalar:
+    """Return the value of a scalar with an explicit tag, as in `!!float 1`.
+
+    Raises:
+        ScalarError: The tag is none of the core schema's, or the text does not fit it.
+    """
+    if tag == TAG_STR:
+        return text
+    types = _TAGGED_TYPES.get(tag)
+    if types is None:
+        message = f'the tag {short_tag(tag)} is not one of YAML\'s core schema'
+        raise ScalarError(message)
+    value = parse_plain_scalar(text)
+    if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+        message = f'{text!r} is no {short_tag(tag)}'
+        raise ScalarError(message)
+    return float(value) if float in types and isinstance(value, int) else value
+
+
+def short_tag(tag: str) -> str:
+    """Return a tag as people write it: `!!str` for YAML's own ones."""
+    return '!!' + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag
+
+
+def _parse_number(text: str) -> Scalar:
+    if len(text) > _MAX_DIGITS and (_INT.fullmatch(text) or _HEX.fullmatch(text)):
+        message = f'a number of {len(text)} digits fits no type of ROS'
+        raise ScalarError(message)
+    if _INT.fullmatch(text):
+        return int(text, 10)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if _OCT.fullmatch(text):
+        return int(text, 8)
+    if _HEX.fullmatch(text):
+        return int(text, 16)
+    if _INF.fullmatch(text):
+        return float('-inf') if text[0] == '-' else float('inf')
+    if text in _NAN:
+        return float('nan')
+    return text

@@ -1,0 +1,114 @@
+"""The schema of the language: what it says of data, as findings in the words of the language.
+
+The schema (JSON Schema 2020-12) is the one description of the structure; editors use the same file.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import ValidationError
+from jsonschema.validators import extend
+
+from composer.language.schema_faults import StructureFault, explain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.diagnostics import Diagnostic
+    from composer.language.positions import DataPath, SourceMap
+
+SCHEMA_NAME = 'composer.schema.json'
+
+# What a file without these keys is read on with, once their absence has been reported.
+_REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
+
+
+def schema_path() -> Path:
+    """Return where the schema lies: beside the package in a checkout, inside it in a wheel."""
+    packaged = Path(str(resources.files('composer'))) / 'schemas' / SCHEMA_NAME
+    return packaged if packaged.exists() else packaged.parents[2] / 'schemas' / SCHEMA_NAME
+
+
+def check_structure(
+    data: dict[str, Any], positions: SourceMap
+) -> tuple[dict[str, Any], frozenset[DataPath], list[Diagnostic]]:
+    """Hold data against the schema.
+
+    A misspelt key is reported and then read as the one that was meant, so that what lies below
+    it is checked in the same run; `positions` follow it.
+
+    Returns:
+        The data without what was wrong, the paths that were dropped for it, and the findings.
+    """
+    findings: list[Diagnostic] = []
+    while misspelt := [fault for fault in _find_faults(data) if _can_be_mended(fault, data)]:
+        for fault in misspelt:
+            if _can_be_mended(fault, data):
+                findings.append(fault.diagnostic(positions))
+                data = _with_key_renamed(data, fault.path, str(fault.meant))
+                positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
+    findings += [fault.diagnostic(positions) for fault in _find_faults(data)]
+    dropped: set[DataPath] = set()
+    while faults := _find_faults(data):
+        paths = {fault.drop for fault in faults if fault.drop}
+        for path in paths:
+            data = _without(data, path)
+        data = _REQUIRED | data
+        dropped |= paths
+    return data, frozenset(dropped), findings
+
+
+def _find_faults(data: dict[str, Any]) -> list[StructureFault]:
+    return [fault for error in _validator().iter_errors(data) for fault in explain(error)]
+
+
+def _can_be_mended(fault: StructureFault, data: dict[str, Any]) -> bool:
+    """Return whether a fault is a misspelt key whose right spelling is not there as well."""
+    if fault.meant is None:
+        return False
+    mapping: Any = data
+    for key in fault.path[:-1]:
+        mapping = mapping[key]
+    return fault.path[-1] in mapping and fault.meant not in mapping
+
+
+def _with_key_renamed(data: Any, path: DataPath, key: str) -> Any:
+    head, *rest = path
+    if not rest:
+        return {key if name == head else name: value for name, value in data.items()}
+    if isinstance(data, list):
+        index = int(head)
+        return [*data[:index], _with_key_renamed(data[index], tuple(rest), key), *data[index + 1 :]]
+    return data | {head: _with_key_renamed(data[head], tuple(rest), key)}
+
+
+def _without(data: Any, path: DataPath) -> Any:
+    """Return a copy of nested mappings without the entry at `path`, if it is there."""
+    head, *rest = path
+    if not isinstance(data, dict) or head not in data:
+        return data
+    if not rest:
+        return {key: value for key, value in data.items() if key != head}
+    return data | {head: _without(data[head], tuple(rest))}
+
+
+@cache
+def _validator() -> Any:
+    schema = json.loads(schema_path().read_text(encoding='utf-8'))
+    strict = extend(Draft202012Validator, {'maximum': _check_maximum})
+    return strict(schema)
+
+
+def _check_maximum(
+    validator: Any, maximum: float, instance: object, _schema: object
+) -> Iterator[ValidationError]:
+    """As in JSON Schema, but a NaN is beyond every maximum (JSON has none, YAML has)."""
+    if validator.is_type(instance, 'number') and not instance <= maximum:  # type: ignore[operator]
+        yield ValidationError(f'{instance!r} is greater than the maximum of {maximum!r}')
+

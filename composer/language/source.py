@@ -1,0 +1,85 @@
+"""YAML text → plain data, with the position of every key and value beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, SourceFile
+from composer.language.composition import CompositionError, compose_tree
+from composer.language.construction import construct_data
+from composer.language.positions import SourceMap
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# A file of a thousand nodes with five thousand entities has one megabyte.
+MAX_BYTES = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A YAML file as it was read.
+
+    Attributes:
+        data: Mappings, lists and scalars of the core schema; `None` if nothing could be read.
+        diagnostics: What was wrong with the text.
+    """
+
+    data: dict[str, Any] | None
+    positions: SourceMap
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+
+def read_document(path: Path, name: str | None = None) -> Document:
+    """Read a file.
+
+    Args:
+        name: How the file is called in findings; by default as `path` is written.
+    """
+    name = name or str(path)
+    try:
+        with path.open('rb') as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        return _unreadable(name, f'cannot read the file: {reason}')
+    if len(content) > MAX_BYTES:
+        return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
+    return parse_document(content, name)
+
+
+def parse_document(content: bytes, name: str) -> Document:
+    """Read the text of a file: UTF-8, one YAML document, a mapping at its top."""
+    try:
+        text = content.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        line = content.count(b'\n', 0, error.start) + 1
+        return _unreadable(
+            name,
+            f'the file is not UTF-8: byte {content[error.start]:#04x} in line {line}',
+            help='save the file as UTF-8',
+        )
+    positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
+    try:
+        tree = compose_tree(text, positions.source)
+        data, faults = construct_data(tree, positions)
+    except CompositionError as error:
+        return Document(None, positions, (error.diagnostic,))
+    if isinstance(data, dict):
+        return Document(data, positions, faults)
+    if tree is None:
+        return _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
+    top = Diagnostic(
+        'wrong-type',
+        'a file is a mapping with the keys version and nodes',
+        name,
+        tree.span,
+        help="begin with 'version: 1'",
+    )
+    return Document(None, positions, (*faults, top))
+
+
+def _unreadable(name: str, message: str, help: str | None = None) -> Document:  # noqa: A002
+    finding = Diagnostic('unreadable-file', message, name, help=help)
+    return Document(None, SourceMap(SourceFile(name, ())), (finding,))

@@ -1,0 +1,171 @@
+"""A system as the file declares it: frozen records, one per thing of the language.
+
+Every record carries the path of its data, under which a `SourceMap` knows where it was written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.language.positions import DataPath
+
+LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
+OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
+ClockName: TypeAlias = Literal['ros', 'steady', 'system']
+
+DEFAULT_THREADS = 8
+DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
+REENTRANT = 'reentrant'
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourSpec:
+    """A Python function by name, with constant keyword arguments."""
+
+    module: str
+    function: str
+    arguments: Mapping[str, Any]
+    path: DataPath
+
+    @property
+    def name(self) -> str:
+        """Return `package.module:function`."""
+        return f'{self.module}:{self.function}'
+
+
+@dataclass(frozen=True, slots=True)
+class QosSpec:
+    """QoS as written: a profile's name and the policies that differ from it.
+
+    Attributes:
+        policies: By the keys of the language; durations in seconds, or `'infinite'`.
+    """
+
+    profile: str
+    policies: Mapping[str, Any]
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSpec:
+    """A ROS parameter.
+
+    Attributes:
+        type: A name as in `double_array`; `None` if neither given nor told by the value.
+        value: What it starts with, `None` if it is not set.
+        step: Values are minimum + n * step, or maximum.
+    """
+
+    name: str
+    type: str | None
+    value: Any
+    description: str
+    read_only: bool
+    minimum: float | None
+    maximum: float | None
+    step: float | None
+    choices: tuple[Any, ...] | None
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class PublisherSpec:
+    """A publisher."""
+
+    name: str
+    type: str
+    topic: str
+    qos: QosSpec
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class SubscriptionSpec:
+    """A subscription.
+
+    Attributes:
+        behaviour: `None` if messages are passed on as they are.
+        publish: The publisher for what the behaviour returns, or `None`.
+        group: The callback group's name; `None` for the node's default group.
+    """
+
+    name: str
+    type: str
+    topic: str
+    qos: QosSpec
+    behaviour: BehaviourSpec | None
+    publish: str | None
+    group: str | None
+    on_error: OnError
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class TimerSpec:
+    """A timer.
+
+    Attributes:
+        behaviour: `None` if it publishes the constant `message`.
+        message: The payload, if there is no behaviour.
+    """
+
+    name: str
+    period_sec: float
+    behaviour: BehaviourSpec | None
+    publish: str | None
+    message: Any
+    clock: ClockName
+    group: str | None
+    on_error: OnError
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSpec:
+    """A node and all that it has.
+
+    Attributes:
+        namespace: In full, as in `/robot`.
+        remap: Rules, from and to; the first that matches wins.
+        state: What `node.state` starts as.
+    """
+
+    name: str
+    namespace: str
+    description: str
+    log_level: LogLevel | None
+    use_sim_time: bool
+    on_error: OnError
+    parameters: Mapping[str, ParameterSpec]
+    state: Mapping[str, Any]
+    remap: tuple[tuple[str, str], ...]
+    publishers: Mapping[str, PublisherSpec]
+    subscriptions: Mapping[str, SubscriptionSpec]
+    timers: Mapping[str, TimerSpec]
+    on_start: BehaviourSpec | None
+    on_stop: BehaviourSpec | None
+    on_parameters: BehaviourSpec | None
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class SystemSpec:
+    """A whole system.
+
+    Attributes:
+        name: The file's name without its ending.
+        qos: The named profiles of the file.
+        threads: How many callbacks may run at the same time.
+        shutdown_timeout_sec: What running callbacks get to end when the system stops.
+    """
+
+    name: str
+    description: str
+    qos: Mapping[str, QosSpec]
+    threads: int
+    shutdown_timeout_sec: float
+    nodes: Mapping[str, NodeSpec]

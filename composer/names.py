@@ -1,0 +1,175 @@
+"""ROS's rules for names, and the nearest right spelling of a wrong one.
+
+Sources: https://design.ros2.org/articles/topic_and_service_names.html and the validation in rmw
+(`validate_node_name.c`, `validate_namespace.c`) and rcl (`validate_topic_name.c`, `remap.c`).
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+# RMW_NODE_NAME_MAX_NAME_LENGTH, RMW_NAMESPACE_MAX_LENGTH, RMW_TOPIC_MAX_NAME_LENGTH
+MAX_NODE_NAME = 255
+MAX_NAMESPACE = 245
+MAX_TOPIC_NAME = 247
+
+_WORD = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+_NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
+_TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
+_FULL_CHARACTERS = re.compile(r'[A-Za-z0-9_/]*')
+_SUBSTITUTION = re.compile(r'\{([^{}]*)\}')
+_SUBSTITUTIONS = ('node', 'ns', 'namespace')
+_TYPE_KIND_PARTS = 3
+
+
+def suggest(word: str, options: Iterable[str]) -> str | None:
+    """Return the option that `word` was most likely meant to be, or `None`."""
+    choices = sorted(set(options))
+    lowered = {choice.lower(): choice for choice in reversed(choices)}
+    if word.lower() in lowered:
+        return lowered[word.lower()]
+    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    return lowered[close[0]] if close else None
+
+
+def did_you_mean(word: str, options: Iterable[str], what: str = 'there') -> str | None:
+    """Return the help for a wrong name: the nearest right one, or all if they are few.
+
+    Args:
+        what: How the options are introduced if none is near: `<what>: a, b, c`.
+    """
+    choices = sorted(set(options))
+    near = suggest(word, choices)
+    if near is not None:
+        return f"did you mean '{near}'?"
+    if not choices:
+        return None
+    shown = ', '.join(choices[:_FEW])
+    return f'{what}: {shown}' + (', …' if len(choices) > _FEW else '')
+
+
+_FEW = 12
+
+
+def find_node_name_fault(name: str) -> str | None:
+    """Return why `name` cannot name a node, or `None` if it can."""
+    if not name:
+        return 'a node name is not empty'
+    if not _NODE_CHARACTERS.fullmatch(name):
+        return 'a node name has only letters, digits and underscores'
+    if name[0].isdigit():
+        return 'a node name does not begin with a digit'
+    if len(name) > MAX_NODE_NAME:
+        return f'a node name has at most {MAX_NODE_NAME} characters'
+    return None
+
+
+def find_namespace_fault(namespace: str) -> str | None:
+    """Return why `namespace` (absolute or relative) cannot be one, or `None` if it can."""
+    full = namespace if namespace.startswith('/') else f'/{namespace}'
+    if full == '/':
+        return None
+    if not _FULL_CHARACTERS.fullmatch(full):
+        return 'a namespace has only letters, digits, underscores and slashes'
+    if full.endswith('/'):
+        return 'a namespace does not end with a slash'
+    return _find_token_fault('a namespace', full, MAX_NAMESPACE)
+
+
+def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
+    """Return why `name` cannot name a topic, service or action, or `None` if it can.
+
+    Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions (`{node}`, `{ns}`).
+    """
+    what = f'a {kind} name' if kind != 'action' else 'an action name'
+    if not name:
+        return f'{what} is not empty'
+    if not _TOPIC_CHARACTERS.fullmatch(name):
+        return f"{what} has only letters, digits, underscores and slashes, and begins with '~/' if private"
+    if name.endswith('/'):
+        return f'{what} does not end with a slash'
+    if '~' in name[1:] or (name[0] == '~' and len(name) > 1 and name[1] != '/'):
+        return f"'~' stands only at the beginning of {what}, before a slash"
+    plain = _SUBSTITUTION.sub('x', name)
+    if '{' in plain or '}' in plain:
+        return f'{what} has a brace without its partner'
+    for substitution in _SUBSTITUTION.findall(name):
+        if substitution not in _SUBSTITUTIONS:
+            return f"'{{{substitution}}}' is no substitution of ROS: {{node}}, {{ns}}, {{namespace}}"
+    return _find_token_fault(what, plain.removeprefix('~'), MAX_TOPIC_NAME)
+
+
+def find_parameter_name_fault(name: str) -> str | None:
+    """Return why `name` cannot name a parameter, or `None` if it can."""
+    if not name:
+        return 'a parameter name is not empty'
+    if any(not part for part in name.split('.')):
+        return 'a parameter name has no empty part between its dots'
+    if any(character.isspace() for character in name):
+        return 'a parameter name has no spaces'
+    return None
+
+
+def expand_namespace(namespace: str, default: str = '/') -> str:
+    """Return a namespace in full; a relative one lies in `default`."""
+    if namespace.startswith('/'):
+        return namespace
+    return join_names(default, namespace) if namespace else default
+
+
+def join_names(namespace: str, name: str) -> str:
+    """Return `name` in `namespace`, which begins with a slash."""
+    return f'/{name}' if namespace == '/' else f'{namespace}/{name}'
+
+
+def expand_name(name: str, node_name: str, namespace: str) -> str:
+    """Return a topic, service or action name in full, as `rcl_expand_topic_name` does."""
+    for key, value in (('node', node_name), ('ns', namespace), ('namespace', namespace)):
+        name = name.replace(f'{{{key}}}', value)
+    if name.startswith('~'):
+        return join_names(namespace, node_name) + name[1:]
+    if name.startswith('/'):
+        return re.sub('/+', '/', name)
+    return join_names(namespace, name.replace('//', '/').lstrip('/'))
+
+
+def remap_name(
+    name: str, rules: Sequence[tuple[str, str]], node_name: str, namespace: str, scheme: str
+) -> str:
+    """Return what the node's remapping rules make of a full name; the first that matches wins.
+
+    Args:
+        name: As `expand_name` returned it.
+        rules: Pairs of from and to, both relative, absolute or private.
+        scheme: `rostopic` or `rosservice`: rules that begin with the other one do not apply.
+    """
+    for source, target in rules:
+        prefix, separator, bare = source.rpartition('://')
+        if separator and prefix != scheme:
+            continue
+        if expand_name(bare, node_name, namespace) == name:
+            return expand_name(target, node_name, namespace)
+    return name
+
+
+def split_type(name: str) -> tuple[str, str, str] | None:
+    """Return package, kind (`msg`, `srv`, `action`) and name of a type, or `None` if it is none."""
+    parts = name.split('/')
+    if len(parts) != _TYPE_KIND_PARTS or not all(_WORD.fullmatch(part) for part in parts):
+        return None
+    return parts[0], parts[1], parts[2]
+
+
+def _find_token_fault(what: str, full: str, limit: int) -> str | None:
+    if '//' in full:
+        return f'{what} has no two slashes in a row'
+    if any(token[:1].isdigit() for token in full.split('/')):
+        return f'no part of {what} begins with a digit'
+    if len(full) > limit:
+        return f'{what} has at most {limit} characters'
+    return None

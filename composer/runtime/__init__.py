@@ -1,0 +1,1 @@
+"""A system's specification becomes a living system."""
