@@ -1,0 +1,30 @@
+"""Constant messages against the fields of their type."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.interfaces.descriptions import MessageDescription
+from composer.interfaces.payload_faults import find_payload_faults
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+
+
+def check_messages(context: CheckContext) -> Iterator[Diagnostic]:
+    """A timer's `message:` is a payload of the publisher that it goes to."""
+    for node in context.spec.nodes.values():
+        for timer in node.timers.values():
+            path = (*timer.path, 'message')
+            publisher = node.publishers.get(timer.publish or '')
+            if publisher is None or path not in context.system.positions.values:
+                continue
+            description = context.catalogue.describe(publisher.type)
+            if not isinstance(description, MessageDescription):
+                continue
+            for fault in find_payload_faults(description, timer.message, context.catalogue):
+                at = context.at_key if fault.rule == 'unknown-field' else context.at_value
+                yield at((*path, *fault.path), fault.rule, fault.message, help=fault.help)

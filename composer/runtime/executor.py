@@ -1,0 +1,80 @@
+"""The one place that knows how callbacks are dispatched."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.task import Task
+
+# Only bounds how long an end of spinning can go unnoticed if its wake-up is lost.
+_LONGEST_WAIT_SEC = 0.5
+_JOIN_TIMEOUT_SEC = 2.0
+
+
+class SystemExecutor:
+    """Runs the callbacks of all nodes, on threads of its own, until it is stopped.
+
+    Args:
+        threads: How many callbacks may run at the same time.
+        report: Takes the text of a fault outside all behaviours; dispatching goes on.
+    """
+
+    def __init__(self, context: Context, threads: int, report: Callable[[str], None]) -> None:
+        self._context = context
+        self._report = report
+        self._executor = MultiThreadedExecutor(num_threads=max(threads, 2), context=context)
+        self._spinning = False
+        self._thread = threading.Thread(target=self._spin, name='composer-executor', daemon=True)
+
+    def add_node(self, node: Node) -> None:
+        """Let the node's callbacks run."""
+        self._executor.add_node(node)
+
+    def remove_node(self, node: Node) -> None:
+        """Let none of the node's callbacks begin any more."""
+        self._executor.remove_node(node)
+
+    def create_task(self, callback: Callable[..., Any], *arguments: Any) -> Task:
+        """Run a function or coroutine function among the callbacks."""
+        task = self._executor.create_task(callback, *arguments)
+        self.wake()
+        return task
+
+    def wake(self) -> None:
+        """Look again which callbacks may run: a gate has opened, say."""
+        self._executor.wake()
+
+    def start(self) -> None:
+        """Begin to run callbacks."""
+        self._spinning = True
+        self._thread.start()
+
+    def stop(self, timeout_sec: float) -> bool:
+        """Run no more callbacks.
+
+        Returns:
+            Whether all that were running have ended in time.
+        """
+        self._spinning = False
+        if self._thread.is_alive():
+            self._executor.wake()
+            self._thread.join(_JOIN_TIMEOUT_SEC)
+        return bool(self._executor.shutdown(timeout_sec=timeout_sec))
+
+    def _spin(self) -> None:
+        while self._spinning and self._context.ok():
+            try:
+                self._executor.spin_once(timeout_sec=_LONGEST_WAIT_SEC)
+            except (ShutdownException, ExternalShutdownException):
+                return
+            except Exception:  # noqa: BLE001 - one fault must not end the dispatch of all nodes
+                self._report(traceback.format_exc())

@@ -1,0 +1,161 @@
+"""A node while it lives: the rclpy node, its entities, and what they share."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from rclpy.node import Node as RosNode
+from rclpy.parameter import Parameter
+
+from composer.language.specs import REENTRANT
+from composer.runtime.calls import BehaviourCall, CallLedger
+from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
+from composer.runtime.node import Node, Publish
+from composer.runtime.supervision import ErrorReporter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rclpy.callback_groups import CallbackGroup
+    from rclpy.context import Context
+    from rclpy.task import Task
+    from rclpy.timer import Timer
+
+    from composer.language.positions import DataPath, SourceMap
+    from composer.language.specs import BehaviourSpec, NodeSpec, OnError, QosSpec
+
+
+@dataclass(frozen=True, slots=True)
+class SystemServices:
+    """What nodes need of the system that they are part of.
+
+    Attributes:
+        functions: The behaviours, by their names.
+        ros_arguments: The arguments after `--ros-args` of the command line.
+        act_on_error: Takes a node's name and what to do after an error in it.
+        shutdown: Ends the system with an exit code.
+        create_task: Runs a function or coroutine function among the callbacks.
+    """
+
+    context: Context
+    positions: SourceMap
+    profiles: Mapping[str, QosSpec]
+    functions: Mapping[str, Callable[..., Any]]
+    ros_arguments: Sequence[str]
+    act_on_error: Callable[[str, OnError], None]
+    shutdown: Callable[[int], None]
+    create_task: Callable[..., Task]
+
+
+@dataclass(slots=True)
+class LiveNode:
+    """A node with what its entities share.
+
+    Attributes:
+        gate: Closed until the node has started, and when it stops.
+        publishers: What publishes a payload, by the publisher's name.
+    """
+
+    spec: NodeSpec
+    services: SystemServices
+    ros: RosNode
+    face: Node
+    errors: ErrorReporter
+    publishers: dict[str, Publish]
+    timers: list[Timer] = field(default_factory=list)
+    gate: Gate = field(default_factory=Gate)
+    ledger: CallLedger = field(default_factory=CallLedger)
+    _groups: dict[str, CallbackGroup] = field(default_factory=dict)
+
+    def group(self, name: str | None) -> CallbackGroup:
+        """Return the callback group of this name; `None` is the node's own."""
+        key = name or ''
+        if key not in self._groups:
+            kind = GatedReentrantGroup if key == REENTRANT else GatedMutuallyExclusiveGroup
+            self._groups[key] = kind(self.gate)
+        return self._groups[key]
+
+    def function(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
+        """Return a behaviour as a function of its positional arguments."""
+        return self.services.functions[behaviour.name]
+
+    def call(
+        self,
+        owner: str,
+        path: DataPath,
+        function: Callable[..., Any],
+        *,
+        on_error: OnError | None = None,
+        publish: str | None = None,
+    ) -> BehaviourCall:
+        """Return the wrapped call of a function that an entity is bound to.
+
+        Args:
+            owner: The entity in words.
+            path: Its place in the file.
+            publish: The publisher that takes what the function returns.
+        """
+        place = self.place(path)
+
+        def failed(owner: str, error: BaseException) -> None:
+            self.errors.report(owner, place, error)
+            self.services.act_on_error(self.spec.name, on_error or self.spec.on_error)
+
+        return BehaviourCall(
+            owner, function, self.ledger, deliver=self._delivery(publish), failed=failed
+        )
+
+    def place(self, path: DataPath) -> str:
+        """Return `file:line` of a place in the file."""
+        span = self.services.positions.key(path)
+        return f'{span.source.name}:{span.line}'
+
+    def destroy(self) -> None:
+        """Remove the node and all its entities from the graph."""
+        self.errors.flush()
+        self.ros.destroy_node()
+
+    def _delivery(self, publish: str | None) -> Callable[[Any], None]:
+        if publish is None:
+            return _discard
+        send = self.publishers[publish]
+
+        def deliver(payload: Any) -> None:
+            if payload is not None:
+                send(payload)
+
+        return deliver
+
+
+def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
+    """Create a node without entities."""
+    remapping = [part for old, new in spec.remap for part in ('-r', f'{old}:={new}')]
+    overrides = [Parameter('use_sim_time', value=True)] if spec.use_sim_time else None
+    # Global arguments hold for every node of the process, where a __node rule would give all of
+    # them one name. The command line's rules come first: the first that matches wins.
+    ros = RosNode(
+        spec.name,
+        context=services.context,
+        namespace=spec.namespace,
+        cli_args=['--ros-args', *services.ros_arguments, *remapping],
+        use_global_arguments=False,
+        parameter_overrides=overrides,
+    )
+    publishers: dict[str, Publish] = {}
+    state = SimpleNamespace()
+    state.__dict__.update(copy.deepcopy(dict(spec.state)))
+    return LiveNode(
+        spec,
+        services,
+        ros,
+        face=Node(ros, state, publishers, services.shutdown),
+        errors=ErrorReporter(ros.get_logger().error),
+        publishers=publishers,
+    )
+
+
+def _discard(_result: Any) -> None:
+    """Take a result that goes nowhere."""

@@ -1,0 +1,128 @@
+"""Parameters: declared with descriptors, checked live, with a behaviour heard before a change."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import ParameterException
+from rclpy.parameter import Parameter
+
+from composer.errors import StartError
+from composer.language.parameters import INT64_MAX, INT64_MIN
+from composer.python_source import FunctionKind
+from composer.runtime.behaviours import kind_of
+
+if TYPE_CHECKING:
+    from composer.language.specs import BehaviourSpec, ParameterSpec
+    from composer.runtime.live_node import LiveNode
+
+_FLOAT_MAX = 1.7976931348623157e308
+
+
+def create_parameters(node: LiveNode) -> None:
+    """Declare the node's parameters.
+
+    Raises:
+        StartError: The command line gives one a value that its declaration refuses.
+    """
+    refusing = partial(_refuse_unless_chosen, node.spec.parameters)
+    node.ros.add_on_set_parameters_callback(refusing)
+    for spec in node.spec.parameters.values():
+        try:
+            node.ros.declare_parameter(spec.name, _first_value(spec), create_descriptor(spec))
+        except ParameterException as error:
+            message = f"node '{node.spec.name}': parameter '{spec.name}' from the command line: {error}"
+            raise StartError(message) from error
+    if node.spec.on_parameters:
+        hear = _BehaviourHearing(node, node.spec.on_parameters)
+        node.ros.add_on_set_parameters_callback(hear)
+
+
+def create_descriptor(spec: ParameterSpec) -> ParameterDescriptor:
+    """Return the descriptor that ROS 2 tools show, and whose range rclpy enforces."""
+    descriptor = ParameterDescriptor(
+        name=spec.name, description=spec.description, read_only=spec.read_only
+    )
+    if spec.choices is not None:
+        descriptor.additional_constraints = f'one of {", ".join(map(str, spec.choices))}'
+    if spec.minimum is None and spec.maximum is None:
+        return descriptor
+    if spec.type == 'integer':
+        descriptor.integer_range = [
+            IntegerRange(
+                from_value=INT64_MIN if spec.minimum is None else int(spec.minimum),
+                to_value=INT64_MAX if spec.maximum is None else int(spec.maximum),
+                step=int(spec.step or 0),
+            )
+        ]
+    else:
+        descriptor.floating_point_range = [
+            FloatingPointRange(
+                from_value=-_FLOAT_MAX if spec.minimum is None else float(spec.minimum),
+                to_value=_FLOAT_MAX if spec.maximum is None else float(spec.maximum),
+                step=float(spec.step or 0.0),
+            )
+        ]
+    return descriptor
+
+
+def _first_value(spec: ParameterSpec) -> Any:
+    kind = Parameter.Type[(spec.type or '').upper()]
+    if spec.value is None:
+        return kind
+    if kind is Parameter.Type.BYTE_ARRAY:
+        return [bytes([item]) for item in spec.value]
+    if spec.value == []:
+        # rclpy cannot tell the type of an empty list by itself.
+        return Parameter('', kind, []).get_parameter_value()
+    return spec.value
+
+
+def _refuse_unless_chosen(
+    specs: dict[str, ParameterSpec], changes: list[Parameter]
+) -> SetParametersResult:
+    for change in changes:
+        spec = specs.get(change.name)
+        if spec and spec.choices is not None and change.value not in spec.choices:
+            options = ', '.join(map(str, spec.choices))
+            reason = f"'{change.value}' is not one of {options}"
+            return SetParametersResult(successful=False, reason=reason)
+    return SetParametersResult(successful=True)
+
+
+class _BehaviourHearing:
+    """Asks `on_parameters` whether a change is accepted."""
+
+    def __init__(self, node: LiveNode, spec: BehaviourSpec) -> None:
+        self._node = node
+        self._spec = spec
+        self._kind = kind_of(node.function(spec))
+
+    def __call__(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return the result that ROS gives to whoever asked for the change."""
+        new_values = {change.name: change.value for change in changes}
+        answers: list[Any] = []
+        function = partial(self._node.function(self._spec), self._node.face, **self._spec.arguments)
+        call = self._node.call('on_parameters', self._spec.path, function)
+        call = call.delivering(answers.append)
+        if self._kind is FunctionKind.COROUTINE:
+            self._await(call.as_callback(self._kind), new_values)
+        else:
+            call.run(new_values)
+        reason = answers[0] if answers else 'the behaviour that decides on it raised an error'
+        return SetParametersResult(successful=reason is None, reason=str(reason or ''))
+
+    def _await(self, callback: Any, new_values: dict[str, Any]) -> None:
+        # rclpy wants the answer when this returns, so a coroutine runs beside and is waited for.
+        done = threading.Event()
+        task = self._node.services.create_task(callback, new_values)
+        task.add_done_callback(lambda _task: done.set())
+        done.wait()

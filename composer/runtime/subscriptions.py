@@ -1,0 +1,49 @@
+"""Subscriptions."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+
+from composer.interfaces.classes import import_interface
+from composer.runtime.qos import create_qos_profile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.specs import SubscriptionSpec
+    from composer.runtime.live_node import LiveNode
+
+
+def create_subscriptions(node: LiveNode) -> None:
+    """Create the node's subscriptions, each with its behaviour, or passing messages on."""
+    for spec in node.spec.subscriptions.values():
+        call = node.call(
+            f"subscription '{spec.name}'",
+            spec.path,
+            _create_function(node, spec),
+            on_error=spec.on_error,
+            publish=spec.publish,
+        )
+        node.ros.create_subscription(
+            import_interface(spec.type),
+            spec.topic,
+            call.as_callback(),
+            create_qos_profile(spec.qos, node.services.profiles),
+            callback_group=node.group(spec.group),
+            # While a callback is queued its message is unread, and rclpy's default handlers of
+            # QoS events then wake the stock executor at once, again and again.
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+
+
+def _create_function(node: LiveNode, spec: SubscriptionSpec) -> Callable[[Any], Any]:
+    if spec.behaviour is None:
+        return _pass_on
+    return partial(node.function(spec.behaviour), node.face, **spec.behaviour.arguments)
+
+
+def _pass_on(message: Any) -> Any:
+    return message

@@ -1,0 +1,101 @@
+"""Timers: functions called, generators resumed, or constants published at a fixed rate."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rclpy.clock import Clock, ClockType
+
+from composer.python_source import FunctionKind
+from composer.runtime.behaviours import kind_of
+from composer.runtime.payloads import converter_for
+from composer.interfaces.classes import import_interface
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator, Callable, Generator
+
+    from rclpy.timer import Timer
+
+    from composer.language.specs import ClockName, TimerSpec
+    from composer.runtime.live_node import LiveNode
+
+_CLOCKS = {'steady': ClockType.STEADY_TIME, 'system': ClockType.SYSTEM_TIME}
+
+
+def create_timers(node: LiveNode) -> None:
+    """Create the node's timers; they tick once the node has started."""
+    for spec in node.spec.timers.values():
+        ticker = _Ticker(node, spec)
+        call = node.call(
+            f"timer '{spec.name}'",
+            spec.path,
+            ticker.function,
+            on_error=spec.on_error,
+            publish=spec.publish,
+        )
+        ticker.timer = node.ros.create_timer(
+            spec.period_sec,
+            call.as_callback(ticker.kind),
+            callback_group=node.group(spec.group),
+            clock=_create_clock(spec.clock),
+            # A period is counted from the start of the node, not from its creation.
+            autostart=False,
+        )
+        node.timers.append(ticker.timer)
+
+
+def _create_clock(name: ClockName) -> Clock | None:
+    return Clock(clock_type=_CLOCKS[name]) if name in _CLOCKS else None
+
+
+class _Ticker:
+    """What a timer does at each tick, as one function without arguments."""
+
+    timer: Timer
+
+    def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
+        self.kind = FunctionKind.PLAIN
+        if spec.behaviour is None:
+            publisher = node.spec.publishers[spec.publish or '']
+            message = converter_for(import_interface(publisher.type)).convert(spec.message)
+            self.function: Callable[[], Any] = lambda: message
+            return
+        behaviour = node.function(spec.behaviour)
+        self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
+        kind = kind_of(behaviour)
+        if kind is FunctionKind.GENERATOR:
+            self._generator: Generator[Any, Any, Any] | None = None
+            self.function = self._resume
+        elif kind is FunctionKind.ASYNC_GENERATOR:
+            self._async_generator: AsyncGenerator[Any, Any] | None = None
+            self.kind = FunctionKind.COROUTINE
+            self.function = self._resume_async
+        else:
+            self.kind = kind
+            self.function = self._begin
+
+    def _resume(self) -> Any:
+        if self._generator is None:
+            self._generator = self._begin()
+        try:
+            return next(self._generator)
+        except StopIteration as end:
+            self.timer.cancel()
+            return end.value
+        except BaseException:
+            # A generator that raised is finished; the next tick begins a new one.
+            self._generator = None
+            raise
+
+    async def _resume_async(self) -> Any:
+        if self._async_generator is None:
+            self._async_generator = self._begin()
+        try:
+            return await anext(self._async_generator)
+        except StopAsyncIteration:
+            self.timer.cancel()
+            return None
+        except BaseException:
+            self._async_generator = None
+            raise
