@@ -1,0 +1,13 @@
+"""Composer: one YAML file → a running ROS 2 system.
+
+Attributes:
+    Node: What a behaviour sees of its node.
+    load: Reads a file as far as it can be read.
+    check: Returns all that is wrong with a file.
+    up: Runs the system that a file declares; returns the exit code.
+"""
+
+from composer.api import check, load, up
+from composer.runtime.node import Node
+
+__all__ = ['Node', 'check', 'load', 'up']

@@ -1,1 +1,1 @@
-"""A system's specification becomes a living system."""
+"""`SystemSpec` → a living system on rclpy."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -106,6 +107,19 @@ class LiveNode:
 
         return BehaviourCall(
             owner, function, self.ledger, deliver=self._delivery(publish), failed=failed
+        )
+
+    def hook(
+        self, owner: str, behaviour: BehaviourSpec, failed: Callable[[BaseException], None]
+    ) -> BehaviourCall:
+        """Return the wrapped call of `on_start` or `on_stop`, which takes the node's face."""
+        function = partial(self.function(behaviour), **behaviour.arguments)
+        return BehaviourCall(
+            owner,
+            function,
+            self.ledger,
+            deliver=_discard,
+            failed=lambda _owner, error: failed(error),
         )
 
     def place(self, path: DataPath) -> str:

@@ -1,0 +1,13 @@
+"""A parameter that can be changed while the node runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from composer import Node
+
+
+def greet(node: Node) -> None:
+    """Greet whom the parameter names now."""
+    node.logger.info(f'Hello {node.parameters.my_parameter}!')

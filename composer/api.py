@@ -1,0 +1,49 @@
+"""The public functions; each imports what it needs when it is called.
+
+Behaviours import `composer` for its `Node` alone, and must not pay for the rest.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.diagnostics import Diagnostic
+    from composer.language import LoadedSystem
+
+
+def load(path: str | Path) -> LoadedSystem:
+    """Read a file as far as it can be read; what is wrong with it is in its `diagnostics`."""
+    from composer.language import load_system  # noqa: PLC0415
+
+    return load_system(Path(path))
+
+
+def check(path: str | Path) -> list[Diagnostic]:
+    """Return all that is wrong with a file, from top to bottom."""
+    from composer.checks import check_system  # noqa: PLC0415
+    from composer.interfaces.catalogue import InterfaceCatalogue  # noqa: PLC0415
+
+    return check_system(load(path), InterfaceCatalogue())
+
+
+def up(
+    path: str | Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()
+) -> int:
+    """Run the system that a file declares until it is stopped; return the exit code.
+
+    Args:
+        ros_arguments: As after `--ros-args` on a command line.
+        log_levels: `debug` for all loggers, `talker:=debug` for one.
+
+    Raises:
+        RosNotFoundError: There is no rclpy.
+        StartError: The system could not be brought up.
+        UsageError: The ROS arguments are wrong.
+    """
+    from composer.commands.up import up as run  # noqa: PLC0415
+
+    return run(Path(path), ros_arguments, log_levels)

@@ -1,0 +1,100 @@
+"""`composer up`: check a file, then run the system that it declares."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from composer.checks import check_system, create_context
+from composer.checks.behaviours import check_behaviour_call
+from composer.diagnostics import has_errors
+from composer.errors import ExitCode, RosNotFoundError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import LoadedSystem, load_system
+from composer.language.bindings import node_bindings
+from composer.python_source import project_search_path
+from composer.reports.text import render_finding
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from composer.diagnostics import Diagnostic
+
+_NO_ROS_HELP = (
+    "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
+)
+
+
+def up(path: Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()) -> int:
+    """Run a system until it ends; return the exit code.
+
+    Args:
+        ros_arguments: As after `--ros-args` on a command line.
+        log_levels: `debug` for all loggers, `talker:=debug` for one.
+
+    Raises:
+        RosNotFoundError: There is no rclpy.
+        StartError: The system could not be brought up.
+        UsageError: The ROS arguments are wrong.
+    """
+    system = load_system(path)
+    catalogue = InterfaceCatalogue()
+    findings = check_system(system, catalogue)
+    if _report(findings) or system.spec is None:
+        return ExitCode.FAILED
+    if importlib.util.find_spec('rclpy') is None:
+        message = 'there is no rclpy in this Python, so nothing can run'
+        raise RosNotFoundError(message, help=_NO_ROS_HELP)
+    from composer.runtime.behaviours import project_on_path  # noqa: PLC0415 - needs ROS
+    from composer.runtime.run import run_system  # noqa: PLC0415 - needs ROS
+
+    with project_on_path(project_search_path(path)):
+        functions, findings = _import_behaviours(system, catalogue)
+        if _report(findings):
+            return ExitCode.FAILED
+        return run_system(
+            system.spec,
+            system.positions,
+            functions,
+            ros_arguments=ros_arguments,
+            log_level_requests=log_levels,
+        )
+
+
+def _import_behaviours(
+    system: LoadedSystem, catalogue: InterfaceCatalogue
+) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
+    """Import every behaviour, and hold the functions themselves against their calls."""
+    from composer.runtime import behaviours  # noqa: PLC0415 - its callers need ROS
+
+    context = create_context(system, catalogue)
+    functions: dict[str, Callable[..., Any]] = {}
+    findings: list[Diagnostic] = []
+    if context is None:
+        return functions, findings
+    for node in context.spec.nodes.values():
+        for binding in node_bindings(node):
+            spec = binding.behaviour
+            try:
+                function = functions.get(spec.name) or behaviours.import_behaviour(spec)
+            except behaviours.BehaviourImportError as error:
+                findings.append(
+                    context.at_value(
+                        spec.path, 'broken-behaviour', str(error), part=spec.name, help=error.help
+                    )
+                )
+                continue
+            functions[spec.name] = function
+            kind, signature = behaviours.kind_of(function), behaviours.signature_of(function)
+            findings += check_behaviour_call(context, binding, kind, signature)
+    return functions, findings
+
+
+def _report(findings: list[Diagnostic]) -> bool:
+    """Show findings on standard error; return whether they forbid a start."""
+    for finding in findings:
+        click.echo(render_finding(finding) + '\n', err=True)
+    return has_errors(findings)

@@ -1,0 +1,42 @@
+"""The kinds of entity, in the order of their creation; to add a kind, add a file and a row."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.errors import ComposerError, StartError
+from composer.runtime.parameters import create_parameters
+from composer.runtime.publishers import create_publishers
+from composer.runtime.subscriptions import create_subscriptions
+from composer.runtime.timers import create_timers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.runtime.live_node import LiveNode
+
+# Publishers come first: what is bound to a behaviour may publish what it returns.
+ENTITY_KINDS: tuple[Callable[[LiveNode], None], ...] = (
+    create_parameters,
+    create_publishers,
+    create_subscriptions,
+    create_timers,
+)
+
+
+def create_entities(node: LiveNode) -> None:
+    """Create all that a node declares.
+
+    Raises:
+        StartError: One of them cannot be created.
+    """
+    for create in ENTITY_KINDS:
+        try:
+            create(node)
+        except ComposerError as error:
+            message = f"node '{node.spec.name}': {error}"
+            raise StartError(message, help=error.help) from error
+        except Exception as error:
+            # rclpy and the middleware raise many kinds; none of them may leave half a system.
+            message = f"node '{node.spec.name}': {type(error).__name__}: {error}"
+            raise StartError(message) from error

@@ -1,0 +1,47 @@
+"""Levels of the ROS loggers, from the file and the command line."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rclpy.logging import LoggingSeverity, get_logger, get_logger_level, set_logger_level
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from composer.language.specs import NodeSpec
+
+# The logger of Composer itself, for what concerns the whole system.
+system_logger = get_logger('composer')
+
+_ROOT = ''
+
+
+@contextmanager
+def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[None]:
+    """Set the levels of all loggers, and give them back their old ones at the end.
+
+    Args:
+        nodes: Their `log_level` holds where the command line does not say otherwise.
+        requests: What the command line says: `debug` for all loggers, `talker:=debug` for one.
+    """
+    by_name = {_logger_name(node): node.log_level for node in nodes if node.log_level}
+    for request in requests:
+        name, separator, level = request.rpartition(':=')
+        if not separator:
+            by_name = dict.fromkeys(by_name, level)
+        by_name[name.strip('/').replace('/', '.') if separator else _ROOT] = level  # type: ignore[assignment]
+    before = {name: get_logger_level(name) for name in by_name}
+    try:
+        for name, level in by_name.items():
+            set_logger_level(name, LoggingSeverity[str(level).upper()])
+        yield
+    finally:
+        for name, severity in before.items():
+            set_logger_level(name, severity)
+
+
+def _logger_name(node: NodeSpec) -> str:
+    """Return the name of a node's logger, as `rcl_create_node_logger_name` makes it."""
+    return f'{node.namespace}/{node.name}'.strip('/').replace('//', '/').replace('/', '.')

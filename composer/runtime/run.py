@@ -1,0 +1,80 @@
+"""Running a system from start to stop, signals included."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ExitCode
+from composer.runtime.logs import log_levels
+from composer.runtime.system import System
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from types import FrameType
+
+    from composer.language.positions import SourceMap
+    from composer.language.specs import SystemSpec
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def run_system(
+    spec: SystemSpec,
+    positions: SourceMap,
+    functions: Mapping[str, Callable[..., Any]],
+    *,
+    ros_arguments: Sequence[str] = (),
+    log_level_requests: Sequence[str] = (),
+) -> int:
+    """Start a system, wait for its end, and stop it.
+
+    The first SIGINT or SIGTERM stops it, a second one leaves at once. If a behaviour cannot be
+    ended, the process is left with its exit code, since its threads cannot be ended either.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        StartError: It could not be brought up.
+        UsageError: The ROS arguments are wrong.
+    """
+    with log_levels(list(spec.nodes.values()), log_level_requests):
+        system = System(spec, positions, functions, ros_arguments)
+        with _stopped_by_signals(system):
+            system.start()
+            system.wait()
+            code, ended = system.stop()
+    if not ended:
+        _leave(code)
+    return code
+
+
+@contextmanager
+def _stopped_by_signals(system: System) -> Iterator[None]:
+    # Python delivers signals to the main thread alone; elsewhere they stay with the caller.
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        if system.stop_requested:
+            _leave(ExitCode.FAILED)
+        system.request_stop()
+
+    before = {number: signal.signal(number, handle) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave(code: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

@@ -1,0 +1,204 @@
+"""`SystemSpec` → a living system: all of it comes up or none of it, and it goes down cleanly."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rclpy.context import Context
+
+from composer.errors import ComposerError, ExitCode, StartError, UsageError
+from composer.runtime.entities import create_entities
+from composer.runtime.executor import SystemExecutor
+from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
+from composer.runtime.logs import system_logger
+from composer.runtime.stopping import stop_nodes
+from composer.runtime.supervision import Supervisor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from composer.language.positions import SourceMap
+    from composer.language.specs import NodeSpec, SystemSpec
+
+_EXECUTOR_STOP_SEC = 1.0
+
+
+class System:
+    """A system that can be started once and stopped once.
+
+    Args:
+        positions: Where the parts of `spec` were written.
+        functions: The behaviours, by their names.
+        ros_arguments: The arguments after `--ros-args` of the command line.
+    """
+
+    def __init__(
+        self,
+        spec: SystemSpec,
+        positions: SourceMap,
+        functions: Mapping[str, Callable[..., Any]],
+        ros_arguments: Sequence[str] = (),
+    ) -> None:
+        self._spec = spec
+        self._begun = time.monotonic()
+        self._exit_code: int = ExitCode.DONE
+        self._stop_requested = threading.Event()
+        self._rebuilding = threading.Lock()
+        self._nodes: dict[str, LiveNode] = {}
+        self._context = Context()
+        _init_context(self._context, ros_arguments)
+        self._executor = SystemExecutor(
+            self._context, spec.threads, lambda text: system_logger.error(text)
+        )
+        self._supervisor = Supervisor(self._restart, self.request_stop)
+        self._services = SystemServices(
+            context=self._context,
+            positions=positions,
+            profiles=spec.qos,
+            functions=functions,
+            ros_arguments=ros_arguments,
+            act_on_error=self._supervisor.act,
+            shutdown=self.request_stop,
+            create_task=self._executor.create_task,
+        )
+
+    @property
+    def stop_requested(self) -> bool:
+        """Whether somebody wants the system to end."""
+        return self._stop_requested.is_set()
+
+    def request_stop(self, code: int = ExitCode.DONE) -> None:
+        """Let `wait` return; the first request that is not 0 decides the exit code."""
+        if self._exit_code == ExitCode.DONE:
+            self._exit_code = code
+        self._stop_requested.set()
+
+    def start(self) -> None:
+        """Create all nodes and entities, run `on_start`, then let the behaviours run.
+
+        Raises:
+            StartError: One of them failed; all has been torn down again.
+        """
+        try:
+            for spec in self._spec.nodes.values():
+                self._create(spec)
+            for node in self._nodes.values():
+                self._executor.add_node(node.ros)
+            self._executor.start()
+            for node in list(self._nodes.values()):
+                self._run_on_start(node)
+        except BaseException:
+            self._tear_down()
+            raise
+        if self.stop_requested:
+            return
+        for node in self._nodes.values():
+            self._open(node)
+        count = len(self._nodes)
+        nodes = '1 node' if count == 1 else f'{count} nodes'
+        elapsed = time.monotonic() - self._begun
+        system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
+
+    def wait(self) -> None:
+        """Wait until a stop is requested."""
+        self._stop_requested.wait()
+
+    def stop(self) -> tuple[int, bool]:
+        """End the system.
+
+        Returns:
+            The exit code, and whether all behaviours have ended. If they have not, their threads
+            still run, and only the end of the process ends them.
+        """
+        self._supervisor.stop()
+        with self._rebuilding:
+            ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+        if not ended and self._exit_code == ExitCode.DONE:
+            self._exit_code = ExitCode.FAILED
+        if ended:
+            self._tear_down()
+        return self._exit_code, ended
+
+    def _create(self, spec: NodeSpec) -> LiveNode:
+        try:
+            node = create_live_node(spec, self._services)
+        except Exception as error:
+            message = f"node '{spec.name}' cannot be created: {error}"
+            raise StartError(message) from error
+        self._nodes[spec.name] = node
+        create_entities(node)
+        return node
+
+    def _run_on_start(self, node: LiveNode) -> None:
+        hook = node.spec.on_start
+        if hook is None or self.stop_requested:
+            return
+        failures: list[BaseException] = []
+        call = node.hook('on_start', hook, failures.append)
+        done = threading.Event()
+        task = self._executor.create_task(call.as_callback(), node.face)
+        task.add_done_callback(lambda _task: done.set())
+        while not done.wait(_POLL_SEC) and not self.stop_requested:
+            pass
+        if failures:
+            node.errors.report('on_start', node.place(hook.path), failures[0])
+            message = f"node '{node.spec.name}': on_start raised {failures[0]!r}"
+            raise StartError(message) from failures[0]
+
+    def _open(self, node: LiveNode) -> None:
+        node.gate.is_open = True
+        for timer in node.timers:
+            timer.reset()
+        self._executor.wake()
+
+    def _restart(self, name: str) -> None:
+        """Rebuild a node: its entities, parameters and state are as at the start again."""
+        with self._rebuilding:
+            old = self._nodes[name]
+            if self.stop_requested:
+                return
+            old.gate.is_open = False
+            if not old.ledger.wait_until_idle(self._spec.shutdown_timeout_sec):
+                system_logger.error(f"node '{name}' is not restarted: one of its behaviours hangs")
+                old.gate.is_open = True
+                return
+            self._executor.remove_node(old.ros)
+            old.destroy()
+            try:
+                node = self._create(old.spec)
+                self._executor.add_node(node.ros)
+                self._run_on_start(node)
+            except ComposerError as error:
+                system_logger.error(f'restart: {error}')
+                self._supervisor.act(name, 'restart')
+                return
+            self._open(node)
+        system_logger.warn(f"node '{name}' was restarted")
+
+    def _tear_down(self) -> None:
+        for node in self._nodes.values():
+            self._executor.remove_node(node.ros)
+        self._executor.stop(_EXECUTOR_STOP_SEC)
+        for node in self._nodes.values():
+            node.destroy()
+        self._nodes.clear()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+
+_POLL_SEC = 0.05
+
+
+def _init_context(context: Context, ros_arguments: Sequence[str]) -> None:
+    for argument in ros_arguments:
+        if argument.startswith(('__node:=', '__name:=')):
+            message = f"'{argument}' would give all nodes of the system one name"
+            raise UsageError(message, help=f'name the node that is meant, as in talker:{argument}')
+    try:
+        context.init(['--ros-args', *ros_arguments] if ros_arguments else [])
+    except Exception as error:
+        kind = UsageError if 'arg' in type(error).__name__.lower() else StartError
+        message = f'ROS 2 cannot start: {error}'
+        raise kind(message) from error
