@@ -17,22 +17,20 @@ if TYPE_CHECKING:
 
 def load(path: str | Path) -> LoadedSystem:
     """Read a file as far as it can be read; what is wrong with it is in its `diagnostics`."""
-    from composer.language import load_system  # noqa: PLC0415
+    from composer.language import load_system
 
     return load_system(Path(path))
 
 
 def check(path: str | Path) -> list[Diagnostic]:
     """Return all that is wrong with a file, from top to bottom."""
-    from composer.checks import check_system  # noqa: PLC0415
-    from composer.interfaces.catalogue import InterfaceCatalogue  # noqa: PLC0415
+    from composer.checks import check_system
+    from composer.interfaces.catalogue import InterfaceCatalogue
 
     return check_system(load(path), InterfaceCatalogue())
 
 
-def up(
-    path: str | Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()
-) -> int:
+def up(path: str | Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()) -> int:
     """Run the system that a file declares until it is stopped; return the exit code.
 
     Args:
@@ -44,6 +42,6 @@ def up(
         StartError: The system could not be brought up.
         UsageError: The ROS arguments are wrong.
     """
-    from composer.commands.up import up as run  # noqa: PLC0415
+    from composer.commands.up import up as run
 
     return run(Path(path), ros_arguments, log_levels)

@@ -97,7 +97,7 @@ def cli() -> None:
     multiple=True,
     metavar='[NODE:=]LEVEL',
     callback=_check_log_levels,
-    help='debug, info, warn, error or fatal; of all loggers, or of one. Wins over the file.',
+    help='debug, info, warn, error or fatal; of all nodes, or of one. Wins over the file.',
 )
 @click.pass_obj
 def up_command(ros_arguments: list[str], file: Path, log_levels: tuple[str, ...]) -> int:
@@ -105,7 +105,7 @@ def up_command(ros_arguments: list[str], file: Path, log_levels: tuple[str, ...]
 
     What follows --ros-args (up to the end, or a --) goes to every node.
     """
-    from composer.commands.up import up  # noqa: PLC0415 - a command pays for its own imports only
+    from composer.commands.up import up
 
     return up(file, ros_arguments, log_levels)
 
@@ -114,7 +114,7 @@ def up_command(ros_arguments: list[str], file: Path, log_levels: tuple[str, ...]
 @click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
 def check_command(files: tuple[Path, ...]) -> int:
     """Say all that is wrong with FILES, without running anything. Needs no ROS."""
-    from composer.commands.check import check  # noqa: PLC0415 - as above
+    from composer.commands.check import check
 
     return check(files)
 

@@ -84,13 +84,13 @@ def find_namespace_fault(namespace: str) -> str | None:
 def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
     """Return why `name` cannot name a topic, service or action, or `None` if it can.
 
-    Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions (`{node}`, `{ns}`).
+    Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions, as in `{node}`.
     """
     what = f'a {kind} name' if kind != 'action' else 'an action name'
     if not name:
         return f'{what} is not empty'
     if not _TOPIC_CHARACTERS.fullmatch(name):
-        return f"{what} has only letters, digits, underscores and slashes, and begins with '~/' if private"
+        return f"{what} has only letters, digits, underscores, slashes, and '~/' first"
     if name.endswith('/'):
         return f'{what} does not end with a slash'
     if '~' in name[1:] or (name[0] == '~' and len(name) > 1 and name[1] != '/'):
@@ -100,7 +100,9 @@ def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
         return f'{what} has a brace without its partner'
     for substitution in _SUBSTITUTION.findall(name):
         if substitution not in _SUBSTITUTIONS:
-            return f"'{{{substitution}}}' is no substitution of ROS: {{node}}, {{ns}}, {{namespace}}"
+            return (
+                f"'{{{substitution}}}' is no substitution of ROS: {{node}}, {{ns}}, {{namespace}}"
+            )
     return _find_token_fault(what, plain.removeprefix('~'), MAX_TOPIC_NAME)
 
 
@@ -158,7 +160,7 @@ def remap_name(
 
 
 def split_type(name: str) -> tuple[str, str, str] | None:
-    """Return package, kind (`msg`, `srv`, `action`) and name of a type, or `None` if it is none."""
+    """Return package, kind (`msg`, `srv`, `action`) and name of a type, `None` if it is none."""
     parts = name.split('/')
     if len(parts) != _TYPE_KIND_PARTS or not all(_WORD.fullmatch(part) for part in parts):
         return None

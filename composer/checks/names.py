@@ -30,7 +30,7 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_node_name_fault(name)
         if fault:
             yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
-        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+        for entity in node.endpoints:
             yield from _check_topic(context, entity)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.language.parameters import find_type_fault
-from composer.language.specs import ParameterSpec
 
 if TYPE_CHECKING:
+    from composer.language.specs import ParameterSpec
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
@@ -18,7 +18,7 @@ _RULE = 'bad-parameter'
 _NUMERIC = ('integer', 'double')
 _HAS_CHOICES = (*_NUMERIC, 'string')
 
-# rclpy compares steps of doubles with this relative tolerance (`Node._apply_floating_point_range`).
+# With this relative tolerance rclpy compares doubles (`Node._apply_floating_point_range`).
 _STEP_TOLERANCE = 1e-6
 
 
@@ -40,7 +40,7 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
             path,
             _RULE,
             'the type of this list cannot be told',
-            help="write {default: [], type: string_array}, with the type that is meant",
+            help='write {default: [], type: string_array}, with the type that is meant',
         )
         return
     fault = None if parameter.value is None else find_type_fault(parameter.value, parameter.type)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def check_publish(context: CheckContext) -> Iterator[Diagnostic]:
     """`publish:` names a publisher of the same node; a relay's types are the same on both ends."""
     for node in context.spec.nodes.values():
-        for entity in (*node.timers.values(), *node.subscriptions.values()):
+        for entity in node.triggers:
             if entity.publish is not None:
                 yield from _check_publisher(context, node, entity.path, entity.publish)
         yield from _check_relays(context, node)
@@ -66,7 +66,7 @@ def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_key(profile.path, 'bad-name', message)
     declared: dict[DataPath, QosSpec] = {profile.path: profile for profile in profiles.values()}
     for node in context.spec.nodes.values():
-        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+        for entity in node.endpoints:
             declared[entity.qos.path] = entity.qos
     reported: set[DataPath] = set()
     for spec in declared.values():
@@ -98,7 +98,7 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     if not catalogue.available:
         return
     for node in context.spec.nodes.values():
-        for entity in (*node.publishers.values(), *node.subscriptions.values()):
+        for entity in node.endpoints:
             package = entity.type.partition('/')[0]
             if entity.type in catalogue.names('msg', package):
                 continue

@@ -48,8 +48,8 @@ def up(path: Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] 
     if importlib.util.find_spec('rclpy') is None:
         message = 'there is no rclpy in this Python, so nothing can run'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
-    from composer.runtime.behaviours import project_on_path  # noqa: PLC0415 - needs ROS
-    from composer.runtime.run import run_system  # noqa: PLC0415 - needs ROS
+    from composer.runtime.behaviours import project_on_path
+    from composer.runtime.run import run_system
 
     with project_on_path(project_search_path(path)):
         functions, findings = _import_behaviours(system, catalogue)
@@ -68,7 +68,7 @@ def _import_behaviours(
     system: LoadedSystem, catalogue: InterfaceCatalogue
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
     """Import every behaviour, and hold the functions themselves against their calls."""
-    from composer.runtime import behaviours  # noqa: PLC0415 - its callers need ROS
+    from composer.runtime import behaviours
 
     context = create_context(system, catalogue)
     functions: dict[str, Callable[..., Any]] = {}

@@ -98,7 +98,8 @@ def _package_missing(package: str, full_name: str) -> InterfaceNotFoundError:
     message = f'{full_name}: the package {package!r} is not installed'
     install = "install it, or name the folder of its definitions under 'interfaces:'"
     return InterfaceNotFoundError(
-        message, help=f'did you mean {nearest!r}?' if nearest else install,
+        message,
+        help=f'did you mean {nearest!r}?' if nearest else install,
     )
 
 

@@ -40,7 +40,9 @@ class FieldFault:
 
 
 def find_payload_faults(
-    description: MessageDescription, data: object, catalogue: InterfaceCatalogue,
+    description: MessageDescription,
+    data: object,
+    catalogue: InterfaceCatalogue,
 ) -> Iterator[FieldFault]:
     """Find everything for which data could not become a message.
 
@@ -72,7 +74,10 @@ class _Walk:
     catalogue: InterfaceCatalogue
 
     def message(
-        self, description: MessageDescription, data: object, place: _Place,
+        self,
+        description: MessageDescription,
+        data: object,
+        place: _Place,
     ) -> Iterator[FieldFault]:
         names = [field.name for field in description.fields]
         if isinstance(data, Mapping):

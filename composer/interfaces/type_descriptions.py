@@ -101,7 +101,10 @@ def _parse_interface(document: dict[str, Any]) -> InterfaceDescription:
     if kind == 'srv':
         return ServiceDescription(name, parse_part('Request'), parse_part('Response'))
     return ActionDescription(
-        name, parse_part('Goal'), parse_part('Result'), parse_part('Feedback'),
+        name,
+        parse_part('Goal'),
+        parse_part('Result'),
+        parse_part('Feedback'),
     )
 
 

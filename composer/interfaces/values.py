@@ -26,20 +26,24 @@ from composer.interfaces.wording import describe_value
 from composer.names import suggest
 
 FieldRule: TypeAlias = Literal[
-    'unknown-field', 'field-type', 'field-range', 'field-length', 'field-text',
+    'unknown-field',
+    'field-type',
+    'field-range',
+    'field-length',
+    'field-text',
 ]
 Reader: TypeAlias = Callable[[object], object]
 
 INTEGER_RANGES: Final = {
     'byte': (0, 2**8 - 1),
     'char': (0, 2**8 - 1),
-    'int8': (-2**7, 2**7 - 1),
+    'int8': (-(2**7), 2**7 - 1),
     'uint8': (0, 2**8 - 1),
-    'int16': (-2**15, 2**15 - 1),
+    'int16': (-(2**15), 2**15 - 1),
     'uint16': (0, 2**16 - 1),
-    'int32': (-2**31, 2**31 - 1),
+    'int32': (-(2**31), 2**31 - 1),
     'uint32': (0, 2**32 - 1),
-    'int64': (-2**63, 2**63 - 1),
+    'int64': (-(2**63), 2**63 - 1),
     'uint64': (0, 2**64 - 1),
 }
 # The greatest finite single-precision number (IEEE 754 binary32).
@@ -58,7 +62,11 @@ class FieldError(ComposerError):
     """
 
     def __init__(
-        self, message: str, *, rule: FieldRule, help: str | None = None,  # noqa: A002
+        self,
+        message: str,
+        *,
+        rule: FieldRule,
+        help: str | None = None,  # noqa: A002
     ) -> None:
         """Say what was expected, what was found, and which rule that breaks."""
         super().__init__(message, help=help)

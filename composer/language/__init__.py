@@ -25,7 +25,7 @@ class LoadedSystem:
 
     Attributes:
         path: The file; relative module paths and the like are sought from its folder.
-        spec: The system without the parts that were wrong, `None` if the file could not be read at all.
+        spec: The system without the parts that were wrong; `None` if nothing could be read.
         dropped: The paths of the data that were left out of `spec` for that.
     """
 

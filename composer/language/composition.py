@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import yaml
 
@@ -134,7 +134,9 @@ class _TreeBuilder:
     def _aliased(self, event: Any) -> TreeNode:
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} stands before this alias')
+            self._stop(
+                event, 'unknown-alias', f'no anchor &{event.anchor} stands before this alias'
+            )
         if node in self._open:
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
         return node
@@ -149,7 +151,7 @@ class _TreeBuilder:
             length = max(len(self._source.line(start.line + 1).rstrip()) - start.column, 1)
         return Span(self._source, start.line + 1, start.column + 1, length)
 
-    def _stop(self, event: Any, rule: str, message: str) -> Any:
+    def _stop(self, event: Any, rule: str, message: str) -> NoReturn:
         raise CompositionError(diagnostic_at(self._span(event), rule, message))
 
 
@@ -176,9 +178,7 @@ def _syntax_help(span: Span) -> str | None:
     return None
 
 
-def _character_fault(
-    error: yaml.reader.ReaderError, text: str, source: SourceFile
-) -> Diagnostic:
+def _character_fault(error: yaml.reader.ReaderError, text: str, source: SourceFile) -> Diagnostic:
     position = error.position if isinstance(error.position, int) else 0
     before = text[:position]
     line = before.count('\n') + 1

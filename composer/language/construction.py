@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.composition import (
@@ -13,7 +13,6 @@ from composer.language.composition import (
     SequenceNode,
     TreeNode,
 )
-from composer.language.positions import DataPath, SourceMap
 from composer.language.scalars import (
     TAG_MAP,
     TAG_SEQ,
@@ -22,6 +21,9 @@ from composer.language.scalars import (
     parse_tagged_scalar,
     short_tag,
 )
+
+if TYPE_CHECKING:
+    from composer.language.positions import DataPath, SourceMap
 
 # A file of the largest size has fewer values than this; only aliases in aliases reach it.
 MAX_VALUES = 1_000_000
@@ -124,7 +126,9 @@ class _Constructor:
         parts = node.items if isinstance(node, SequenceNode) else [node]
         for part in parts:
             if not isinstance(part, MappingNode):
-                self._fault(part, 'bad-merge', 'the merge key << takes a mapping, or a list of them')
+                self._fault(
+                    part, 'bad-merge', 'the merge key << takes a mapping, or a list of them'
+                )
                 continue
             merged = MappingNode(None, part.span)
             for key_node, value_node in part.pairs:

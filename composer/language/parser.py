@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from composer.language.positions import DataPath
+    from composer.language.specs import OnError
 
 Spec = TypeVar('Spec')
 Data = dict[str, Any]
@@ -45,11 +46,12 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         description=data.get('description', ''),
         qos=_parse_entries(data, (), 'qos', _parse_named_qos),
         threads=int(executor.get('threads', DEFAULT_THREADS)),
-        shutdown_timeout_sec=float(
-            executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)
-        ),
+        shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
         nodes=_parse_entries(
-            data, (), 'nodes', lambda name, node, path: _NodeParser(defaults, node, path).parse(name)
+            data,
+            (),
+            'nodes',
+            lambda name, node, path: _NodeParser(defaults, node, path).parse(name),
         ),
     )
 
@@ -79,7 +81,7 @@ class _NodeParser:
         self._defaults = defaults
         self._data = defaults.node | data
         self._path = path
-        self._on_error = self._data.get('on_error', 'log')
+        self._on_error: OnError = self._data.get('on_error', 'log')
 
     def parse(self, name: str) -> NodeSpec:
         data, path = self._data, self._path
@@ -173,7 +175,7 @@ def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa:
     return _parse_qos(data, path)
 
 
-def _parse_qos(data: int | float | str | Data, path: DataPath) -> QosSpec:
+def _parse_qos(data: float | str | Data, path: DataPath) -> QosSpec:
     if isinstance(data, str):
         return QosSpec(data, {}, path)
     if not isinstance(data, dict):

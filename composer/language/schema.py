@@ -1,6 +1,6 @@
 """The schema of the language: what it says of data, as findings in the words of the language.
 
-The schema (JSON Schema 2020-12) is the one description of the structure; editors use the same file.
+The schema (JSON Schema 2020-12) is the one description of the structure, for editors too.
 """
 
 from __future__ import annotations
@@ -84,7 +84,11 @@ def _with_key_renamed(data: Any, path: DataPath, key: str) -> Any:
         return {key if name == head else name: value for name, value in data.items()}
     if isinstance(data, list):
         index = int(head)
-        return [*data[:index], _with_key_renamed(data[index], tuple(rest), key), *data[index + 1 :]]
+        return [
+            *data[:index],
+            _with_key_renamed(data[index], tuple(rest), key),
+            *data[index + 1 :],
+        ]
     return data | {head: _with_key_renamed(data[head], tuple(rest), key)}
 
 
@@ -111,4 +115,3 @@ def _check_maximum(
     """As in JSON Schema, but a NaN is beyond every maximum (JSON has none, YAML has)."""
     if validator.is_type(instance, 'number') and not instance <= maximum:  # type: ignore[operator]
         yield ValidationError(f'{instance!r} is greater than the maximum of {maximum!r}')
-

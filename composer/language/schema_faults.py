@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from jsonschema.exceptions import ValidationError
 
     from composer.language.positions import DataPath, SourceMap
@@ -164,13 +164,15 @@ def _explain_dependency(error: ValidationError) -> Iterator[StructureFault]:
 
 
 def _explain_exclusion(error: ValidationError) -> Iterator[StructureFault]:
-    keys = error.validator_value['required']
-    yield _conflict(error, keys)
+    if isinstance(error.instance, dict):
+        yield _conflict(error, error.validator_value['required'])
 
 
 def _explain_alternatives(error: ValidationError) -> Iterator[StructureFault]:
     branches = error.validator_value
     if all(set(branch) == {'required'} for branch in branches):
+        if not isinstance(error.instance, dict):
+            return  # what is no mapping has its finding for that
         yield _explain_key_alternatives(error, [branch['required'] for branch in branches])
         return
     by_branch: dict[int, list[ValidationError]] = {}
@@ -193,7 +195,9 @@ def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
         return False
     if inner.validator == 'const':
         return True
-    nested = inner.validator == 'oneOf' and all(_is_mismatch(e, outer) for e in inner.context or ())
+    nested = inner.validator == 'oneOf' and all(
+        _is_mismatch(e, outer) for e in inner.context or ()
+    )
     return inner.validator == 'type' or nested
 
 

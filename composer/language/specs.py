@@ -151,6 +151,16 @@ class NodeSpec:
     on_parameters: BehaviourSpec | None
     path: DataPath
 
+    @property
+    def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
+        """All that has a topic."""
+        return (*self.publishers.values(), *self.subscriptions.values())
+
+    @property
+    def triggers(self) -> tuple[TimerSpec | SubscriptionSpec, ...]:
+        """All that may publish what a behaviour returns."""
+        return (*self.timers.values(), *self.subscriptions.values())
+
 
 @dataclass(frozen=True, slots=True)
 class SystemSpec:

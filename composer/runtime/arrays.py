@@ -59,7 +59,7 @@ def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
         return read_numbers
     # NumPy takes a tenth of a second to import, and most messages do without it. The class of one
     # with a fixed array of numbers has imported it by now.
-    from composer.runtime.numpy_arrays import fixed_reader  # noqa: PLC0415
+    from composer.runtime.numpy_arrays import fixed_reader
 
     return fixed_reader(field_type, read_numbers)
 
@@ -107,7 +107,7 @@ def _copy_fast(kind: str, value: object) -> 'array[Any] | None':
         return array(code, octets)
     if hasattr(value, '__array_interface__'):
         # Only NumPy's arrays get here, so it is imported already.
-        from composer.runtime.numpy_arrays import read_array  # noqa: PLC0415
+        from composer.runtime.numpy_arrays import read_array
 
         exact = read_array(kind, value)
         return None if exact is None else array(code, exact.tobytes())
@@ -126,7 +126,7 @@ def _copy_list(code: str, value: 'list[Any] | tuple[Any, ...]') -> 'array[Any] |
     return None if code == 'f' and not all(map(isfinite, numbers)) else numbers
 
 
-def _unpack(value: Any) -> object:  # noqa: ANN401
+def _unpack(value: Any) -> object:
     """Get the items of NumPy's arrays and `array.array` as Python values, views as their bytes."""
     if isinstance(value, memoryview):
         return value.tobytes() if value.format in _OCTET_FORMATS else value

@@ -33,7 +33,7 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
     """
     try:
         module = importlib.import_module(spec.module)
-    except BaseException as error:  # noqa: BLE001 - it runs the user's code, which may do anything
+    except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
             raise
         where = _innermost_place(error)
@@ -90,6 +90,3 @@ def _innermost_place(error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename:
         return f' ({error.filename}:{error.lineno})'
     return f' ({own[-1].filename}:{own[-1].lineno})' if len(own) > 1 else ''
-
-
-

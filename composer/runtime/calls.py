@@ -9,13 +9,12 @@ import traceback
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from composer.runtime.behaviours import kind_of
 from composer.python_source import FunctionKind
+from composer.runtime.behaviours import kind_of
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Coroutine
-
-    from composer.language.specs import OnError
+    from collections.abc import Callable
+    from types import CoroutineType
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +27,7 @@ class RunningCall:
 
     owner: str
     thread: int | None
-    coroutine: Coroutine[Any, Any, Any] | None = None
+    coroutine: CoroutineType[Any, Any, Any] | None = None
 
     def format_stack(self) -> str:
         """Return where it is now, innermost call last."""
@@ -129,8 +128,8 @@ class BehaviourCall:
         return True
 
     async def _run_async(self, *arguments: Any) -> None:
-        coroutine: Awaitable[Any] = self._function(*arguments)
-        token = self._ledger.begin(RunningCall(self._owner, None, coroutine))  # type: ignore[arg-type]
+        coroutine: CoroutineType[Any, Any, Any] = self._function(*arguments)
+        token = self._ledger.begin(RunningCall(self._owner, None, coroutine))
         try:
             self._deliver(await coroutine)
         except GeneratorExit:

@@ -20,7 +20,7 @@ class Gate:
         self.is_open = False
 
 
-class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]
+class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):
     """One callback at a time, and none while the gate is closed."""
 
     def __init__(self, gate: Gate) -> None:
@@ -36,7 +36,7 @@ class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):  # type: igno
         return self._gate.is_open and bool(super().beginning_execution(entity))
 
 
-class GatedReentrantGroup(ReentrantCallbackGroup):  # type: ignore[misc]
+class GatedReentrantGroup(ReentrantCallbackGroup):
     """Any number of callbacks at a time, and none while the gate is closed."""
 
     def __init__(self, gate: Gate) -> None:

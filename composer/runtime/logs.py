@@ -15,27 +15,28 @@ if TYPE_CHECKING:
 # The logger of Composer itself, for what concerns the whole system.
 system_logger = get_logger('composer')
 
-_ROOT = ''
-
 
 @contextmanager
 def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[None]:
-    """Set the levels of all loggers, and give them back their old ones at the end.
+    """Set the levels of the nodes' loggers, and give them back their old ones at the end.
 
     Args:
         nodes: Their `log_level` holds where the command line does not say otherwise.
-        requests: What the command line says: `debug` for all loggers, `talker:=debug` for one.
+        requests: What the command line says: `debug` for all nodes and Composer itself,
+            `talker:=debug` for one logger; later ones win.
     """
-    by_name = {_logger_name(node): node.log_level for node in nodes if node.log_level}
+    names = {_logger_name(node): node.log_level for node in nodes}
+    by_name: dict[str, str] = {name: level for name, level in names.items() if level}
     for request in requests:
         name, separator, level = request.rpartition(':=')
-        if not separator:
-            by_name = dict.fromkeys(by_name, level)
-        by_name[name.strip('/').replace('/', '.') if separator else _ROOT] = level  # type: ignore[assignment]
+        if separator:
+            by_name[name.strip('/').replace('/', '.')] = level
+        else:
+            by_name |= dict.fromkeys([*names, system_logger.name], level)
     before = {name: get_logger_level(name) for name in by_name}
     try:
         for name, level in by_name.items():
-            set_logger_level(name, LoggingSeverity[str(level).upper()])
+            set_logger_level(name, LoggingSeverity[level.upper()])
         yield
     finally:
         for name, severity in before.items():

@@ -115,7 +115,9 @@ class Node:
         publish = self._publishers.get(name)
         if publish is None:
             message = f"node '{self.name}' declares no publisher '{name}'"
-            raise UndeclaredError(message, help=did_you_mean(name, self._publishers, 'it declares'))
+            raise UndeclaredError(
+                message, help=did_you_mean(name, self._publishers, 'it declares')
+            )
         publish(payload)
 
     def shutdown(self, code: int = 0) -> None:

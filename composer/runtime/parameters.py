@@ -21,6 +21,8 @@ from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.language.specs import BehaviourSpec, ParameterSpec
     from composer.runtime.live_node import LiveNode
 
@@ -39,7 +41,9 @@ def create_parameters(node: LiveNode) -> None:
         try:
             node.ros.declare_parameter(spec.name, _first_value(spec), create_descriptor(spec))
         except ParameterException as error:
-            message = f"node '{node.spec.name}': parameter '{spec.name}' from the command line: {error}"
+            message = (
+                f"node '{node.spec.name}': parameter '{spec.name}' from the command line: {error}"
+            )
             raise StartError(message) from error
     if node.spec.on_parameters:
         hear = _BehaviourHearing(node, node.spec.on_parameters)
@@ -87,7 +91,7 @@ def _first_value(spec: ParameterSpec) -> Any:
 
 
 def _refuse_unless_chosen(
-    specs: dict[str, ParameterSpec], changes: list[Parameter]
+    specs: Mapping[str, ParameterSpec], changes: list[Parameter]
 ) -> SetParametersResult:
     for change in changes:
         spec = specs.get(change.name)
@@ -110,7 +114,9 @@ class _BehaviourHearing:
         """Return the result that ROS gives to whoever asked for the change."""
         new_values = {change.name: change.value for change in changes}
         answers: list[Any] = []
-        function = partial(self._node.function(self._spec), self._node.face, **self._spec.arguments)
+        function = partial(
+            self._node.function(self._spec), self._node.face, **self._spec.arguments
+        )
         call = self._node.call('on_parameters', self._spec.path, function)
         call = call.delivering(answers.append)
         if self._kind is FunctionKind.COROUTINE:

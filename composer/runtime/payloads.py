@@ -72,7 +72,7 @@ class PayloadConverter:
         self._single = first.name if first else None
         self._takes_bare_messages = first is not None and first.type.kind == 'message'
 
-    def convert(self, payload: object) -> Any:  # noqa: ANN401
+    def convert(self, payload: object) -> Any:
         """Convert a payload to a message, or check the message that it is.
 
         Raises:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from rclpy.duration import Duration, Infinite
 from rclpy.qos import (
     DeadlineBestAvailable,
-    LivelinessLeaseDurationeBestAvailable,
     DurabilityPolicy,
     HistoryPolicy,
+    LivelinessLeaseDurationeBestAvailable,
     LivelinessPolicy,
     QoSProfile,
     ReliabilityPolicy,

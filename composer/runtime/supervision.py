@@ -90,7 +90,9 @@ def _format_traceback(error: BaseException) -> str:
     """Return the traceback without Composer's own frames at its beginning."""
     own = __name__.partition('.')[0]
     trace = error.__traceback__
-    while trace and trace.tb_next and trace.tb_frame.f_globals.get('__package__', '').startswith(own):
+    while (
+        trace and trace.tb_next and trace.tb_frame.f_globals.get('__package__', '').startswith(own)
+    ):
         trace = trace.tb_next
     return ''.join(traceback.format_exception(type(error), error, trace)).rstrip()
 
@@ -121,9 +123,7 @@ class Supervisor:
         shutdown: Ends the system with this exit code.
     """
 
-    def __init__(
-        self, restart: Callable[[str], None], shutdown: Callable[[int], None]
-    ) -> None:
+    def __init__(self, restart: Callable[[str], None], shutdown: Callable[[int], None]) -> None:
         self._restart = restart
         self._shutdown = shutdown
         self._backoffs: dict[str, Backoff] = {}

@@ -50,7 +50,7 @@ class System:
         self._context = Context()
         _init_context(self._context, ros_arguments)
         self._executor = SystemExecutor(
-            self._context, spec.threads, lambda text: system_logger.error(text)
+            self._context, spec.threads, report=system_logger.error
         )
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(

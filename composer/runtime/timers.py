@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
 
+from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
 from composer.runtime.payloads import converter_for
-from composer.interfaces.classes import import_interface
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Generator
