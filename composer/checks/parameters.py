@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from composer.language.parameters import find_type_fault
 
 if TYPE_CHECKING:
-    from composer.language.specs import ParameterSpec
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath
+    from composer.language.specs import ParameterSpec
 
 _RULE = 'bad-parameter'
 _NUMERIC = ('integer', 'double')

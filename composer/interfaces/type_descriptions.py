@@ -126,7 +126,7 @@ def _parse_field(described: dict[str, Any]) -> FieldDescription:
 def _parse_type(described: dict[str, Any]) -> FieldType:
     array_number, number = divmod(described['type_id'] - 1, _ARRAY_STEP)
     number += 1
-    if number not in _KINDS or array_number >= len(_ARRAYS):
+    if number not in _KINDS:
         message = f'type {described["type_id"]} has no place in .msg files'
         raise TypeDescriptionError(message)
     array = _ARRAYS[array_number]

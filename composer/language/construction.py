@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.composition import (

@@ -11,6 +11,7 @@ from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
     from jsonschema.exceptions import ValidationError
 
     from composer.language.positions import DataPath, SourceMap

@@ -76,7 +76,7 @@ def _list_reader(field_type: FieldType, read_item: Reader) -> _SequenceReader:
             error.within(len(kept))
             raise
         # A list that needs no change stays the same object.
-        return items if items is value and all(map(is_, kept, items)) else kept
+        return value if type(value) is list and all(map(is_, kept, value)) else kept
 
     return read
 

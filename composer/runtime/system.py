@@ -49,9 +49,7 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = Context()
         _init_context(self._context, ros_arguments)
-        self._executor = SystemExecutor(
-            self._context, spec.threads, report=system_logger.error
-        )
+        self._executor = SystemExecutor(self._context, spec.threads, report=system_logger.error)
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(
             context=self._context,
