@@ -20,6 +20,16 @@ _LONGEST_WAIT_SEC = 0.5
 _JOIN_TIMEOUT_SEC = 2.0
 
 
+class _PoolEndingExecutor(MultiThreadedExecutor):
+    """The stock executor, whose idle threads end with it and not with a later collection."""
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """See the base class."""
+        ended = bool(super().shutdown(timeout_sec))
+        self._executor.shutdown(wait=ended, cancel_futures=True)
+        return ended
+
+
 class SystemExecutor:
     """Runs the callbacks of all nodes, on threads of its own, until it is stopped.
 
@@ -31,7 +41,7 @@ class SystemExecutor:
     def __init__(self, context: Context, threads: int, report: Callable[[str], None]) -> None:
         self._context = context
         self._report = report
-        self._executor = MultiThreadedExecutor(num_threads=max(threads, 2), context=context)
+        self._executor = _PoolEndingExecutor(num_threads=max(threads, 2), context=context)
         self._spinning = False
         self._thread = threading.Thread(target=self._spin, name='composer-executor', daemon=True)
 
