@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.names import (
+    expand_name,
     find_namespace_fault,
     find_node_name_fault,
     find_parameter_name_fault,
@@ -31,7 +32,7 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
         if fault:
             yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
         for entity in node.endpoints:
-            yield from _check_topic(context, entity)
+            yield from _check_topic(context, node, entity)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)
             if fault:
@@ -51,9 +52,9 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _check_topic(
-    context: CheckContext, entity: PublisherSpec | SubscriptionSpec
+    context: CheckContext, node: NodeSpec, entity: PublisherSpec | SubscriptionSpec
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(entity.topic)
+    fault = find_topic_name_fault(entity.topic) or _find_full_name_fault(node, entity.topic)
     if not fault:
         return
     message = f"'{entity.topic}' cannot name a topic: {fault}"
@@ -62,6 +63,15 @@ def _check_topic(
         yield context.at_value(path, _RULE, message)
     else:
         yield context.at_key(entity.path, _RULE, message, help=_NAMES_ITS_TOPIC)
+
+
+def _find_full_name_fault(node: NodeSpec, topic: str) -> str | None:
+    """Return what becomes wrong with a name in its namespace: its length, say."""
+    if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
+        return None
+    full = expand_name(topic, node.name, node.namespace)
+    fault = find_topic_name_fault(full)
+    return fault and f"in full it is '{full}', and {fault}"
 
 
 def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
@@ -79,6 +89,15 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = find_topic_name_fault(name)
+            fault = _find_rule_name_fault(name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
+
+
+def _find_rule_name_fault(name: str) -> str | None:
+    """Return why a name cannot stand in a rule, which takes less than topics do (rcl's lexer)."""
+    if '{' in name:
+        return 'it has no substitutions'
+    if name == '~':
+        return "'~' stands before a slash"
+    return find_topic_name_fault(name)

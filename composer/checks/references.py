@@ -117,6 +117,7 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             'unknown-type',
             f"no interface package '{package}' is installed",
             part=package,
+            first=True,
             help=_nearest(package, packages) or 'install it, or mend its name',
         )
     names = [known.rpartition('/')[2] for known in context.catalogue.names('msg', package)]
