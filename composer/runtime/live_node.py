@@ -58,6 +58,7 @@ class LiveNode:
     Attributes:
         gate: Closed until the node has started, and when it stops.
         publishers: What publishes a payload, by the publisher's name.
+        has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
     """
 
     spec: NodeSpec
@@ -69,6 +70,7 @@ class LiveNode:
     timers: list[Timer] = field(default_factory=list)
     gate: Gate = field(default_factory=Gate)
     ledger: CallLedger = field(default_factory=CallLedger)
+    has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
 
     def group(self, name: str | None) -> CallbackGroup:

@@ -31,7 +31,7 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     hooks = [
         threading.Thread(target=_run_on_stop, args=(node, timeout_sec), daemon=True)
         for node in reversed(nodes)
-        if node.spec.on_stop
+        if node.spec.on_stop and node.has_begun
     ]
     for thread in hooks:
         thread.start()

@@ -131,7 +131,10 @@ class System:
 
     def _run_on_start(self, node: LiveNode) -> None:
         hook = node.spec.on_start
-        if hook is None or self.stop_requested:
+        if self.stop_requested:
+            return
+        node.has_begun = True
+        if hook is None:
             return
         failures: list[BaseException] = []
         call = node.hook('on_start', hook, failures.append)
@@ -197,6 +200,8 @@ def _init_context(context: Context, ros_arguments: Sequence[str]) -> None:
     try:
         context.init(['--ros-args', *ros_arguments] if ros_arguments else [])
     except Exception as error:
-        kind = UsageError if 'arg' in type(error).__name__.lower() else StartError
-        message = f'ROS 2 cannot start: {error}'
+        unknown = 'args' in type(error).__name__.lower()
+        kind = UsageError if unknown or "Couldn't parse" in str(error) else StartError
+        reason = f'it does not know the arguments {error}' if unknown else error
+        message = f'ROS 2 cannot start: {reason}'
         raise kind(message) from error

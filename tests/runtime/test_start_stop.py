@@ -333,7 +333,7 @@ def test_a_module_that_cannot_be_imported_is_told_with_its_place_before_the_star
 
     assert child.wait() == 1
     assert child.lines == [
-        "system.yaml:4:57: error[broken-behaviour]: importing 'parts' raised "
+        "system.yaml:4:52: error[broken-behaviour]: importing 'parts' raised "
         f'{message} ({place})',
         "  4 |   good: {timers: {tick: {period: 0.01, behaviour: 'parts:tell'}}}",
         '    |                                                   ^^^^^^^^^^',
@@ -358,7 +358,7 @@ def test_a_function_that_only_shows_at_import_is_held_against_its_call(compose):
     assert [line for line in child.lines if 'error[' in line] == [
         'system.yaml:4:57: error[bad-signature]: tell() is called as tell(node): '
         'too many positional arguments',
-        "system.yaml:5:28: error[broken-behaviour]: parts has no function 'none'",
+        "system.yaml:5:22: error[broken-behaviour]: parts has no function 'none'",
     ]
 
 
@@ -369,8 +369,17 @@ def test_a_broken_file_starts_nothing(compose):
     assert "did you mean 'timers'?" in child.output
 
 
-def test_wrong_ros_arguments_are_a_usage_error(compose):
-    child = compose('version: 1\nnodes: {a: {}}\n', '', '--ros-args', '-p', 'nonsense')
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (('-p', 'nonsense'), "failed to initialize rcl: Couldn't parse parameter override rule"),
+        (('-r', 'a:b'), "failed to initialize rcl: Couldn't parse remap rule: '-r a:b'"),
+        (('--log-level', 'loud'), "failed to initialize rcl: Couldn't parse log level"),
+        (('-x', '3'), "it does not know the arguments ['-x', '3']"),
+    ],
+)
+def test_wrong_ros_arguments_are_a_usage_error(compose, arguments, message):
+    child = compose('version: 1\nnodes: {a: {}}\n', '', '--ros-args', *arguments)
 
     assert child.wait() == 2
-    assert child.lines[0].startswith('error: ROS 2 cannot start: ')
+    assert child.lines[-1].startswith(f'error: ROS 2 cannot start: {message}')
