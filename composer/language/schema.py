@@ -59,7 +59,12 @@ def check_structure(
                 findings.append(fault.diagnostic(positions))
                 data = _with_key_renamed(data, fault.path, str(fault.meant))
                 positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
-    findings += [fault.diagnostic(positions) for fault in _find_faults(data)]
+    incomplete = {path[:-1] for path in failed}
+    findings += [
+        fault.diagnostic(positions)
+        for fault in _find_faults(data)
+        if fault.rule != 'missing-key' or fault.path not in incomplete
+    ]
     while faults := _find_faults(data):
         paths = {fault.drop for fault in faults if fault.drop}
         for path in paths:
