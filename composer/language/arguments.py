@@ -95,9 +95,7 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[str]:
         yield f'the default {default!r} is none of the choices'
 
 
-def parse_arguments(
-    declared: Mapping[str, ArgumentSpec], words: Sequence[str]
-) -> dict[str, Any]:
+def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) -> dict[str, Any]:
     """Return the values of a file's arguments.
 
     Args:

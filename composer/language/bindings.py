@@ -42,6 +42,11 @@ def node_bindings(node: NodeSpec) -> Iterator[Binding]:
         if subscription.behaviour:
             owner = f"subscription '{subscription.name}'"
             yield Binding(subscription.behaviour, owner, ('node', 'message'))
+    yield from _serving_bindings(node)
+    yield from _hook_bindings(node)
+
+
+def _serving_bindings(node: NodeSpec) -> Iterator[Binding]:
     for service in node.services.values():
         yield Binding(service.behaviour, f"service '{service.name}'", ('node', 'request'))
     for action in node.actions.values():
@@ -55,6 +60,9 @@ def node_bindings(node: NodeSpec) -> Iterator[Binding]:
             yield Binding(client.feedback, f'{owner} (feedback)', ('node', 'feedback'))
         if client.result:
             yield Binding(client.result, f'{owner} (result)', ('node', 'result'))
+
+
+def _hook_bindings(node: NodeSpec) -> Iterator[Binding]:
     hooks = (
         ('on_start', node.on_start, ('node',)),
         ('on_stop', node.on_stop, ('node',)),

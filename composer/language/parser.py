@@ -241,9 +241,7 @@ def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa:
     return _parse_qos(data, path)
 
 
-def _parse_qos(
-    data: float | str | Data, path: DataPath, base: str = DEFAULT_PROFILE
-) -> QosSpec:
+def _parse_qos(data: float | str | Data, path: DataPath, base: str = DEFAULT_PROFILE) -> QosSpec:
     if isinstance(data, str):
         return QosSpec(data, {}, path)
     if not isinstance(data, dict):

@@ -10,7 +10,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import StrictUndefined, TemplateError, UndefinedError
-from jinja2.sandbox import SandboxedEnvironment, SecurityError
+from jinja2.exceptions import SecurityError
+from jinja2.sandbox import SandboxedEnvironment
 
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.names import did_you_mean

@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Any
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient as RosActionClient
 
-from composer.errors import ComposerError
+from composer.errors import (
+    ActionNotAvailableError,
+    GoalRejectedError,
+    GoalTimeoutError,
+)
 from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
@@ -36,22 +40,6 @@ _STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: 'canceled',
     GoalStatus.STATUS_ABORTED: 'aborted',
 }
-
-
-class GoalError(ComposerError):
-    """A goal was not accepted, or has no result."""
-
-
-class ActionNotAvailableError(GoalError):
-    """No action server appeared in time."""
-
-
-class GoalRejectedError(GoalError):
-    """The server refused the goal."""
-
-
-class GoalTimeoutError(GoalError):
-    """The server did not answer in time."""
 
 
 def create_action_clients(node: LiveNode) -> None:
@@ -115,7 +103,7 @@ class ActionClient:
         goal.heard.put(None)
         if future.done() and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
-                self._node.face.logger.warn(f"the goal of '{self._name}' was {goal.status}")
+                self._node.face.logger.warning(f"the goal of '{self._name}' was {goal.status}")
             self._result.put(response.result)
 
 

@@ -132,7 +132,9 @@ class _Execution:
         self._to_result = converter_for(action_class.Result).convert
         self._to_feedback = converter_for(action_class.Feedback).convert
         self.is_async = self._kind in (FunctionKind.COROUTINE, FunctionKind.ASYNC_GENERATOR)
-        self.callback: Callable[[Any], Any] = self._execute_async if self.is_async else self._execute
+        self.callback: Callable[[Any], Any] = (
+            self._execute_async if self.is_async else self._execute
+        )
 
     def _execute(self, goal: Any) -> Any:
         results: list[Any] = []

@@ -43,13 +43,14 @@ class _ElasticExecutor(MultiThreadedExecutor):
         """Let another thread work while this one waits for something that callbacks bring."""
         pool = self._executor
         with self._growth:
-            pool._max_workers += 1
-            pool._adjust_thread_count()
+            # Nothing public lets a pool of the standard library grow.
+            pool._max_workers += 1  # noqa: SLF001
+            pool._adjust_thread_count()  # noqa: SLF001
         try:
             yield
         finally:
             with self._growth:
-                pool._max_workers -= 1
+                pool._max_workers -= 1  # noqa: SLF001
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """See the base class."""

@@ -161,7 +161,10 @@ class Node:
         return client.call({} if payload is None else payload, timeout)
 
     async def call_async(
-        self, name: str, payload: Payload = None, timeout: float | None = 5.0
+        self,
+        name: str,
+        payload: Payload = None,
+        timeout: float | None = 5.0,  # noqa: ASYNC109 - as in `call`; rclpy's loop has no scopes
     ) -> Any:
         """As `call`, for `async def` behaviours: no thread is held while it waits."""
         client = self._declared(name, self._service_clients, 'service client')

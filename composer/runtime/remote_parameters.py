@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
-from composer.errors import ComposerError
+from composer.errors import (
+    CallTimeoutError,
+    ParametersRefusedError,
+    ServiceNotAvailableError,
+)
 from composer.names import expand_namespace, join_names
-from composer.runtime.service_clients import CallTimeoutError, ServiceNotAvailableError
 from composer.runtime.waiting import poll_in_thread, wait_in_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from composer.runtime.live_node import LiveNode
-
-
-class ParametersRefusedError(ComposerError):
-    """A node refused new values of its parameters, or has no such parameters."""
 
 
 class RemoteParameters:

@@ -5,7 +5,12 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-from composer.errors import ComposerError
+from composer.errors import (
+    CallError,
+    CallTimeoutError,
+    ServiceFailedError,
+    ServiceNotAvailableError,
+)
 from composer.interfaces.classes import import_interface
 from composer.runtime.payloads import converter_for
 from composer.runtime.qos import create_qos_profile
@@ -17,22 +22,6 @@ if TYPE_CHECKING:
     from composer.language.specs import ServiceClientSpec
     from composer.runtime.live_node import LiveNode
     from composer.runtime.node import Payload
-
-
-class CallError(ComposerError):
-    """A service call has no response."""
-
-
-class ServiceNotAvailableError(CallError):
-    """No server appeared in time."""
-
-
-class CallTimeoutError(CallError):
-    """The server did not answer in time."""
-
-
-class ServiceFailedError(CallError):
-    """The server is in this system, and its behaviour raised an error."""
 
 
 def create_service_clients(node: LiveNode) -> None:
@@ -98,9 +87,7 @@ class ServiceClient:
         message = f"no server of '{self._service}' appeared within {timeout_sec:g} s"
         return ServiceNotAvailableError(message, help='is it running, and is that its name?')
 
-    def _no_response(
-        self, future: Future, begun: float, timeout_sec: float | None
-    ) -> CallError:
+    def _no_response(self, future: Future, begun: float, timeout_sec: float | None) -> CallError:
         self._client.remove_pending_request(future)
         if self._node.services.failures.since(self._service, begun):
             message = f"'{self._service}' did not answer: its behaviour raised an error"
