@@ -56,9 +56,10 @@ class Span:
         start = self.column - 1
         return self.source.line(self.line)[start : start + self.length]
 
-    def narrowed_to(self, part: str) -> Span:
-        """Return the span of the last `part` within this one, or this one if it has none."""
-        start = self.text.rfind(part) if part else -1
+    def narrowed_to(self, part: str, *, first: bool = False) -> Span:
+        """Return the span of the last (or `first`) `part` within this one; this one if none."""
+        find = self.text.find if first else self.text.rfind
+        start = find(part) if part else -1
         if start < 0:
             return self
         return Span(self.source, self.line, self.column + start, len(part))

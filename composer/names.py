@@ -139,8 +139,8 @@ def expand_name(name: str, node_name: str, namespace: str) -> str:
     if name.startswith('~'):
         return join_names(namespace, node_name) + name[1:]
     if name.startswith('/'):
-        return re.sub('/+', '/', name)
-    return join_names(namespace, name.replace('//', '/').lstrip('/'))
+        return name
+    return join_names(namespace, name)
 
 
 def remap_name(

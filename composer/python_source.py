@@ -128,6 +128,8 @@ def read_module(path: Path) -> ModuleSource:
         return ModuleSource(path, is_open=True)
     try:
         tree = ast.parse(path.read_bytes(), str(path))
+        # The compiler finds what the parser lets pass: `return` outside a function, say.
+        compile(tree, str(path), 'exec', dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = getattr(error, 'lineno', None)
         where = f'{path}:{line}' if line else str(path)
@@ -140,12 +142,16 @@ def read_module(path: Path) -> ModuleSource:
 
 
 class _ModuleReader:
-    """Collects the names that the statements of a module bind; later ones win."""
+    """Collects the names that the statements of a module bind.
+
+    Later ones win; what a conditional statement binds again may be either.
+    """
 
     def __init__(self) -> None:
         self.functions: dict[str, FunctionSource] = {}
         self.constants: dict[str, str] = {}
         self.is_open = False
+        self._conditions = 0
 
     def read(self, body: list[ast.stmt]) -> None:
         for statement in body:
@@ -162,10 +168,12 @@ class _ModuleReader:
         elif isinstance(statement, ast.Assign | ast.AnnAssign):
             self._read_assignment(statement)
         else:
-            for name in ('body', 'orelse', 'finalbody'):
-                self.read(getattr(statement, name, []))
-            for inner in (*getattr(statement, 'handlers', ()), *getattr(statement, 'cases', ())):
-                self.read(inner.body)
+            self._conditions += 1
+            for name in ('body', 'handlers', 'cases', 'orelse', 'finalbody'):
+                for inner in getattr(statement, name, ()):
+                    is_block = isinstance(inner, ast.ExceptHandler | ast.match_case)
+                    self.read(inner.body if is_block else [inner])
+            self._conditions -= 1
 
     def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
         for alias in statement.names:
@@ -189,10 +197,15 @@ class _ModuleReader:
                     self._bind(node.id, FunctionSource())
 
     def _bind(self, name: str, function: FunctionSource) -> None:
+        if self._conditions and (name in self.functions or name in self.constants):
+            function = FunctionSource()
         self.constants.pop(name, None)
         self.functions[name] = function
 
     def _constant(self, name: str, what: str) -> None:
+        if self._conditions and name in self.functions:
+            self._bind(name, FunctionSource())
+            return
         self.functions.pop(name, None)
         self.constants[name] = what
 

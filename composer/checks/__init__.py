@@ -50,7 +50,9 @@ def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Di
     """Return all that is wrong with a system, by its place in the file."""
     context, declared = create_context(system, catalogue)
     found = [finding for rule in RULES for finding in rule(context)] if context else []
-    return sorted([*system.diagnostics, *declared, *found], key=lambda finding: finding.sort_key)
+    # What several entries share through an alias is wrong once.
+    once = dict.fromkeys([*system.diagnostics, *declared, *found])
+    return sorted(once, key=lambda finding: finding.sort_key)
 
 
 def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:

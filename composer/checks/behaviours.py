@@ -6,7 +6,7 @@ import inspect
 from typing import TYPE_CHECKING
 
 from composer.language.bindings import Binding, node_bindings
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 from composer.python_source import FunctionKind, MissingModule, ModuleSource
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ def _check_source(context: CheckContext, binding: Binding) -> Iterator[Diagnosti
             'broken-module',
             f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
             part=behaviour.module,
+            first=True,
         )
     elif function := module.functions.get(behaviour.function):
         yield from check_behaviour_call(context, binding, function.kind, function.signature)
@@ -75,6 +76,7 @@ def _explain_missing_module(
         'unknown-behaviour',
         f"there is no module '{module.missing}'",
         part=behaviour.module,
+        first=True,
         help=help_text,
     )
 
@@ -110,19 +112,23 @@ def _check_signature(
     behaviour = binding.behaviour
     by_keyword = _keyword_parameters(signature)
     taken = list(signature.parameters)[: len(binding.parameters)]
+    free = [name for name in by_keyword or () if name not in taken]
+    # What is given, with misspelt names as they were meant: their finding is enough.
+    was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
+    given = set(free if was_dropped else behaviour.arguments)
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
-            options = [name for name in by_keyword if name not in taken]
+            given.remove(keyword)
+            given.add(suggest(keyword, free) or '')
             yield context.at_key(
                 (*behaviour.path[:-1], 'with', keyword),
                 'bad-argument',
                 f"{behaviour.name} takes no argument '{keyword}'",
-                help=did_you_mean(keyword, options, 'it takes') or 'it takes no more arguments',
+                help=did_you_mean(keyword, free, 'it takes') or 'it takes no more arguments',
             )
     try:
-        known = {k: None for k in behaviour.arguments if by_keyword is None or k in by_keyword}
-        free = {key: None for key in known if key not in taken}
-        signature.bind(*binding.parameters, **free)
+        keywords = dict.fromkeys(given - {'', *taken})
+        signature.bind(*binding.parameters, **keywords)
     except TypeError as error:
         shown = str(signature).replace('=Ellipsis', '=…')
         yield context.at_value(

@@ -35,11 +35,12 @@ class CheckContext:
         message: str,
         *,
         part: str = '',
+        first: bool = False,
         help: str | None = None,  # noqa: A002 - the word that the finding shows
         severity: Severity = Severity.ERROR,
     ) -> Diagnostic:
-        """Return a finding at a value, or at the last `part` of its text."""
-        span = self.system.positions.value(path).narrowed_to(part)
+        """Return a finding at a value, or at the last (or `first`) `part` of its text."""
+        span = self.system.positions.value(path).narrowed_to(part, first=first)
         return diagnostic_at(span, rule, message, help=help, severity=severity)
 
     def at_key(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.names import (
+    expand_name,
     find_namespace_fault,
     find_node_name_fault,
     find_parameter_name_fault,
@@ -51,17 +52,17 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
     for endpoint in node.endpoints:
-        yield from _check_ros_name(context, endpoint.path, 'topic', endpoint.topic)
+        yield from _check_ros_name(context, node, endpoint.path, 'topic', endpoint.topic)
     for service in node.service_endpoints:
-        yield from _check_ros_name(context, service.path, 'service', service.service)
+        yield from _check_ros_name(context, node, service.path, 'service', service.service)
     for action in node.action_endpoints:
-        yield from _check_ros_name(context, action.path, 'action', action.action)
+        yield from _check_ros_name(context, node, action.path, 'action', action.action)
 
 
 def _check_ros_name(
-    context: CheckContext, entity: DataPath, kind: str, name: str
+    context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(name, kind)
+    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name)
     if not fault:
         return
     message = f"'{name}' cannot name {with_article(kind)}: {fault}"
@@ -71,6 +72,15 @@ def _check_ros_name(
     else:
         help_text = f"give its name with '{kind}:', and let this be a plain word"
         yield context.at_key(entity, _RULE, message, help=help_text)
+
+
+def _find_full_name_fault(node: NodeSpec, topic: str) -> str | None:
+    """Return what becomes wrong with a name in its namespace: its length, say."""
+    if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
+        return None
+    full = expand_name(topic, node.name, node.namespace)
+    fault = find_topic_name_fault(full)
+    return fault and f"in full it is '{full}', and {fault}"
 
 
 def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
@@ -88,6 +98,15 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = find_topic_name_fault(name)
+            fault = _find_rule_name_fault(name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
+
+
+def _find_rule_name_fault(name: str) -> str | None:
+    """Return why a name cannot stand in a rule, which takes less than topics do (rcl's lexer)."""
+    if '{' in name:
+        return 'it has no substitutions'
+    if name == '~':
+        return "'~' stands before a slash"
+    return find_topic_name_fault(name)

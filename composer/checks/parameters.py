@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.language.parameters import find_type_fault
+from composer.language.parameters import find_type_fault, find_type_faults
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,6 +17,15 @@ if TYPE_CHECKING:
 _RULE = 'bad-parameter'
 _NUMERIC = ('integer', 'double')
 _HAS_CHOICES = (*_NUMERIC, 'string')
+
+# Parameters that each node of rclpy declares itself, and what to say of them.
+_OF_EVERY_NODE = {
+    'use_sim_time': (
+        'a key of the node, not one of its parameters',
+        "move it out of 'parameters:'",
+    ),
+    'start_type_description_service': ('declared by every node of ROS itself', 'remove it'),
+}
 
 # With this relative tolerance rclpy compares doubles (`Node._apply_floating_point_range`).
 _STEP_TOLERANCE = 1e-6
@@ -31,9 +40,10 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
     path = _value_path(context, parameter)
-    if parameter.name == 'use_sim_time':
-        message = "'use_sim_time' is a key of the node, not one of its parameters"
-        yield context.at_key(parameter.path, _RULE, message, help="move it out of 'parameters:'")
+    if parameter.name in _OF_EVERY_NODE:
+        what, help_text = _OF_EVERY_NODE[parameter.name]
+        message = f"'{parameter.name}' is {what}"
+        yield context.at_key(parameter.path, _RULE, message, help=help_text)
         return
     if parameter.type is None:
         yield context.at_value(
@@ -43,9 +53,11 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
             help='write {default: [], type: string_array}, with the type that is meant',
         )
         return
-    fault = None if parameter.value is None else find_type_fault(parameter.value, parameter.type)
-    if fault:
-        yield context.at_value(path, _RULE, f"parameter '{parameter.name}': {fault}")
+    value = parameter.value
+    faults = [] if value is None else list(find_type_faults(value, parameter.type))
+    for item, fault in faults:
+        yield context.at_value((*path, *item), _RULE, f"parameter '{parameter.name}': {fault}")
+    if faults:
         return
     limits = list(_check_limits(context, parameter))
     yield from limits

@@ -121,6 +121,7 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             'unknown-type',
             f"no interface package '{package}' is installed",
             part=package,
+            first=True,
             help=_nearest(package, packages) or 'install it, or mend its name',
         )
     known = context.catalogue.names(cast('InterfaceKind', kind), package)

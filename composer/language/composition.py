@@ -179,10 +179,10 @@ def _syntax_help(span: Span) -> str | None:
 
 
 def _character_fault(error: yaml.reader.ReaderError, text: str, source: SourceFile) -> Diagnostic:
-    position = error.position if isinstance(error.position, int) else 0
-    before = text[:position]
-    line = before.count('\n') + 1
-    column = position - (before.rfind('\n') + 1) + 1
+    # What the parser calls a position is one in bytes or in characters, whichever it reads.
+    found = yaml.reader.Reader.NON_PRINTABLE.search(text)
+    before = f'{text[: found.start()]}^'.splitlines() if found else ['^']
+    line, column = len(before), len(before[-1])
     code = error.character if isinstance(error.character, int) else ord(str(error.character)[:1])
     return diagnostic_at(
         Span(source, line, column),

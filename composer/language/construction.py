@@ -23,6 +23,7 @@ from composer.language.scalars import (
 )
 
 if TYPE_CHECKING:
+    from composer.diagnostics import Span
     from composer.language.positions import DataPath, SourceMap
 
 # A file of the largest size has fewer values than this; only aliases in aliases reach it.
@@ -54,12 +55,13 @@ class _Constructor:
     def construct(self, node: TreeNode, path: DataPath) -> Any:
         self._count += 1
         if self._count > MAX_VALUES:
-            self._stop(node, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
+            entry = self._keys.get(path[:1], node.span)
+            self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
         self._values[path] = node.span
         if isinstance(node, ScalarNode):
             return self._scalar(node)
         if len(path) > MAX_DEPTH:
-            self._stop(node, 'too-deep', f'aliases nest more than {MAX_DEPTH} levels deep')
+            self._stop(node.span, 'too-deep', f'aliases nest more than {MAX_DEPTH} levels deep')
         wanted = TAG_MAP if isinstance(node, MappingNode) else TAG_SEQ
         if node.tag not in (None, wanted):
             self._fault(node, 'bad-tag', f'a {short_tag(node.tag or "")} is not allowed here')
@@ -103,11 +105,16 @@ class _Constructor:
         if not isinstance(node, ScalarNode):
             self._fault(node, 'bad-key', 'a key is a string, not a list or a mapping')
             return None
-        shown = node.text or 'nothing'
+        if not node.text:
+            self._fault(node, 'bad-key', 'a key is a string, and nothing stands here')
+            return None
         self._fault(
-            node, 'bad-key', f'a key is a string, and {shown} is not one', help=f"write '{shown}'"
+            node,
+            'bad-key',
+            f'a key is a string, and {node.text} is not one',
+            help=f"write '{node.text}'",
         )
-        return None
+        return node.text
 
     def _duplicate(self, key: str, node: TreeNode, path: DataPath) -> None:
         first = Related('it stands here first', self._keys[path])
@@ -140,5 +147,5 @@ class _Constructor:
     def _fault(self, node: TreeNode, rule: str, message: str, help: str | None = None) -> None:  # noqa: A002
         self.faults.append(diagnostic_at(node.span, rule, message, help=help))
 
-    def _stop(self, node: TreeNode, rule: str, message: str) -> None:
-        raise CompositionError(diagnostic_at(node.span, rule, message))
+    def _stop(self, span: Span, rule: str, message: str) -> None:
+        raise CompositionError(diagnostic_at(span, rule, message))

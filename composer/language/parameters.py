@@ -6,7 +6,10 @@ in lower case.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 PARAMETER_TYPES = (*_SCALARS.values(), *(f'{name}_array' for name in ('byte', *_SCALARS.values())))
@@ -44,24 +47,34 @@ def convert_parameter_value(value: Any, type_name: str | None) -> Any:
 
 def find_type_fault(value: Any, type_name: str) -> str | None:
     """Return why a value is not of a parameter type, or `None` if it is."""
-    if type_name.endswith('_array'):
-        return _find_array_fault(value, type_name.removesuffix('_array'))
+    return next((fault for _, fault in find_type_faults(value, type_name)), None)
+
+
+def find_type_faults(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ...], str]]:
+    """Yield why a value is not of a parameter type; faults of items with their index."""
+    item_type = type_name.removesuffix('_array')
+    if item_type == type_name:
+        if fault := _find_scalar_fault(value, type_name):
+            yield (), fault
+    elif not isinstance(value, list):
+        yield (), f'expected a list, of {item_type} values, got {value!r}'
+    else:
+        for index, item in enumerate(value):
+            if fault := _find_item_fault(item, item_type):
+                yield (index,), f'item {index}: {fault}'
+
+
+def _find_item_fault(item: Any, item_type: str) -> str | None:
+    fault = _find_scalar_fault(item, 'integer' if item_type == 'byte' else item_type)
+    if fault is None and item_type == 'byte' and not 0 <= item <= _BYTE_MAX:
+        return f'expected a byte (0 to {_BYTE_MAX}), got {item}'
+    return fault
+
+
+def _find_scalar_fault(value: Any, type_name: str) -> str | None:
     if _SCALARS.get(type(convert_parameter_value(value, type_name))) != type_name:
         return f'expected {_with_article(type_name)}, got {value!r}'
     return _find_width_fault(value, type_name)
-
-
-def _find_array_fault(value: Any, item_type: str) -> str | None:
-    if not isinstance(value, list):
-        return f'expected a list, of {item_type} values, got {value!r}'
-    for index, item in enumerate(value):
-        wanted = 'integer' if item_type == 'byte' else item_type
-        fault = find_type_fault(item, wanted)
-        if fault is None and item_type == 'byte' and not 0 <= item <= _BYTE_MAX:
-            fault = f'expected a byte (0 to {_BYTE_MAX}), got {item}'
-        if fault:
-            return f'item {index}: {fault}'
-    return None
 
 
 def _find_width_fault(value: Any, type_name: str) -> str | None:

@@ -35,6 +35,7 @@ BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     'action_status_default': _DEFAULT | {'depth': 1, 'durability': 'transient_local'},
     'system_default': {
         'history': 'system_default',
+        'depth': 0,
         'reliability': 'system_default',
         'durability': 'system_default',
         'liveliness': 'system_default',

@@ -17,9 +17,9 @@ _INF = re.compile(r'[-+]?\.(inf|Inf|INF)')
 _NAN = frozenset({'.nan', '.NaN', '.NAN'})
 _NUMBER_START = frozenset('+-.0123456789')
 
-# Python refuses to read longer decimal numbers (sys.set_int_max_str_digits); no ROS field or
-# parameter holds more than 20 digits.
-_MAX_DIGITS = 400
+# No ROS field or parameter holds an integer of more than 20 digits. Beyond this bound they are not
+# even doubles, and much longer ones Python will not read or print (sys.set_int_max_str_digits).
+_MAX_DIGITS = 250
 
 _TAG_PREFIX = 'tag:yaml.org,2002:'
 TAG_STR = _TAG_PREFIX + 'str'
@@ -41,7 +41,7 @@ def parse_plain_scalar(text: str) -> Scalar:
     """Return the value of an untagged plain scalar.
 
     Raises:
-        ScalarError: A number is longer than 400 digits.
+        ScalarError: A number is longer than 250 digits.
     """
     if text in _NULL:
         return None
@@ -77,7 +77,7 @@ def short_tag(tag: str) -> str:
 
 
 def _parse_number(text: str) -> Scalar:
-    if len(text) > _MAX_DIGITS and (_INT.fullmatch(text) or _HEX.fullmatch(text)):
+    if len(text) > _MAX_DIGITS and any(kind.fullmatch(text) for kind in (_INT, _OCT, _HEX)):
         message = f'a number of {len(text)} digits fits no type of ROS'
         raise ScalarError(message)
     if _INT.fullmatch(text):

@@ -216,8 +216,9 @@ def _explain_key_alternatives(
     present = [keys for keys in alternatives if all(key in error.instance for key in keys)]
     if len(present) > 1:
         return _conflict(error, [keys[0] for keys in present])
-    wanted = ' or '.join(' and '.join(f"'{key}'" for key in keys) for keys in alternatives)
-    verb = 'is' if all(len(keys) == 1 for keys in alternatives) else 'are'
+    absent = [[key for key in keys if key not in error.instance] for keys in alternatives]
+    wanted = ' or '.join(' and '.join(f"'{key}'" for key in keys) for keys in absent)
+    verb = 'is' if all(len(keys) == 1 for keys in absent) else 'are'
     return _missing(error, f'{wanted} {verb} missing{_owner(error)}')
 
 
@@ -263,7 +264,7 @@ def _conflict(error: ValidationError, keys: list[str]) -> StructureFault:
     listed = ' and '.join(f"'{key}'" for key in keys)
     return StructureFault(
         'conflicting-keys',
-        f'{listed} exclude each other',
+        f'{listed} exclude each other{_owner(error)}',
         (*path, last),
         (*path, last),
         at_key=True,
@@ -273,7 +274,7 @@ def _conflict(error: ValidationError, keys: list[str]) -> StructureFault:
 
 def _wrong_type(error: ValidationError, expected: str) -> StructureFault:
     path = _path(error)
-    empty = error.instance is None and 'a mapping' in expected
+    empty = error.instance is None and expected == 'a mapping'
     return StructureFault(
         'wrong-type',
         f'expected {expected}, got {_shown(error.instance)}',
@@ -313,6 +314,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict):
         return 'a mapping'
     if isinstance(value, list):
-        return 'a list'
+        return 'a list' if value else 'an empty list'
     text = repr(value)
     return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 1] + '…'

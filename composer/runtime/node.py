@@ -37,6 +37,15 @@ class UndeclaredError(ComposerError):
     """A behaviour asks for something that its node does not declare in the file."""
 
 
+class UndeclaredParameterError(UndeclaredError, KeyError, AttributeError):
+    """A behaviour asks for a parameter that its node does not declare in the file.
+
+    As a `KeyError` and an `AttributeError` it lets `in`, `get` and `getattr` do what they promise.
+    """
+
+    __str__ = Exception.__str__
+
+
 class Parameters(Mapping[str, Any]):
     """The values of a node's parameters, as they are now.
 
@@ -51,7 +60,7 @@ class Parameters(Mapping[str, Any]):
         """Return a parameter's value: a bool, int, float, str or a list of these."""
         if not self._ros.has_parameter(name):
             message = f"node '{self._ros.get_name()}' has no parameter '{name}'"
-            raise UndeclaredError(message, help=did_you_mean(name, self, 'it has'))
+            raise UndeclaredParameterError(message, help=did_you_mean(name, self, 'it has'))
         value = self._ros.get_parameter_or(name).value
         return value.tolist() if hasattr(value, 'tolist') else value
 
@@ -63,7 +72,7 @@ class Parameters(Mapping[str, Any]):
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the declared parameters."""
-        return iter(self._ros.list_parameters([], 0).result.names)
+        return iter(self._ros.list_parameters([], 0).names)
 
     def __len__(self) -> int:
         """Return how many parameters there are."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import threading
+import time
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from composer.runtime.live_node import LiveNode
 
 _FLOAT_MAX = 1.7976931348623157e308
+_POLL_SEC = 0.001
 
 
 def create_parameters(node: LiveNode) -> None:
@@ -39,15 +41,18 @@ def create_parameters(node: LiveNode) -> None:
     node.ros.add_on_set_parameters_callback(refusing)
     for spec in node.spec.parameters.values():
         try:
-            node.ros.declare_parameter(spec.name, _first_value(spec), create_descriptor(spec))
+            _declare(node.ros, spec)
         except ParameterException as error:
-            message = (
-                f"node '{node.spec.name}': parameter '{spec.name}' from the command line: {error}"
-            )
+            reason = str(error).removesuffix(f': {spec.name}')
+            message = f"parameter '{spec.name}' from the command line: {reason}"
             raise StartError(message) from error
     if node.spec.on_parameters:
+        # rclpy asks the callback first that was added last, and a behaviour need not hear of what
+        # is refused anyway.
+        node.ros.remove_on_set_parameters_callback(refusing)
         hear = _BehaviourHearing(node, node.spec.on_parameters)
         node.ros.add_on_set_parameters_callback(hear)
+        node.ros.add_on_set_parameters_callback(refusing)
 
 
 def create_descriptor(spec: ParameterSpec) -> ParameterDescriptor:
@@ -78,16 +83,22 @@ def create_descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     return descriptor
 
 
-def _first_value(spec: ParameterSpec) -> Any:
+def _declare(ros: RosNode, spec: ParameterSpec) -> None:
     kind = Parameter.Type[(spec.type or '').upper()]
+    descriptor = create_descriptor(spec)
     if spec.value is None:
-        return kind
-    if kind is Parameter.Type.BYTE_ARRAY:
-        return [bytes([item]) for item in spec.value]
-    if spec.value == []:
-        # rclpy cannot tell the type of an empty list by itself.
-        return Parameter('', kind, []).get_parameter_value()
-    return spec.value
+        ros.declare_parameter(spec.name, kind, descriptor)
+    elif spec.value == []:
+        # To rclpy every empty list is one of bytes, so it is set when the type is known already.
+        declared = ros.declare_parameter(spec.name, kind)
+        if declared.type_ is Parameter.Type.NOT_SET:
+            ros.set_parameters([Parameter(spec.name, kind, [])])
+        descriptor.type = kind.value
+        ros.set_descriptor(spec.name, descriptor)
+    elif kind is Parameter.Type.BYTE_ARRAY:
+        ros.declare_parameter(spec.name, [bytes([item]) for item in spec.value], descriptor)
+    else:
+        ros.declare_parameter(spec.name, spec.value, descriptor)
 
 
 def _refuse_unless_chosen(
@@ -127,8 +138,10 @@ class _BehaviourHearing:
         return SetParametersResult(successful=reason is None, reason=str(reason or ''))
 
     def _await(self, callback: Any, new_values: dict[str, Any]) -> None:
-        # rclpy wants the answer when this returns, so a coroutine runs beside and is waited for.
-        done = threading.Event()
-        task = self._node.services.create_task(callback, new_values)
-        task.add_done_callback(lambda _task: done.set())
-        done.wait()
+        # rclpy wants the answer when this returns, on a thread that the executor may not have
+        # twice: so the coroutine is resumed here until it ends, not given to the executor.
+        coroutine = callback(new_values)
+        with suppress(StopIteration):
+            while True:
+                coroutine.send(None)
+                time.sleep(_POLL_SEC)

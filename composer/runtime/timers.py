@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +65,8 @@ class _Ticker:
         behaviour = node.function(spec.behaviour)
         self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
         kind = kind_of(behaviour)
+        # Ticks of a reentrant group overlap, which a generator cannot: it lets such a tick pass.
+        self._turn = threading.Lock()
         if kind is FunctionKind.GENERATOR:
             self._generator: Generator[Any, Any, Any] | None = None
             self.function = self._resume
@@ -76,9 +79,11 @@ class _Ticker:
             self.function = self._begin
 
     def _resume(self) -> Any:
-        if self._generator is None:
-            self._generator = self._begin()
+        if not self._turn.acquire(blocking=False):
+            return None
         try:
+            if self._generator is None:
+                self._generator = self._begin()
             return next(self._generator)
         except StopIteration as end:
             self.timer.cancel()
@@ -87,11 +92,15 @@ class _Ticker:
             # A generator that raised is finished; the next tick begins a new one.
             self._generator = None
             raise
+        finally:
+            self._turn.release()
 
     async def _resume_async(self) -> Any:
-        if self._async_generator is None:
-            self._async_generator = self._begin()
+        if not self._turn.acquire(blocking=False):
+            return None
         try:
+            if self._async_generator is None:
+                self._async_generator = self._begin()
             return await anext(self._async_generator)
         except StopAsyncIteration:
             self.timer.cancel()
@@ -99,3 +108,5 @@ class _Ticker:
         except BaseException:
             self._async_generator = None
             raise
+        finally:
+            self._turn.release()

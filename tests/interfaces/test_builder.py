@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from conftest import SHIPPED, RunPython, WriteDefinitions, process_environment
+from building import SHIPPED, RunPython, WriteDefinitions, process_environment
 
 from composer.interfaces.builder import (
     BuildError,

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import WriteDefinitions
+from building import WriteDefinitions
 
 from composer.interfaces import cache
 from composer.interfaces.cache import BuildFolder, CacheError, compute_key, provide_cached

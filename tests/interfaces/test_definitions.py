@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import SHIPPED, WriteDefinitions
+from building import SHIPPED, WriteDefinitions
 
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
 from composer.interfaces.definitions import PackageDefinitions, load_definitions

@@ -2,7 +2,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from conftest import WriteDefinitions
+from building import WriteDefinitions
 
 from composer.interfaces.catalogue import default_prefixes
 from composer.interfaces.definitions import load_definitions

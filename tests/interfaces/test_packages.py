@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import SHIPPED, RunPython, WriteDefinitions, process_environment
+from building import SHIPPED, RunPython, WriteDefinitions, process_environment
 
 from composer.interfaces.differences import DefinitionsDifferError
 from composer.interfaces.packages import (

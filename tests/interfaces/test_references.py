@@ -1,7 +1,7 @@
 from collections.abc import Mapping
 
 import pytest
-from conftest import WriteDefinitions
+from building import WriteDefinitions
 
 from composer.diagnostics import Diagnostic
 from composer.interfaces.catalogue import InterfaceCatalogue

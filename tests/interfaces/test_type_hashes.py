@@ -1,7 +1,7 @@
 import json
 
 import pytest
-from conftest import SHIPPED
+from building import SHIPPED
 
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
 from composer.interfaces.definitions import load_definitions

@@ -1,0 +1,101 @@
+"""A case is a file: `tests/data/invalid/<rule>.yaml` beside what is said of it, whole."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import composer
+from composer.checks import check_files, check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
+from composer.reports.text import render_finding
+
+DATA = Path(__file__).parents[1] / 'data'
+INVALID = DATA / 'invalid'
+PACKAGE = Path(composer.__file__).parent
+SHIPPED = sorted((PACKAGE.parent / 'configs').glob('*.yaml'))
+
+CASES = sorted(path.stem for path in INVALID.glob('*.yaml'))
+# These look into interface packages, which come with ROS.
+NEED_INTERFACES = {
+    'field-length',
+    'field-range',
+    'field-text',
+    'field-type',
+    'many_faults',
+    'unknown-field',
+    'unknown-type',
+}
+
+
+def render(name, monkeypatch, catalogue=None):
+    """Return all that is said of a case, with paths as they are in its folder."""
+    monkeypatch.chdir(INVALID)
+    findings = check_system(load_system(Path(name)), catalogue or InterfaceCatalogue())
+    text = '\n\n'.join(map(render_finding, findings)) + '\n'
+    return text.replace(f'{INVALID}/', '')
+
+
+def rules_in_the_code():
+    found = set()
+    for folder in ('language', 'checks', 'interfaces'):
+        for path in (PACKAGE / folder).glob('*.py'):
+            for node in ast.walk(ast.parse(path.read_text())):
+                text = node.value if isinstance(node, ast.Constant) else None
+                if isinstance(text, str) and re.fullmatch('[a-z]+(-[a-z]+)+', text):
+                    found.add(text)
+    return found - {'x-expected'}
+
+
+@pytest.mark.parametrize(
+    'case',
+    [
+        pytest.param(case, marks=pytest.mark.ros if case in NEED_INTERFACES else ())
+        for case in CASES
+    ],
+)
+def test_everything_that_is_wrong_is_said_in_one_run(case, monkeypatch):
+    expected = (INVALID / f'{case}.txt').read_text()
+    assert render(f'{case}.yaml', monkeypatch) == expected
+
+
+@pytest.mark.parametrize('case', sorted(set(CASES) - {'many_faults'}))
+def test_a_case_shows_the_rule_that_it_is_named_after(case):
+    assert f'error[{case}]: ' in (INVALID / f'{case}.txt').read_text()
+
+
+def test_every_rule_has_a_case():
+    assert rules_in_the_code() == set(CASES) - {'many_faults'}
+
+
+def test_many_different_faults_are_found_at_once():
+    text = (INVALID / 'many_faults.txt').read_text()
+    assert len(set(re.findall(r'error\[([\w-]+)\]', text))) >= 10
+    assert len(re.findall(r'error\[', text)) >= 15
+
+
+@pytest.mark.parametrize('path', [*sorted((DATA / 'valid').glob('*.yaml')), *SHIPPED], ids=str)
+def test_nothing_is_said_of_a_valid_file(path):
+    ((_, findings),) = check_files([path])
+    assert [render_finding(finding) for finding in findings] == []
+
+
+@pytest.mark.parametrize('case', sorted(NEED_INTERFACES - {'many_faults'}))
+def test_without_ros_types_are_taken_as_they_are(case, monkeypatch):
+    nothing_installed = InterfaceCatalogue(prefixes=[])
+    assert render(f'{case}.yaml', monkeypatch, nothing_installed) == '\n'
+
+
+def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
+    path = tmp_path / 'shared.yaml'
+    path.write_text(
+        'version: 1\n'
+        'x-tick: &tick {period: 1, behaviour: nowhere:tick}\n'
+        'nodes: {a: {timers: {one: *tick, two: *tick}}, b: {timers: {three: {<<: *tick}}}}\n'
+    )
+    ((_, findings),) = check_files([path])
+    assert [(finding.rule, finding.span.line) for finding in findings] == [
+        ('unknown-behaviour', 2)
+    ]

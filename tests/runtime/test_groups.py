@@ -1,0 +1,111 @@
+"""Callback groups: what runs beside what."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+# Two behaviours meet at a barrier only if they run at the same time.
+CODE = """
+import threading
+import time
+
+barrier = threading.Barrier(2)
+
+def meet(node):
+    try:
+        barrier.wait(timeout={timeout})
+    except threading.BrokenBarrierError:
+        barrier.reset()
+        node.logger.info('met nobody')
+    else:
+        node.logger.info('met')
+
+def alone(node):
+    node.state.inside += 1
+    time.sleep(0.03)
+    node.logger.info(f'inside: {{node.state.inside}}')
+    node.state.inside -= 1
+
+async def alone_async(node):
+    alone(node)
+"""
+
+
+def test_one_node_runs_one_behaviour_at_a_time_by_default(compose):
+    text = """
+        version: 1
+        nodes:
+          strict:
+            state: {inside: 0}
+            publishers: {ticks: std_msgs/msg/Empty}
+            subscriptions: {ticks: {type: std_msgs/msg/Empty, behaviour: 'parts:heard'}}
+            timers:
+              first: {period: 0.01, behaviour: 'parts:alone'}
+              second: {period: 0.01, behaviour: 'parts:alone_async'}
+              third: {period: 0.01, publish: ticks, message: {}}
+    """
+    code = CODE.format(timeout=1) + 'def heard(node, message):\n    alone(node)\n'
+    child = compose(text, code)
+    child.wait_for_line('inside', times=30)
+
+    assert child.stop() == 0
+    assert set(child.matching('inside')) == {'[INFO] [strict]: inside: 1'}
+
+
+@pytest.mark.parametrize(
+    ('first', 'second'),
+    [('', ', group: other'), (', group: reentrant', ', group: reentrant')],
+)
+def test_behaviours_of_different_or_reentrant_groups_run_at_the_same_time(compose, first, second):
+    text = f"""
+        version: 1
+        nodes:
+          parallel:
+            timers:
+              one: {{period: 0.05, behaviour: 'parts:meet'{first}}}
+              two: {{period: 0.05, behaviour: 'parts:meet'{second}}}
+    """
+    child = compose(text, CODE.format(timeout=30))
+
+    child.wait_for_line('[INFO] [parallel]: met', times=2)
+
+
+def test_behaviours_of_different_nodes_run_at_the_same_time(compose):
+    text = """
+        version: 1
+        nodes:
+          one: {timers: {meet: {period: 0.05, behaviour: 'parts:meet'}}}
+          two: {timers: {meet: {period: 0.05, behaviour: 'parts:meet'}}}
+    """
+    child = compose(text, CODE.format(timeout=30))
+
+    child.wait_for_line('[INFO] [one]: met')
+    child.wait_for_line('[INFO] [two]: met')
+
+
+def test_behaviours_of_one_named_group_do_not_run_at_the_same_time(compose):
+    text = """
+        version: 1
+        nodes:
+          strict:
+            timers:
+              one: {period: 0.01, behaviour: 'parts:meet', group: shared}
+              two: {period: 0.01, behaviour: 'parts:meet', group: shared}
+    """
+    child = compose(text, CODE.format(timeout=0.2))
+    child.wait_for_line('met nobody', times=3)
+
+    assert not [line for line in child.lines if line.endswith(': met')]
+
+
+def test_a_reentrant_timer_overlaps_itself(compose):
+    text = """
+        version: 1
+        nodes:
+          parallel: {timers: {meet: {period: 0.02, behaviour: 'parts:meet', group: reentrant}}}
+    """
+    child = compose(text, CODE.format(timeout=30))
+
+    child.wait_for_line('[INFO] [parallel]: met', times=2)

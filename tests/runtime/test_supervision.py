@@ -1,0 +1,271 @@
+"""Behaviours that raise: what is said, and what is done about it."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rcl_interfaces.msg import Log
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int32
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+def fail(node):
+    raise RuntimeError('out of order')
+
+def live(node):
+    node.logger.info('alive')
+
+def hear(node, message):
+    node.logger.info(f'heard {message.data}')
+    return 1 // message.data
+
+async def fail_async(node):
+    raise KeyError('lost')
+
+def fail_later(node):
+    yield
+    raise ValueError('halfway')
+
+def leave(node):
+    raise SystemExit(5)
+"""
+
+
+def test_an_error_is_logged_with_node_entity_place_and_traceback_and_others_go_on(compose):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            timers:
+              fail: {period: 0.02, behaviour: 'parts:fail'}
+              live: {period: 0.02, behaviour: 'parts:live'}
+          good:
+            timers:
+              live: {period: 0.02, behaviour: 'parts:live'}
+    """
+    child = compose(text, CODE)
+    first = child.wait_for_line('[ERROR]')
+    child.wait_for_line('RuntimeError: out of order', times=2)
+    alive = [len(child.matching(f'[{node}]: alive')) for node in ('bad', 'good')]
+    child.wait_for_line('[bad]: alive', times=alive[0] + 3)
+    child.wait_for_line('[good]: alive', times=alive[1] + 3)
+    assert child.stop() == 0
+
+    assert first == "[ERROR] [bad]: timer 'fail' (system.yaml:6) raised RuntimeError: out of order"
+    lines = [line for line in child.lines if 'alive' not in line]
+    begin = lines.index(first)
+    assert lines[begin + 1 : begin + 5] == [
+        'Traceback (most recent call last):',
+        f'  File "{compose.folder}/parts.py", line 3, in fail',
+        "    raise RuntimeError('out of order')",
+        'RuntimeError: out of order',
+    ]
+
+
+def test_repeated_errors_are_counted_and_told_at_most_once_a_second(compose):
+    text = """
+        version: 1
+        nodes:
+          bad: {timers: {fail: {period: 0.01, behaviour: 'parts:fail'}}}
+    """
+    child = compose(text, CODE)
+    line = child.wait_for_line('more times')
+    child.wait_for_line('more times', times=2)
+    assert child.stop() == 0
+
+    assert line.startswith("[ERROR] [bad]: timer 'fail' (system.yaml:4) raised ")
+    assert line.endswith(' more times, last: RuntimeError: out of order')
+    assert int(line.split()[6]) > 10
+    assert len(child.matching('Traceback')) == 1
+
+
+@pytest.mark.parametrize(
+    ('behaviour', 'error'),
+    [
+        ('fail_async', "KeyError: 'lost'"),
+        ('fail_later', 'ValueError: halfway'),
+        ('leave', 'SystemExit: 5'),
+    ],
+)
+def test_any_kind_of_behaviour_may_raise_anything(compose, behaviour, error):
+    text = f"""
+        version: 1
+        nodes:
+          bad:
+            timers:
+              fail: {{period: 0.02, behaviour: 'parts:{behaviour}'}}
+              live: {{period: 0.02, behaviour: 'parts:live'}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line(f"[ERROR] [bad]: timer 'fail' (system.yaml:6) raised {error}")
+    alive = len(child.matching('alive'))
+    child.wait_for_line('alive', times=alive + 3)
+
+    assert child.stop() == 0
+
+
+def test_a_subscription_that_raised_hears_the_next_message(compose, peer):
+    text = """
+        version: 1
+        nodes:
+          ears: {subscriptions: {number: {type: std_msgs/msg/Int32, behaviour: 'parts:hear'}}}
+    """
+    child = compose(text, CODE)
+    publisher = peer.advertise(Int32, 'number')
+    publisher.publish(Int32(data=0))
+    child.wait_for_line(
+        "[ERROR] [ears]: subscription 'number' (system.yaml:4) raised ZeroDivisionError: "
+    )
+    publisher.publish(Int32(data=7))
+
+    child.wait_for_line('[INFO] [ears]: heard 7')
+
+
+def test_errors_reach_rosout(compose, peer, wait_for):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            namespace: deep
+            timers: {fail: {period: 0.02, behaviour: 'parts:fail'}}
+    """
+    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard = peer.listen(Log, '/rosout', latched)
+    compose(text, CODE).wait_until_ready()
+
+    (error,) = wait_for(
+        lambda: [log for log in heard if 'Traceback' in log.msg], 'the error on /rosout'
+    )
+    assert error.name == 'deep.bad'
+    assert error.level == Log.ERROR
+    assert error.msg.startswith("timer 'fail' (system.yaml:6) raised RuntimeError: out of order\n")
+
+
+def test_on_error_shutdown_stops_the_system_with_exit_code_1(compose):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            on_error: shutdown
+            timers: {fail: {period: 0.05, behaviour: 'parts:fail'}}
+          good:
+            on_stop: parts:live
+    """
+    child = compose(text, CODE)
+
+    assert child.wait() == 1
+    child.wait_for_line("[bad]: timer 'fail' (system.yaml:6) raised RuntimeError: out of order")
+    child.wait_for_line('[good]: alive')
+
+
+def test_on_error_of_an_entity_wins_over_that_of_the_node_and_of_the_file(compose):
+    text = """
+        version: 1
+        defaults: {on_error: shutdown}
+        nodes:
+          bad:
+            on_error: shutdown
+            timers:
+              fail: {period: 0.02, behaviour: 'parts:fail', on_error: log}
+          tolerant:
+            on_error: log
+            timers: {fail: {period: 0.02, behaviour: 'parts:fail'}}
+          steady:
+            timers: {live: {period: 0.02, behaviour: 'parts:live'}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('[ERROR] [bad]')
+    child.wait_for_line('[ERROR] [tolerant]')
+    alive = len(child.matching('alive'))
+    child.wait_for_line('alive', times=alive + 5)
+
+    assert child.stop() == 0
+
+
+RESTARTING = """
+version: 1
+nodes:
+  phoenix:
+    on_error: restart
+    parameters: {mode: calm}
+    state: {ticks: 0}
+    publishers: {ticks: std_msgs/msg/Int32}
+    subscriptions:
+      number: {type: std_msgs/msg/Int32, behaviour: 'parts:hear'}
+    timers: {tick: {period: 0.02, behaviour: 'parts:tick', publish: ticks}}
+    on_start: parts:start
+    on_stop: parts:stop
+  bystander:
+    timers: {live: {period: 0.05, behaviour: 'parts:live'}}
+"""
+
+RESTARTING_CODE = (
+    CODE
+    + """
+from pathlib import Path
+from rclpy.parameter import Parameter
+
+def start(node):
+    node.logger.info(f'start: {node.parameters.mode}, {node.state.ticks} ticks')
+    if Path('no_start').exists():
+        raise OSError('no such device')
+
+def stop(node):
+    node.logger.info('stop')
+
+def tick(node):
+    node.state.ticks += 1
+    if node.state.ticks == 3 and not Path('calm').exists():
+        node.ros.set_parameters([Parameter('mode', value='wild')])
+        raise RuntimeError('out of order')
+    return node.state.ticks
+"""
+)
+
+
+def test_on_error_restart_rebuilds_the_node_as_at_the_start(compose, peer, wait_for):
+    ticks = peer.listen(Int32, 'ticks')
+    child = compose(RESTARTING, RESTARTING_CODE)
+    child.wait_for_line("[WARN] [composer]: node 'phoenix' was restarted", times=3)
+    (compose.folder / 'calm').touch()
+    wait_for(lambda: ticks and ticks[-1].data > 5, 'ticks after the last restart')
+    peer.advertise(Int32, 'number').publish(Int32(data=5))
+    child.wait_for_line('[INFO] [phoenix]: heard 5')
+    names = peer.node.get_node_names()
+    assert child.stop() == 0
+
+    assert set(child.matching('start: ')) == {'[INFO] [phoenix]: start: calm, 0 ticks'}
+    assert child.matching(']: stop') == ['[INFO] [phoenix]: stop']
+    assert names.count('phoenix') == 1
+    assert not child.matching('InvalidHandle')
+    assert len(child.matching('Traceback')) == len(child.matching('raised RuntimeError'))
+
+
+def test_a_restart_that_fails_is_tried_again(compose):
+    child = compose(RESTARTING, RESTARTING_CODE)
+    child.wait_for_line('[phoenix]: start: ')
+    (compose.folder / 'no_start').touch()
+    child.wait_for_line("[ERROR] [composer]: restart: node 'phoenix': on_start raised", times=2)
+    alive = len(child.matching('[bystander]: alive'))
+    child.wait_for_line('[bystander]: alive', times=alive + 3)
+    (compose.folder / 'calm').touch()
+    (compose.folder / 'no_start').unlink()
+    child.wait_for_line("node 'phoenix' was restarted")
+
+    assert child.stop() == 0
+
+
+def test_a_restart_of_many_nodes_at_once_brings_all_of_them_back(compose):
+    nodes = '\n'.join(
+        f'  n{n}: {{on_error: restart, state: {{ticks: 0}}, publishers: {{p: std_msgs/msg/Int32}}, '
+        f"timers: {{tick: {{period: 0.01, behaviour: 'parts:tick'}}}}, parameters: {{mode: a}}}}"
+        for n in range(6)
+    )
+    child = compose(f'version: 1\nnodes:\n{nodes}\n', RESTARTING_CODE)
+    for n in range(6):
+        child.wait_for_line(f"node 'n{n}' was restarted", times=2)
+
+    assert child.stop() == 0
+    assert not child.matching('InvalidHandle')

@@ -1,0 +1,139 @@
+"""Each shipped system, run by `composer up` and seen by a plain rclpy peer in another process."""
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import ReliabilityPolicy
+from std_msgs.msg import String
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def up(compose):
+    """Run a shipped system from the project's root."""
+
+    def run(name, *arguments):
+        return compose.run(f'configs/{name}.yaml', *arguments, folder=ROOT)
+
+    return run
+
+
+def test_talker_listener_counts_from_zero_and_is_heard_inside_and_outside(up, peer, wait_for):
+    heard = peer.listen(String, 'topic')
+    child = up('talker_listener')
+    child.wait_until_ready()
+    child.wait_for_line('[INFO] [minimal_subscriber]: I heard: "Hello World: 2"')
+    wait_for(lambda: len(heard) >= 2, 'two messages')
+
+    assert child.stop() == 0
+    said = child.matching('[minimal_publisher]')
+    listened = child.matching('[minimal_subscriber]')
+    assert said == [
+        f'[INFO] [minimal_publisher]: Publishing: "Hello World: {n}"' for n in range(len(said))
+    ]
+    assert listened == [
+        f'[INFO] [minimal_subscriber]: I heard: "Hello World: {n}"' for n in range(len(listened))
+    ]
+    first = int(heard[0].data.rpartition(' ')[2])
+    assert [message.data for message in heard] == [
+        f'Hello World: {n}' for n in range(first, first + len(heard))
+    ]
+
+
+def test_talker_listener_has_the_nodes_and_endpoints_of_the_tutorial(up, peer, wait_for):
+    up('talker_listener').wait_until_ready()
+    (publisher,) = wait_for(
+        lambda: peer.node.get_publishers_info_by_topic('/topic'), 'the publisher'
+    )
+    (subscription,) = wait_for(
+        lambda: peer.node.get_subscriptions_info_by_topic('/topic'), 'the subscription'
+    )
+
+    assert publisher.node_name == 'minimal_publisher'
+    assert subscription.node_name == 'minimal_subscriber'
+    for endpoint in (publisher, subscription):
+        assert endpoint.node_namespace == '/'
+        assert endpoint.topic_type == 'std_msgs/msg/String'
+        assert endpoint.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+
+
+def test_greeter_says_the_name_and_is_answered(up, peer, wait_for):
+    heard = peer.listen(String, 'greeting')
+    child = up('greeter')
+    child.wait_for_line(
+        '[INFO] [greeter_subscriber]: Hello Alice! This is the greeter bot.', times=2
+    )
+    wait_for(lambda: heard, 'a greeting')
+
+    assert heard[0].data == 'Alice'
+    assert child.lines[0].startswith('[INFO] [composer]: greeter: 2 nodes ready in ')
+    assert child.stop() == 0
+
+
+def test_greeter_publishes_its_parameter_as_it_is_now(up, peer, wait_for):
+    heard = peer.listen(String, 'greeting')
+    child = up('greeter')
+    child.wait_until_ready()
+    change = Parameter('name', value='Bob').to_parameter_msg()
+    peer.call(SetParameters, 'greeter_publisher/set_parameters', parameters=[change])
+
+    child.wait_for_line('[INFO] [greeter_subscriber]: Hello Bob! This is the greeter bot.')
+    wait_for(lambda: heard and heard[-1].data == 'Bob', 'the new name')
+
+
+def test_parameter_set_live_shows_in_the_next_line(up, peer):
+    child = up('parameter')
+    child.wait_for_line('[INFO] [minimal_param_node]: Hello world!')
+    before = peer.call(
+        GetParameters, 'minimal_param_node/get_parameters', names=['my_parameter']
+    ).values
+    change = Parameter('my_parameter', value='earth').to_parameter_msg()
+    (result,) = peer.call(
+        SetParameters, 'minimal_param_node/set_parameters', parameters=[change]
+    ).results
+    greetings_before = len(child.matching('Hello world!'))
+    child.wait_for_line('[INFO] [minimal_param_node]: Hello earth!')
+
+    assert before[0].type == ParameterType.PARAMETER_STRING
+    assert before[0].string_value == 'world'
+    assert (result.successful, result.reason) == (True, '')
+    assert child.stop() == 0
+    greetings = child.matching('Hello ')
+    assert len(child.matching('Hello world!')) <= greetings_before + 1
+    assert greetings == sorted(greetings, reverse=True), 'world came back after earth'
+
+
+_LEVELS = {
+    'DEBUG': 'This is a debug message.',
+    'INFO': 'This is an info message.',
+    'WARN': 'This is a warn message.',
+    'ERROR': 'This is an error message.',
+    'FATAL': 'This is a fatal message.',
+}
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'first'),
+    [
+        ((), 1),
+        (('--log-level', 'debug'), 0),
+        (('--log-level', 'logger_node:=error'), 3),
+        (('--ros-args', '--log-level', 'logger_node:=debug'), 0),
+    ],
+)
+def test_logging_shows_the_levels_that_are_asked_for(up, arguments, first):
+    child = up('logging', *arguments)
+    child.wait_for_line('This is a fatal message.')
+
+    assert child.stop() == 0
+    expected = [f'[{level}] [logger_node]: {text}' for level, text in _LEVELS.items()]
+    assert child.matching('[logger_node]: This is') == expected[first:]
