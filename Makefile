@@ -6,7 +6,7 @@ ifdef ROS_DISTRO
 EXTRAS := test
 VENV_FLAGS := --system-site-packages
 else
-EXTRAS := ros,ros-test,test
+EXTRAS := ros,interfaces,ros-test,test
 endif
 
 .PHONY: up test check format clean

@@ -8,6 +8,33 @@ Attributes:
 """
 
 from composer.api import check, load, up
+from composer.errors import (
+    ActionNotAvailableError,
+    CallError,
+    CallTimeoutError,
+    ComposerError,
+    GoalError,
+    GoalRejectedError,
+    GoalTimeoutError,
+    ParametersRefusedError,
+    ServiceFailedError,
+    ServiceNotAvailableError,
+)
 from composer.runtime.node import Node
 
-__all__ = ['Node', 'check', 'load', 'up']
+__all__ = [
+    'ActionNotAvailableError',
+    'CallError',
+    'CallTimeoutError',
+    'ComposerError',
+    'GoalError',
+    'GoalRejectedError',
+    'GoalTimeoutError',
+    'Node',
+    'ParametersRefusedError',
+    'ServiceFailedError',
+    'ServiceNotAvailableError',
+    'check',
+    'load',
+    'up',
+]

@@ -30,18 +30,24 @@ def check(path: str | Path) -> list[Diagnostic]:
     return check_system(load(path), InterfaceCatalogue())
 
 
-def up(path: str | Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()) -> int:
+def up(
+    path: str | Path,
+    words: Sequence[str] = (),
+    ros_arguments: Sequence[str] = (),
+    log_levels: Sequence[str] = (),
+) -> int:
     """Run the system that a file declares until it is stopped; return the exit code.
 
     Args:
+        words: Values for the arguments that the file declares, as in `['a:=1']`.
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all loggers, `talker:=debug` for one.
 
     Raises:
         RosNotFoundError: There is no rclpy.
         StartError: The system could not be brought up.
-        UsageError: The ROS arguments are wrong.
+        UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
     from composer.commands.up import up as run
 
-    return run(Path(path), ros_arguments, log_levels)
+    return run(Path(path), words, ros_arguments, log_levels)

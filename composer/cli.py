@@ -94,8 +94,16 @@ def cli() -> None:
     """Run ROS 2 systems that are declared in YAML."""
 
 
-@cli.command('up')
-@click.argument('file', type=click.Path(path_type=Path))
+@cli.command(
+    'up',
+    context_settings={'ignore_unknown_options': True, 'help_option_names': []},
+    options_metavar='[OPTIONS]',
+)
+@click.argument('file', type=click.Path(path_type=Path), required=False)
+@click.argument('arguments', nargs=-1, type=click.UNPROCESSED, metavar='[NAME:=VALUE]...')
+@click.option(
+    '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
+)
 @click.option(
     '--log-level',
     'log_levels',
@@ -104,15 +112,34 @@ def cli() -> None:
     callback=_check_log_levels,
     help='debug, info, warn, error or fatal; of all nodes, or of one. Wins over the file.',
 )
-@click.pass_obj
-def up_command(ros_arguments: list[str], file: Path, log_levels: tuple[str, ...]) -> int:
+@click.pass_context
+def up_command(
+    context: click.Context,
+    file: Path | None,
+    arguments: tuple[str, ...],
+    log_levels: tuple[str, ...],
+    *,
+    wants_help: bool,
+) -> int:
     """Check FILE, then run the system that it declares until it is stopped.
 
-    What follows --ros-args (up to the end, or a --) goes to every node.
+    The file's own arguments are given by name, NAME:=VALUE, or as values in their order. What
+    follows --ros-args (up to the end, or a --) goes to every node.
     """
-    from composer.commands.up import up
+    from composer.commands.up import describe_file_arguments, up
 
-    return up(file, ros_arguments, log_levels)
+    if wants_help:
+        click.echo(context.get_help())
+        if file is not None:
+            click.echo(f'\n{file}: {describe_file_arguments(file)}')
+        return ExitCode.DONE
+    if file is None:
+        message = "Missing argument 'FILE'."
+        raise click.UsageError(message, context)
+    for argument in arguments:
+        if argument.startswith('--'):
+            raise click.NoSuchOption(argument, ctx=context)
+    return up(file, arguments, context.obj, log_levels)
 
 
 @cli.command('check')
@@ -122,6 +149,38 @@ def check_command(files: tuple[Path, ...]) -> int:
     from composer.commands.check import check
 
     return check(files)
+
+
+@cli.group('interfaces')
+def interfaces_group() -> None:
+    """Build, list and show interface packages."""
+
+
+@interfaces_group.command('build')
+@click.argument('file', type=click.Path(path_type=Path))
+def interfaces_build_command(file: Path) -> int:
+    """Build the packages that FILE declares, where they are not there yet."""
+    from composer.commands.interfaces import build
+
+    return build(file)
+
+
+@interfaces_group.command('list')
+@click.argument('package', required=False)
+def interfaces_list_command(package: str | None) -> int:
+    """List the interfaces that are installed, or those of PACKAGE."""
+    from composer.commands.interfaces import list_all
+
+    return list_all(package)
+
+
+@interfaces_group.command('show')
+@click.argument('name')
+def interfaces_show_command(name: str) -> int:
+    """Show the fields, constants and comments of NAME, as in std_msgs/msg/Header."""
+    from composer.commands.interfaces import show
+
+    return show(name)
 
 
 def _bug_report(arguments: list[str]) -> str:

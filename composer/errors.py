@@ -36,3 +36,39 @@ class RosNotFoundError(ComposerError):
 
 class StartError(ComposerError):
     """The system could not be brought up; all of it has been torn down again."""
+
+
+class CallError(ComposerError):
+    """A service call has no response."""
+
+
+class ServiceNotAvailableError(CallError):
+    """No server appeared in time."""
+
+
+class CallTimeoutError(CallError):
+    """The server did not answer in time."""
+
+
+class ServiceFailedError(CallError):
+    """The server is in this system, and its behaviour raised an error."""
+
+
+class GoalError(ComposerError):
+    """A goal was not accepted, or has no result."""
+
+
+class ActionNotAvailableError(GoalError):
+    """No action server appeared in time."""
+
+
+class GoalRejectedError(GoalError):
+    """The server refused the goal."""
+
+
+class GoalTimeoutError(GoalError):
+    """The server did not answer in time."""
+
+
+class ParametersRefusedError(ComposerError):
+    """A node refused new values of its parameters, or has no such parameters."""

@@ -18,13 +18,11 @@ MAX_NODE_NAME = 255
 MAX_NAMESPACE = 245
 MAX_TOPIC_NAME = 247
 
-_WORD = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 _NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
 _TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
 _FULL_CHARACTERS = re.compile(r'[A-Za-z0-9_/]*')
 _SUBSTITUTION = re.compile(r'\{([^{}]*)\}')
 _SUBSTITUTIONS = ('node', 'ns', 'namespace')
-_TYPE_KIND_PARTS = 3
 
 
 def suggest(word: str, options: Iterable[str]) -> str | None:
@@ -54,6 +52,11 @@ def did_you_mean(word: str, options: Iterable[str], what: str = 'there') -> str 
 
 
 _FEW = 12
+
+
+def with_article(noun: str) -> str:
+    """Return `a timer`, `an action`."""
+    return f'an {noun}' if noun[0] in 'aeiou' else f'a {noun}'
 
 
 def find_node_name_fault(name: str) -> str | None:
@@ -86,7 +89,7 @@ def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
 
     Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions, as in `{node}`.
     """
-    what = f'a {kind} name' if kind != 'action' else 'an action name'
+    what = with_article(f'{kind} name')
     if not name:
         return f'{what} is not empty'
     if not _TOPIC_CHARACTERS.fullmatch(name):
@@ -157,14 +160,6 @@ def remap_name(
         if expand_name(bare, node_name, namespace) == name:
             return expand_name(target, node_name, namespace)
     return name
-
-
-def split_type(name: str) -> tuple[str, str, str] | None:
-    """Return package, kind (`msg`, `srv`, `action`) and name of a type, `None` if it is none."""
-    parts = name.split('/')
-    if len(parts) != _TYPE_KIND_PARTS or not all(_WORD.fullmatch(part) for part in parts):
-        return None
-    return parts[0], parts[1], parts[2]
 
 
 def _find_token_fault(what: str, full: str, limit: int) -> str | None:

@@ -11,6 +11,7 @@ from composer.checks.names import check_names
 from composer.checks.parameters import check_parameters
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
 from composer.python_source import ModuleFinder, project_search_path
 
@@ -31,20 +32,26 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
 )
 
 
-def create_context(system: LoadedSystem, catalogue: InterfaceCatalogue) -> CheckContext | None:
-    """Return what the rules look at; `None` if the file could not be read at all."""
+def create_context(
+    system: LoadedSystem, installed: InterfaceCatalogue
+) -> tuple[CheckContext | None, list[Diagnostic]]:
+    """Return what the rules look at, and what is wrong with the interfaces that a file declares.
+
+    The context is `None` if the file could not be read at all.
+    """
     if system.spec is None:
-        return None
+        return None, []
+    catalogue, findings = describe_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.path))
-    return CheckContext(system, system.spec, catalogue, modules)
+    return CheckContext(system, system.spec, catalogue, modules), findings
 
 
 def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
     """Return all that is wrong with a system, by its place in the file."""
-    context = create_context(system, catalogue)
+    context, declared = create_context(system, catalogue)
     found = [finding for rule in RULES for finding in rule(context)] if context else []
     # What several entries share through an alias is wrong once.
-    once = dict.fromkeys([*system.diagnostics, *found])
+    once = dict.fromkeys([*system.diagnostics, *declared, *found])
     return sorted(once, key=lambda finding: finding.sort_key)
 
 

@@ -37,7 +37,7 @@ def check_behaviour_call(
             'generator-not-allowed',
             f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
             part=behaviour.function,
-            help='only timers take generators here; return the value instead',
+            help='timers and actions take generators; return the value instead',
         )
     if signature is not None:
         yield from _check_signature(context, binding, signature)

@@ -10,6 +10,7 @@ from composer.names import (
     find_node_name_fault,
     find_parameter_name_fault,
     find_topic_name_fault,
+    with_article,
 )
 
 if TYPE_CHECKING:
@@ -18,10 +19,9 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath
-    from composer.language.specs import NodeSpec, PublisherSpec, SubscriptionSpec
+    from composer.language.specs import NodeSpec
 
 _RULE = 'bad-name'
-_NAMES_ITS_TOPIC = "give the topic's name with 'topic:', and let this be a plain word"
 
 
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
@@ -31,8 +31,7 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_node_name_fault(name)
         if fault:
             yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
-        for entity in node.endpoints:
-            yield from _check_topic(context, node, entity)
+        yield from _check_ros_names(context, node)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)
             if fault:
@@ -51,18 +50,28 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
 
 
-def _check_topic(
-    context: CheckContext, node: NodeSpec, entity: PublisherSpec | SubscriptionSpec
+def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    for endpoint in node.endpoints:
+        yield from _check_ros_name(context, node, endpoint.path, 'topic', endpoint.topic)
+    for service in node.service_endpoints:
+        yield from _check_ros_name(context, node, service.path, 'service', service.service)
+    for action in node.action_endpoints:
+        yield from _check_ros_name(context, node, action.path, 'action', action.action)
+
+
+def _check_ros_name(
+    context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(entity.topic) or _find_full_name_fault(node, entity.topic)
+    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name)
     if not fault:
         return
-    message = f"'{entity.topic}' cannot name a topic: {fault}"
-    path = (*entity.path, 'topic')
+    message = f"'{name}' cannot name {with_article(kind)}: {fault}"
+    path = (*entity, kind)
     if path in context.system.positions.values:
         yield context.at_value(path, _RULE, message)
     else:
-        yield context.at_key(entity.path, _RULE, message, help=_NAMES_ITS_TOPIC)
+        help_text = f"give its name with '{kind}:', and let this be a plain word"
+        yield context.at_key(entity, _RULE, message, help=help_text)
 
 
 def _find_full_name_fault(node: NodeSpec, topic: str) -> str | None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from composer.language.qos import BUILTIN_PROFILES, QosError, UnknownProfileError, resolve_qos
-from composer.names import did_you_mean, split_type
+from composer.names import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.interfaces.catalogue import InterfaceKind
     from composer.language.positions import DataPath
     from composer.language.specs import NodeSpec, QosSpec
+
+
+_KIND_NOUNS = {'msg': 'message', 'srv': 'service', 'action': 'action'}
 
 
 def check_publish(context: CheckContext) -> Iterator[Diagnostic]:
@@ -93,14 +97,15 @@ def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]
 
 
 def check_types(context: CheckContext) -> Iterator[Diagnostic]:
-    """Every message type is one of an installed package."""
+    """Every interface type is one of an installed package, or of one that the file brings."""
     catalogue = context.catalogue
     if not catalogue.available:
         return
     for node in context.spec.nodes.values():
-        for entity in node.endpoints:
-            package = entity.type.partition('/')[0]
-            if entity.type in catalogue.names('msg', package):
+        for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
+            package, kind, _ = entity.type.split('/')
+            unreadable = context.was_dropped(('interfaces', package))
+            if unreadable or entity.type in catalogue.names(cast('InterfaceKind', kind), package):
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path
@@ -108,9 +113,8 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diagnostic:
-    parts = split_type(full_name)
+    package, kind, name = full_name.split('/')
     packages = context.catalogue.packages()
-    package, name = (parts[0], parts[2]) if parts else ('', '')
     if package not in packages:
         return context.at_value(
             path,
@@ -120,13 +124,15 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             first=True,
             help=_nearest(package, packages) or 'install it, or mend its name',
         )
-    names = [known.rpartition('/')[2] for known in context.catalogue.names('msg', package)]
+    known = context.catalogue.names(cast('InterfaceKind', kind), package)
+    names = [full.rpartition('/')[2] for full in known]
+    noun = _KIND_NOUNS[kind]
     return context.at_value(
         path,
         'unknown-type',
-        f"the package '{package}' has no message '{name}'",
+        f"the package '{package}' has no {noun} '{name}'",
         part=name,
-        help=did_you_mean(name, names, 'its messages are'),
+        help=did_you_mean(name, names, f'its {noun}s are'),
     )
 
 

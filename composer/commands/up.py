@@ -12,7 +12,9 @@ from composer.checks.behaviours import check_behaviour_call
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared import provide_declared
 from composer.language import LoadedSystem, load_system
+from composer.language.arguments import describe_arguments
 from composer.language.bindings import node_bindings
 from composer.python_source import project_search_path
 from composer.reports.text import render_finding
@@ -28,19 +30,25 @@ _NO_ROS_HELP = (
 )
 
 
-def up(path: Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] = ()) -> int:
+def up(
+    path: Path,
+    words: Sequence[str] = (),
+    ros_arguments: Sequence[str] = (),
+    log_levels: Sequence[str] = (),
+) -> int:
     """Run a system until it ends; return the exit code.
 
     Args:
+        words: Values for the arguments that the file declares.
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all loggers, `talker:=debug` for one.
 
     Raises:
         RosNotFoundError: There is no rclpy.
         StartError: The system could not be brought up.
-        UsageError: The ROS arguments are wrong.
+        UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    system = load_system(path)
+    system = load_system(path, words)
     catalogue = InterfaceCatalogue()
     findings = check_system(system, catalogue)
     if _report(findings) or system.spec is None:
@@ -51,6 +59,7 @@ def up(path: Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] 
     from composer.runtime.behaviours import project_on_path
     from composer.runtime.run import run_system
 
+    provide_declared(system, lambda line: click.echo(line, err=True))
     with project_on_path(project_search_path(path)):
         functions, findings = _import_behaviours(system, catalogue)
         if _report(findings):
@@ -64,13 +73,21 @@ def up(path: Path, ros_arguments: Sequence[str] = (), log_levels: Sequence[str] 
         )
 
 
+def describe_file_arguments(path: Path) -> str:
+    """Return which arguments a file declares, as its help shows them."""
+    system = load_system(path)
+    if system.spec is None:
+        return 'the file cannot be read'
+    return describe_arguments(system.arguments)
+
+
 def _import_behaviours(
     system: LoadedSystem, catalogue: InterfaceCatalogue
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
     """Import every behaviour, and hold the functions themselves against their calls."""
     from composer.runtime import behaviours
 
-    context = create_context(system, catalogue)
+    context, _ = create_context(system, catalogue)
     functions: dict[str, Callable[..., Any]] = {}
     findings: list[Diagnostic] = []
     if context is None:

@@ -42,6 +42,27 @@ def node_bindings(node: NodeSpec) -> Iterator[Binding]:
         if subscription.behaviour:
             owner = f"subscription '{subscription.name}'"
             yield Binding(subscription.behaviour, owner, ('node', 'message'))
+    yield from _serving_bindings(node)
+    yield from _hook_bindings(node)
+
+
+def _serving_bindings(node: NodeSpec) -> Iterator[Binding]:
+    for service in node.services.values():
+        yield Binding(service.behaviour, f"service '{service.name}'", ('node', 'request'))
+    for action in node.actions.values():
+        owner = f"action '{action.name}'"
+        yield Binding(action.behaviour, owner, ('node', 'goal'), may_yield=True)
+        if action.accept:
+            yield Binding(action.accept, f'{owner} (accept)', ('node', 'goal'))
+    for client in node.action_clients.values():
+        owner = f"action client '{client.name}'"
+        if client.feedback:
+            yield Binding(client.feedback, f'{owner} (feedback)', ('node', 'feedback'))
+        if client.result:
+            yield Binding(client.result, f'{owner} (result)', ('node', 'result'))
+
+
+def _hook_bindings(node: NodeSpec) -> Iterator[Binding]:
     hooks = (
         ('on_start', node.on_start, ('node',)),
         ('on_stop', node.on_stop, ('node',)),

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.language.parameters import convert_parameter_value, infer_parameter_type
-from composer.language.qos import DEFAULT_PROFILE
+from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
     DEFAULT_THREADS,
+    ActionClientSpec,
+    ActionSpec,
     BehaviourSpec,
     NodeSpec,
     ParameterSpec,
     PublisherSpec,
     QosSpec,
+    ServiceClientSpec,
+    ServiceSpec,
     SubscriptionSpec,
     SystemSpec,
     TimerSpec,
@@ -44,6 +48,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
     return SystemSpec(
         name=name,
         description=data.get('description', ''),
+        interfaces=MappingProxyType(data.get('interfaces', {})),
         qos=_parse_entries(data, (), 'qos', _parse_named_qos),
         threads=int(executor.get('threads', DEFAULT_THREADS)),
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
@@ -98,6 +103,12 @@ class _NodeParser:
             publishers=_parse_entries(data, path, 'publishers', self._parse_publisher),
             subscriptions=_parse_entries(data, path, 'subscriptions', self._parse_subscription),
             timers=_parse_entries(data, path, 'timers', self._parse_timer),
+            services=_parse_entries(data, path, 'services', self._parse_service),
+            service_clients=_parse_entries(
+                data, path, 'service_clients', self._parse_service_client
+            ),
+            actions=_parse_entries(data, path, 'actions', self._parse_action),
+            action_clients=_parse_entries(data, path, 'action_clients', _parse_action_client),
             on_start=self._parse_hook('on_start'),
             on_stop=self._parse_hook('on_stop'),
             on_parameters=self._parse_hook('on_parameters'),
@@ -137,6 +148,39 @@ class _NodeParser:
             path=path,
         )
 
+    def _parse_service(self, name: str, data: Data, path: DataPath) -> ServiceSpec:
+        return ServiceSpec(
+            name=name,
+            type=data['type'],
+            service=data.get('service', name),
+            qos=_parse_service_qos(data, path),
+            behaviour=_behaviour_at(data, path, 'behaviour'),
+            group=data.get('group'),
+            on_error=data.get('on_error', self._on_error),
+            path=path,
+        )
+
+    def _parse_service_client(
+        self, name: str, data: str | Data, path: DataPath
+    ) -> ServiceClientSpec:
+        if isinstance(data, str):
+            data = {'type': data}
+        return ServiceClientSpec(
+            name, data['type'], data.get('service', name), _parse_service_qos(data, path), path
+        )
+
+    def _parse_action(self, name: str, data: Data, path: DataPath) -> ActionSpec:
+        return ActionSpec(
+            name=name,
+            type=data['type'],
+            action=data.get('action', name),
+            behaviour=_behaviour_at(data, path, 'behaviour'),
+            accept=_behaviour_at(data, path, 'accept') if 'accept' in data else None,
+            concurrency=data.get('concurrency', 'parallel'),
+            on_error=data.get('on_error', self._on_error),
+            path=path,
+        )
+
     def _parse_entity_qos(self, data: Data, path: DataPath) -> QosSpec:
         return _parse_qos(data['qos'], (*path, 'qos')) if 'qos' in data else self._defaults.qos
 
@@ -162,28 +206,50 @@ def _parse_behaviour(
 ) -> BehaviourSpec | None:
     if 'behaviour' not in data:
         return None
-    module, _, function = data['behaviour'].partition(':')
-    return BehaviourSpec(
-        module,
-        function,
-        MappingProxyType(data.get('with', {})),
-        own_path or (*path, 'behaviour'),
+    spec = _behaviour_at(data, path, 'behaviour')
+    return replace(spec, path=own_path) if own_path else spec
+
+
+def _behaviour_at(data: Data, path: DataPath, key: str) -> BehaviourSpec:
+    """Return the behaviour under a key; constant arguments go to `behaviour:` alone."""
+    module, _, function = data[key].partition(':')
+    arguments = data.get('with', {}) if key == 'behaviour' else {}
+    return BehaviourSpec(module, function, MappingProxyType(arguments), (*path, key))
+
+
+def _parse_action_client(name: str, data: str | Data, path: DataPath) -> ActionClientSpec:
+    if isinstance(data, str):
+        data = {'type': data}
+    return ActionClientSpec(
+        name=name,
+        type=data['type'],
+        action=data.get('action', name),
+        feedback=_behaviour_at(data, path, 'feedback') if 'feedback' in data else None,
+        result=_behaviour_at(data, path, 'result') if 'result' in data else None,
+        path=path,
     )
+
+
+def _parse_service_qos(data: Data, path: DataPath) -> QosSpec:
+    # The QoS of defaults is for topics; rmw has a profile of its own for services.
+    if 'qos' in data:
+        return _parse_qos(data['qos'], (*path, 'qos'), SERVICES_PROFILE)
+    return QosSpec(SERVICES_PROFILE, {}, ())
 
 
 def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa: ARG001 - a parser of entries
     return _parse_qos(data, path)
 
 
-def _parse_qos(data: float | str | Data, path: DataPath) -> QosSpec:
+def _parse_qos(data: float | str | Data, path: DataPath, base: str = DEFAULT_PROFILE) -> QosSpec:
     if isinstance(data, str):
         return QosSpec(data, {}, path)
     if not isinstance(data, dict):
-        return QosSpec(DEFAULT_PROFILE, {'depth': int(data)}, path)
+        return QosSpec(base, {'depth': int(data)}, path)
     policies = {key: value for key, value in data.items() if key != 'profile'}
     if 'depth' in policies:
         policies['depth'] = int(policies['depth'])
-    return QosSpec(data.get('profile', DEFAULT_PROFILE), policies, path)
+    return QosSpec(data.get('profile', base), policies, path)
 
 
 def _parse_parameter(name: str, data: Any, path: DataPath) -> ParameterSpec:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from composer.language.specs import QosSpec
 
 DEFAULT_PROFILE = 'default'
+SERVICES_PROFILE = 'services_default'
 
 _DEFAULT = {
     'history': 'keep_last',
@@ -28,7 +29,7 @@ _DEFAULT = {
 BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     DEFAULT_PROFILE: _DEFAULT,
     'sensor_data': _DEFAULT | {'depth': 5, 'reliability': 'best_effort'},
-    'services_default': _DEFAULT,
+    SERVICES_PROFILE: _DEFAULT,
     'parameters': _DEFAULT | {'depth': 1000},
     'parameter_events': _DEFAULT | {'depth': 1000},
     'action_status_default': _DEFAULT | {'depth': 1, 'durability': 'transient_local'},

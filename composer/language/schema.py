@@ -18,7 +18,7 @@ from jsonschema.validators import extend
 from composer.language.schema_faults import StructureFault, explain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, SourceMap
@@ -36,25 +36,35 @@ def schema_path() -> Path:
 
 
 def check_structure(
-    data: dict[str, Any], positions: SourceMap
+    data: dict[str, Any], positions: SourceMap, failed: Sequence[DataPath] = ()
 ) -> tuple[dict[str, Any], frozenset[DataPath], list[Diagnostic]]:
     """Hold data against the schema.
 
     A misspelt key is reported and then read as the one that was meant, so that what lies below
     it is checked in the same run; `positions` follow it.
 
+    Args:
+        failed: The paths of expressions that could not be evaluated; they are left out.
+
     Returns:
         The data without what was wrong, the paths that were dropped for it, and the findings.
     """
     findings: list[Diagnostic] = []
+    dropped: set[DataPath] = set(failed)
+    for path in failed:
+        data = _without(data, path)
     while misspelt := [fault for fault in _find_faults(data) if _can_be_mended(fault, data)]:
         for fault in misspelt:
             if _can_be_mended(fault, data):
                 findings.append(fault.diagnostic(positions))
                 data = _with_key_renamed(data, fault.path, str(fault.meant))
                 positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
-    findings += [fault.diagnostic(positions) for fault in _find_faults(data)]
-    dropped: set[DataPath] = set()
+    incomplete = {path[:-1] for path in failed}
+    findings += [
+        fault.diagnostic(positions)
+        for fault in _find_faults(data)
+        if fault.rule != 'missing-key' or fault.path not in incomplete
+    ]
     while faults := _find_faults(data):
         paths = {fault.drop for fault in faults if fault.drop}
         for path in paths:

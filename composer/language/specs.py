@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
 OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
+Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 DEFAULT_THREADS = 8
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
@@ -125,6 +126,70 @@ class TimerSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class ServiceSpec:
+    """A service that the node serves.
+
+    Attributes:
+        group: The callback group's name; `None` for the node's default group.
+    """
+
+    name: str
+    type: str
+    service: str
+    qos: QosSpec
+    behaviour: BehaviourSpec
+    group: str | None
+    on_error: OnError
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceClientSpec:
+    """A service that behaviours call."""
+
+    name: str
+    type: str
+    service: str
+    qos: QosSpec
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class ActionSpec:
+    """An action that the node serves.
+
+    Attributes:
+        accept: Decides whether a goal is accepted; `None` accepts all.
+    """
+
+    name: str
+    type: str
+    action: str
+    behaviour: BehaviourSpec
+    accept: BehaviourSpec | None
+    concurrency: Concurrency
+    on_error: OnError
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class ActionClientSpec:
+    """An action that behaviours send goals to.
+
+    Attributes:
+        feedback: Hears the feedback to each goal.
+        result: Hears the result of each goal.
+    """
+
+    name: str
+    type: str
+    action: str
+    feedback: BehaviourSpec | None
+    result: BehaviourSpec | None
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
 class NodeSpec:
     """A node and all that it has.
 
@@ -146,6 +211,10 @@ class NodeSpec:
     publishers: Mapping[str, PublisherSpec]
     subscriptions: Mapping[str, SubscriptionSpec]
     timers: Mapping[str, TimerSpec]
+    services: Mapping[str, ServiceSpec]
+    service_clients: Mapping[str, ServiceClientSpec]
+    actions: Mapping[str, ActionSpec]
+    action_clients: Mapping[str, ActionClientSpec]
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
@@ -155,6 +224,16 @@ class NodeSpec:
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
         """All that has a topic."""
         return (*self.publishers.values(), *self.subscriptions.values())
+
+    @property
+    def service_endpoints(self) -> tuple[ServiceSpec | ServiceClientSpec, ...]:
+        """All that has a service."""
+        return (*self.services.values(), *self.service_clients.values())
+
+    @property
+    def action_endpoints(self) -> tuple[ActionSpec | ActionClientSpec, ...]:
+        """All that has an action."""
+        return (*self.actions.values(), *self.action_clients.values())
 
     @property
     def triggers(self) -> tuple[TimerSpec | SubscriptionSpec, ...]:
@@ -168,6 +247,7 @@ class SystemSpec:
 
     Attributes:
         name: The file's name without its ending.
+        interfaces: The folders of interface packages to build if they are not installed.
         qos: The named profiles of the file.
         threads: How many callbacks may run at the same time.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
@@ -175,6 +255,7 @@ class SystemSpec:
 
     name: str
     description: str
+    interfaces: Mapping[str, str]
     qos: Mapping[str, QosSpec]
     threads: int
     shutdown_timeout_sec: float

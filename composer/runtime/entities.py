@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError, StartError
+from composer.runtime.action_clients import create_action_clients
+from composer.runtime.actions import create_actions
 from composer.runtime.parameters import create_parameters
 from composer.runtime.publishers import create_publishers
+from composer.runtime.service_clients import create_service_clients
+from composer.runtime.services import create_services
 from composer.runtime.subscriptions import create_subscriptions
 from composer.runtime.timers import create_timers
 
@@ -15,10 +19,14 @@ if TYPE_CHECKING:
 
     from composer.runtime.live_node import LiveNode
 
-# Publishers come first: what is bound to a behaviour may publish what it returns.
+# First come those that behaviours use, then those that call behaviours.
 ENTITY_KINDS: tuple[Callable[[LiveNode], None], ...] = (
     create_parameters,
     create_publishers,
+    create_service_clients,
+    create_action_clients,
+    create_services,
+    create_actions,
     create_subscriptions,
     create_timers,
 )

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import threading
 import traceback
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
 
+from composer.errors import ComposerError
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
 
     from rclpy.context import Context
     from rclpy.node import Node
@@ -20,8 +24,33 @@ _LONGEST_WAIT_SEC = 0.5
 _JOIN_TIMEOUT_SEC = 2.0
 
 
-class _PoolEndingExecutor(MultiThreadedExecutor):
-    """The stock executor, whose idle threads end with it and not with a later collection."""
+class NoResponseError(ComposerError):
+    """Raised by a service's callback that cannot answer: rclpy sends a response otherwise."""
+
+
+class _ElasticExecutor(MultiThreadedExecutor):
+    """The stock executor with a pool that grows while callbacks wait for other callbacks.
+
+    Its idle threads end with it, and not with a later collection.
+    """
+
+    def __init__(self, num_threads: int, context: Context) -> None:
+        super().__init__(num_threads=num_threads, context=context)
+        self._growth = threading.Lock()
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Let another thread work while this one waits for something that callbacks bring."""
+        pool = self._executor
+        with self._growth:
+            # Nothing public lets a pool of the standard library grow.
+            pool._max_workers += 1  # noqa: SLF001
+            pool._adjust_thread_count()  # noqa: SLF001
+        try:
+            yield
+        finally:
+            with self._growth:
+                pool._max_workers -= 1  # noqa: SLF001
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """See the base class."""
@@ -41,7 +70,7 @@ class SystemExecutor:
     def __init__(self, context: Context, threads: int, report: Callable[[str], None]) -> None:
         self._context = context
         self._report = report
-        self._executor = _PoolEndingExecutor(num_threads=max(threads, 2), context=context)
+        self._executor = _ElasticExecutor(max(threads, 2), context)
         self._spinning = False
         self._thread = threading.Thread(target=self._spin, name='composer-executor', daemon=True)
 
@@ -58,6 +87,10 @@ class SystemExecutor:
         task = self._executor.create_task(callback, *arguments)
         self.wake()
         return task
+
+    def waiting(self) -> AbstractContextManager[None]:
+        """Return the context in which a callback may wait for other callbacks."""
+        return self._executor.waiting()
 
     def wake(self) -> None:
         """Look again which callbacks may run: a gate has opened, say."""
@@ -84,6 +117,8 @@ class SystemExecutor:
         while self._spinning and self._context.ok():
             try:
                 self._executor.spin_once(timeout_sec=_LONGEST_WAIT_SEC)
+            except NoResponseError:
+                continue
             except (ShutdownException, ExternalShutdownException):
                 return
             except Exception:  # noqa: BLE001 - one fault must not end the dispatch of all nodes

@@ -8,6 +8,7 @@ from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
@@ -15,10 +16,13 @@ from composer.language.specs import REENTRANT
 from composer.runtime.calls import BehaviourCall, CallLedger
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.node import Node, Publish
+from composer.runtime.remote_parameters import RemoteParameters
 from composer.runtime.supervision import ErrorReporter
+from composer.runtime.waiting import CoroutineWaits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from contextlib import AbstractContextManager
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.context import Context
@@ -27,6 +31,9 @@ if TYPE_CHECKING:
 
     from composer.language.positions import DataPath, SourceMap
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError, QosSpec
+    from composer.runtime.action_clients import ActionClient
+    from composer.runtime.failures import ServiceFailures
+    from composer.runtime.service_clients import ServiceClient
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +46,8 @@ class SystemServices:
         act_on_error: Takes a node's name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
         create_task: Runs a function or coroutine function among the callbacks.
+        waiting: The context in which a callback may wait for other callbacks.
+        failures: Which services failed lately.
     """
 
     context: Context
@@ -49,6 +58,8 @@ class SystemServices:
     act_on_error: Callable[[str, OnError], None]
     shutdown: Callable[[int], None]
     create_task: Callable[..., Task]
+    waiting: Callable[[], AbstractContextManager[None]]
+    failures: ServiceFailures
 
 
 @dataclass(slots=True)
@@ -58,7 +69,13 @@ class LiveNode:
     Attributes:
         gate: Closed until the node has started, and when it stops.
         publishers: What publishes a payload, by the publisher's name.
+<<<<<<< HEAD
         has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
+=======
+        background: A group that no behaviour is in: responses and the like are always taken.
+        serving: The group of requests to action servers; open until the node is destroyed.
+        at_destruction: What ends entities that rclpy's node does not end itself.
+>>>>>>> e7a89f03c70a2533182bc8b9df49f034406895cf
     """
 
     spec: NodeSpec
@@ -67,6 +84,12 @@ class LiveNode:
     face: Node
     errors: ErrorReporter
     publishers: dict[str, Publish]
+    service_clients: dict[str, ServiceClient]
+    action_clients: dict[str, ActionClient]
+    coroutine_waits: CoroutineWaits
+    background: CallbackGroup
+    serving: CallbackGroup
+    at_destruction: list[Callable[[], None]] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
     gate: Gate = field(default_factory=Gate)
     ledger: CallLedger = field(default_factory=CallLedger)
@@ -132,6 +155,8 @@ class LiveNode:
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph."""
         self.errors.flush()
+        for end in self.at_destruction:
+            end()
         self.ros.destroy_node()
 
     def _delivery(self, publish: str | None) -> Callable[[Any], None]:
@@ -161,16 +186,26 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
         parameter_overrides=overrides,
     )
     publishers: dict[str, Publish] = {}
+    service_clients: dict[str, ServiceClient] = {}
+    action_clients: dict[str, ActionClient] = {}
+    background = ReentrantCallbackGroup()
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
-    return LiveNode(
+    node = LiveNode(
         spec,
         services,
         ros,
         face=Node(ros, state, publishers, services.shutdown),
         errors=ErrorReporter(ros.get_logger().error),
         publishers=publishers,
+        service_clients=service_clients,
+        action_clients=action_clients,
+        coroutine_waits=CoroutineWaits(ros, background),
+        background=background,
+        serving=MutuallyExclusiveCallbackGroup(),
     )
+    node.face.connect(service_clients, action_clients, RemoteParameters(node))
+    return node
 
 
 def _discard(_result: Any) -> None:

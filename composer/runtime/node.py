@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 from composer.errors import ComposerError
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from types import SimpleNamespace
 
     import rclpy.node
     from rclpy.impl.rcutils_logger import RcutilsLogger
     from rclpy.time import Time
 
+    from composer.runtime.action_clients import ActionClient, Goal
+    from composer.runtime.remote_parameters import RemoteParameters
+    from composer.runtime.service_clients import ServiceClient
+
 # A message, a mapping of (nested) fields, or the bare value of a message with one field.
 Payload: TypeAlias = Any
+
+Entity = TypeVar('Entity')
 
 
 class Publish(Protocol):
@@ -84,7 +90,17 @@ class Node:
         ros: The rclpy node beneath, for what is not here.
     """
 
-    __slots__ = ('_publishers', '_shutdown', 'name', 'parameters', 'ros', 'state')
+    __slots__ = (
+        '_action_clients',
+        '_publishers',
+        '_remote_parameters',
+        '_service_clients',
+        '_shutdown',
+        'name',
+        'parameters',
+        'ros',
+        'state',
+    )
 
     def __init__(
         self,
@@ -99,6 +115,17 @@ class Node:
         self.parameters = Parameters(ros)
         self._publishers = publishers
         self._shutdown = shutdown
+
+    def connect(
+        self,
+        service_clients: Mapping[str, ServiceClient],
+        action_clients: Mapping[str, ActionClient],
+        remote_parameters: RemoteParameters,
+    ) -> None:
+        """Take what reaches other nodes; for Composer itself."""
+        self._service_clients = service_clients
+        self._action_clients = action_clients
+        self._remote_parameters = remote_parameters
 
     @property
     def logger(self) -> RcutilsLogger:
@@ -121,14 +148,87 @@ class Node:
             UndeclaredError: The node declares no such publisher.
             PayloadError: The payload does not fit the publisher's type.
         """
-        publish = self._publishers.get(name)
-        if publish is None:
-            message = f"node '{self.name}' declares no publisher '{name}'"
-            raise UndeclaredError(
-                message, help=did_you_mean(name, self._publishers, 'it declares')
-            )
-        publish(payload)
+        self._declared(name, self._publishers, 'publisher')(payload)
+
+    def call(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Any:
+        """Call a service and return its response; works in any behaviour.
+
+        Args:
+            name: The service client's name in the file.
+            payload: The request.
+            timeout: How long to wait for the server and its response, in seconds; `None` for
+                no end.
+
+        Raises:
+            UndeclaredError: The node declares no such service client.
+            PayloadError: The payload does not fit the request.
+            ServiceNotAvailableError: No server appeared in time.
+            CallTimeoutError: The server did not answer in time.
+            ServiceFailedError: The server is in this system, and its behaviour raised.
+        """
+        client = self._declared(name, self._service_clients, 'service client')
+        return client.call({} if payload is None else payload, timeout)
+
+    async def call_async(
+        self,
+        name: str,
+        payload: Payload = None,
+        timeout: float | None = 5.0,  # noqa: ASYNC109 - as in `call`; rclpy's loop has no scopes
+    ) -> Any:
+        """As `call`, for `async def` behaviours: no thread is held while it waits."""
+        client = self._declared(name, self._service_clients, 'service client')
+        return await client.call_async({} if payload is None else payload, timeout)
+
+    def send_goal(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Goal:
+        """Send a goal and return it once the server has accepted it.
+
+        Args:
+            name: The action client's name in the file.
+            payload: The goal.
+            timeout: How long to wait for the server and its answer, in seconds; `None` for no
+                end.
+
+        Raises:
+            UndeclaredError: The node declares no such action client.
+            PayloadError: The payload does not fit the goal.
+            ActionNotAvailableError: No server appeared in time.
+            GoalTimeoutError: The server did not answer in time.
+            GoalRejectedError: The server refused the goal.
+        """
+        client = self._declared(name, self._action_clients, 'action client')
+        return client.send_goal({} if payload is None else payload, timeout)
+
+    def set_parameters(
+        self, node_name: str, values: Mapping[str, Any], timeout: float | None = 5.0
+    ) -> None:
+        """Set parameters of another node; a relative name lies in this node's namespace.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear within `timeout` seconds.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It refused; the message has its reasons.
+        """
+        self._remote_parameters.set(node_name, values, timeout)
+
+    def get_parameters(
+        self, node_name: str, names: Iterable[str], timeout: float | None = 5.0
+    ) -> dict[str, Any]:
+        """Return the values of another node's parameters, `None` for one that is not set.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear within `timeout` seconds.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It has no such parameters.
+        """
+        return self._remote_parameters.get(node_name, names, timeout)
 
     def shutdown(self, code: int = 0) -> None:
         """End the whole system with this exit code; it stops after this behaviour has returned."""
         self._shutdown(code)
+
+    def _declared(self, name: str, entities: Mapping[str, Entity], kind: str) -> Entity:
+        entity = entities.get(name)
+        if entity is None:
+            message = f"node '{self.name}' declares no {kind} '{name}'"
+            raise UndeclaredError(message, help=did_you_mean(name, entities, 'it declares'))
+        return entity

@@ -11,6 +11,7 @@ from rclpy.context import Context
 from composer.errors import ComposerError, ExitCode, StartError, UsageError
 from composer.runtime.entities import create_entities
 from composer.runtime.executor import SystemExecutor
+from composer.runtime.failures import ServiceFailures
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
 from composer.runtime.stopping import stop_nodes
@@ -60,6 +61,8 @@ class System:
             act_on_error=self._supervisor.act,
             shutdown=self.request_stop,
             create_task=self._executor.create_task,
+            waiting=self._executor.waiting,
+            failures=ServiceFailures(),
         )
 
     @property

@@ -74,9 +74,13 @@ def test_everything_else_is_a_string(text):
     assert parse_plain_scalar(text) == text
 
 
-@pytest.mark.parametrize('digits', ['1' * 251, '0o' + '7' * 249, '0x' + 'f' * 249, '-' + '1' * 250])
+@pytest.mark.parametrize(
+    'digits', ['1' * 251, '0o' + '7' * 249, '0x' + 'f' * 249, '-' + '1' * 250]
+)
 def test_an_endless_number_is_refused(digits):
-    with pytest.raises(ScalarError, match=f'^a number of {len(digits)} digits fits no type of ROS$'):
+    with pytest.raises(
+        ScalarError, match=f'^a number of {len(digits)} digits fits no type of ROS$'
+    ):
         parse_plain_scalar(digits)
 
 

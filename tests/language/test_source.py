@@ -151,7 +151,10 @@ def test_an_anchor_may_be_given_anew():
         ('a: &a {b: &b {c: *a}}', '1:18: error[cyclic-alias]: the alias *a contains itself'),
         ('? &a [*a]\n: 1', '1:7: error[cyclic-alias]: the alias *a contains itself'),
         ('a: *b\nb: &b 1', '1:4: error[unknown-alias]: no anchor &b stands before this alias'),
-        ('a: {<<: 3}', '1:9: error[bad-merge]: the merge key << takes a mapping, or a list of them'),
+        (
+            'a: {<<: 3}',
+            '1:9: error[bad-merge]: the merge key << takes a mapping, or a list of them',
+        ),
     ],
 )
 def test_an_impossible_alias_is_a_finding(text, line):
@@ -172,7 +175,9 @@ def test_aliases_in_aliases_do_not_explode(merged):
 
 def test_aliases_do_not_nest_deeper_than_text():
     lines = ['x0: &x0 [1]', *(f'x{n}: &x{n} [*x{n - 1}]' for n in range(1, 200))]
-    assert 'error[too-deep]: aliases nest more than 100 levels deep' in first_line('\n'.join(lines))
+    assert 'error[too-deep]: aliases nest more than 100 levels deep' in first_line(
+        '\n'.join(lines)
+    )
 
 
 # Duplicate keys
@@ -189,7 +194,10 @@ def test_a_duplicate_key_shows_both_places():
 
 
 def test_each_further_key_of_a_name_is_reported():
-    assert [finding.span.line for finding in parse('a: 1\na: 2\nb: 3\na: 4\n').diagnostics] == [2, 4]
+    assert [finding.span.line for finding in parse('a: 1\na: 2\nb: 3\na: 4\n').diagnostics] == [
+        2,
+        4,
+    ]
 
 
 def test_the_first_of_duplicate_keys_counts():
@@ -271,7 +279,9 @@ def test_an_open_quote_says_where_it_was_opened():
 
 @pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? '])
 def test_ten_thousand_levels_are_one_finding(opening):
-    assert 'error[too-deep]: the data nest more than 100 levels deep' in first_line(opening * 10_000)
+    assert 'error[too-deep]: the data nest more than 100 levels deep' in first_line(
+        opening * 10_000
+    )
 
 
 def test_ten_thousand_levels_of_indentation_are_one_finding():
@@ -432,7 +442,21 @@ def test_bytes_never_raise(content):
     assert document.data is not None or document.diagnostics
 
 
-ODD = [None, True, 0, -1, 3, 1.5, float('nan'), 10**250, '', 'a', 'a:b', 'std_msgs/msg/String', '~/x']
+ODD = [
+    None,
+    True,
+    0,
+    -1,
+    3,
+    1.5,
+    float('nan'),
+    10**250,
+    '',
+    'a',
+    'a:b',
+    'std_msgs/msg/String',
+    '~/x',
+]
 
 
 def parts_of(data, path=()):
@@ -451,7 +475,9 @@ def replaced(data, path, value):
     return copy
 
 
-@pytest.mark.parametrize('value', [*ODD, [], {}, [None], {'a': None}, [[1]], {'type': {}}], ids=repr)
+@pytest.mark.parametrize(
+    'value', [*ODD, [], {}, [None], {'a': None}, [[1]], {'type': {}}], ids=repr
+)
 def test_any_value_in_any_place_never_raises(value):
     everything = Path(__file__).parents[1] / 'data' / 'valid' / 'everything.yaml'
     data = parse_document(everything.read_bytes(), 'everything.yaml').data

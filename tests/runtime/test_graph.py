@@ -143,9 +143,7 @@ def test_nodes_are_in_their_namespaces(graph, wait_for):
         ),
     ],
 )
-def test_publishers_have_exactly_the_topics_of_the_file(
-    graph, wait_for, node, namespace, topics
-):
+def test_publishers_have_exactly_the_topics_of_the_file(graph, wait_for, node, namespace, topics):
     expected = {topic: [kind] for topic, kind in topics.items()}
     # Every ROS node has these two.
     expected |= {

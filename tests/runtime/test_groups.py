@@ -58,9 +58,7 @@ def test_one_node_runs_one_behaviour_at_a_time_by_default(compose):
     ('first', 'second'),
     [('', ', group: other'), (', group: reentrant', ', group: reentrant')],
 )
-def test_behaviours_of_different_or_reentrant_groups_run_at_the_same_time(
-    compose, first, second
-):
+def test_behaviours_of_different_or_reentrant_groups_run_at_the_same_time(compose, first, second):
     text = f"""
         version: 1
         nodes:

@@ -96,9 +96,7 @@ def change(child, shared_peer):
 
     def change(name, value, node='plain'):
         message = Parameter(name, value=value).to_parameter_msg()
-        response = shared_peer.call(
-            SetParameters, f'/{node}/set_parameters', parameters=[message]
-        )
+        response = shared_peer.call(SetParameters, f'/{node}/set_parameters', parameters=[message])
         return response.results[0].successful, response.results[0].reason
 
     return change
@@ -107,9 +105,7 @@ def change(child, shared_peer):
 @pytest.fixture
 def describe(child, shared_peer):
     def describe(name):
-        response = shared_peer.call(
-            DescribeParameters, '/plain/describe_parameters', names=[name]
-        )
+        response = shared_peer.call(DescribeParameters, '/plain/describe_parameters', names=[name])
         return response.descriptors[0]
 
     return describe
@@ -120,9 +116,7 @@ def test_all_declared_parameters_are_listed(child, shared_peer):
 
     # The last two are what rclpy gives to every node.
     assert sorted(response.result.names) == sorted(
-        """text number ratio flag texts numbers ratios flags octets nothing fixed unset
-        group.inner.deep whole speed count positive mode gear serial
-        use_sim_time start_type_description_service""".split()
+        ['text', 'number', 'ratio', 'flag', 'texts', 'numbers', 'ratios', 'flags', 'octets', 'nothing', 'fixed', 'unset', 'group.inner.deep', 'whole', 'speed', 'count', 'positive', 'mode', 'gear', 'serial', 'use_sim_time', 'start_type_description_service']
     )
 
 
@@ -177,9 +171,7 @@ def test_descriptors_tell_range_description_choices_and_read_only(describe):
         FloatingPointRange(from_value=0.0, to_value=2.0, step=0.5)
     ]
     assert list(count.integer_range) == [IntegerRange(from_value=0, to_value=10, step=2)]
-    assert list(positive.integer_range) == [
-        IntegerRange(from_value=0, to_value=2**63 - 1, step=0)
-    ]
+    assert list(positive.integer_range) == [IntegerRange(from_value=0, to_value=2**63 - 1, step=0)]
     assert describe('unset').description == 'To be given later.'
     assert describe('mode').additional_constraints == 'one of slow, fast'
     assert describe('gear').additional_constraints == 'one of 1, 2, 4'
@@ -259,9 +251,7 @@ def test_a_change_is_told_to_those_who_listen_for_parameter_events(
     assert events[-1].changed_parameters[0].value.integer_value == 9
 
 
-def test_on_parameters_is_heard_before_the_change_with_the_old_values_in_place(
-    child, change, get
-):
+def test_on_parameters_is_heard_before_the_change_with_the_old_values_in_place(child, change, get):
     assert change('limit', 4, 'judging') == (True, '')
     child.wait_for_line("[INFO] [judging]: asked {'limit': 4}, limit is 1")
     assert get('limit', 'judging') == 4

@@ -40,7 +40,9 @@ def test_built_in_profiles_are_those_of_rclpy(name, preset):
 def test_depth_alone_is_what_rclpy_makes_of_a_number():
     profile = create_qos_profile(QosSpec('default', {'depth': 7}, ()), {})
 
-    assert profile.get_c_qos_profile().to_dict() == QoSProfile(depth=7).get_c_qos_profile().to_dict()
+    assert (
+        profile.get_c_qos_profile().to_dict() == QoSProfile(depth=7).get_c_qos_profile().to_dict()
+    )
 
 
 def test_policies_of_a_chain_of_profiles_add_up():

@@ -201,7 +201,9 @@ nodes:
     timers: {live: {period: 0.05, behaviour: 'parts:live'}}
 """
 
-RESTARTING_CODE = CODE + """
+RESTARTING_CODE = (
+    CODE
+    + """
 from pathlib import Path
 from rclpy.parameter import Parameter
 
@@ -220,6 +222,7 @@ def tick(node):
         raise RuntimeError('out of order')
     return node.state.ticks
 """
+)
 
 
 def test_on_error_restart_rebuilds_the_node_as_at_the_start(compose, peer, wait_for):
@@ -256,7 +259,7 @@ def test_a_restart_that_fails_is_tried_again(compose):
 
 def test_a_restart_of_many_nodes_at_once_brings_all_of_them_back(compose):
     nodes = '\n'.join(
-        f"  n{n}: {{on_error: restart, state: {{ticks: 0}}, publishers: {{p: std_msgs/msg/Int32}}, "
+        f'  n{n}: {{on_error: restart, state: {{ticks: 0}}, publishers: {{p: std_msgs/msg/Int32}}, '
         f"timers: {{tick: {{period: 0.01, behaviour: 'parts:tick'}}}}, parameters: {{mode: a}}}}"
         for n in range(6)
     )

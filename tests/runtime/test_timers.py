@@ -89,13 +89,16 @@ def heard(shared_compose, shared_peer):
         'by_name': String,
     }
     # The generators publish a few messages only, so their publishers must know of the peer before.
-    code = KINDS_CODE + """
+    code = (
+        KINDS_CODE
+        + """
 def wait_for_peer(node):
     import time
     while not all(p.get_subscription_count() for p in node.ros.publishers if 'g' in p.topic_name
                   and 'generated' in p.topic_name):
         time.sleep(0.01)
 """
+    )
     lists = {topic: shared_peer.listen(kind, topic) for topic, kind in classes.items()}
     child = shared_compose(f'{KINDS}    on_start: parts:wait_for_peer\n', code)
     child.wait_until_ready()

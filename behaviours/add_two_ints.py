@@ -1,0 +1,32 @@
+"""The minimal service and client of the ROS 2 tutorials."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer import ServiceNotAvailableError
+
+if TYPE_CHECKING:
+    from example_interfaces.srv import AddTwoInts
+
+    from composer import Node
+
+
+def add(node: Node, request: AddTwoInts.Request) -> int:
+    """Answer with the sum of both numbers."""
+    total: int = request.a + request.b
+    node.logger.info(f'Incoming request\na: {request.a} b: {request.b}')
+    node.logger.info(f'Sending back response: [{total}]')
+    return total
+
+
+def ask(node: Node, a: int, b: int) -> None:
+    """Wait for the service, ask for one sum, and end the system."""
+    while True:
+        try:
+            response = node.call('add_two_ints', {'a': a, 'b': b}, timeout=1.0)
+            break
+        except ServiceNotAvailableError:
+            node.logger.info('service not available, waiting again...')
+    node.logger.info(f'Result of add_two_ints: for {a} + {b} = {response.sum}')
+    node.shutdown()

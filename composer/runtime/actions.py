@@ -1,0 +1,222 @@
+"""Actions: goals accepted, executed beside each other as declared, cancelled at a `yield`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+
+from composer.interfaces.classes import import_interface
+from composer.python_source import FunctionKind
+from composer.runtime.behaviours import kind_of
+from composer.runtime.calls import RunningCall
+from composer.runtime.goal_queue import GoalQueue
+from composer.runtime.payloads import converter_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.specs import ActionSpec
+    from composer.runtime.live_node import LiveNode
+
+_POLL_SEC = 0.005
+# A cancel request takes effect right after its callback; this only bounds a fault of the server.
+_CANCEL_SEC = 5.0
+
+
+def create_actions(node: LiveNode) -> None:
+    """Create the actions that the node serves."""
+    for spec in node.spec.actions.values():
+        server = _Server(node, spec)
+        node.at_destruction.append(server.destroy)
+
+
+class _Server(ActionServer):
+    """An action server whose plain and generator behaviours run in threads of their own.
+
+    The stock server executes goals in the executor's pool, where goals that sleep keep requests
+    to cancel them from being heard.
+    """
+
+    def __init__(self, node: LiveNode, spec: ActionSpec) -> None:
+        self._queue = GoalQueue(spec.concurrency, lambda goal: goal.execute())
+        self._execution = _Execution(node, spec, self._queue)
+        self._live = node
+        self._owner = f"action '{spec.name}'"
+        self._place = node.place(spec.path)
+        self._accept = node.function(spec.accept) if spec.accept else None
+        super().__init__(
+            node.ros,
+            import_interface(spec.type),
+            spec.action,
+            execute_callback=self._execution.callback,
+            callback_group=node.serving,
+            goal_callback=self._decide,
+            handle_accepted_callback=self._queue.add,
+            cancel_callback=self._cancel,
+        )
+
+    def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
+        """See the base class."""
+        callback = execute_callback or self._execution.callback
+        if self._execution.is_async:
+            self._live.services.create_task(self._execute_in_task, callback, goal_handle)
+        else:
+            threading.Thread(
+                target=self._execute_in_thread, args=(callback, goal_handle), daemon=True
+            ).start()
+
+    async def _execute_in_task(self, callback: Any, goal: Any) -> None:
+        try:
+            await self._execute_goal(callback, goal)
+        finally:
+            self._queue.finished(goal)
+
+    def _execute_in_thread(self, callback: Any, goal: Any) -> None:
+        ledger = self._live.ledger
+        token = ledger.begin(RunningCall(self._owner, threading.get_ident()))
+        try:
+            # Nothing in it waits: the callback is a plain function.
+            self._execute_goal(callback, goal).send(None)
+        except StopIteration:
+            pass
+        finally:
+            self._queue.finished(goal)
+            ledger.end(token)
+
+    def _decide(self, goal: Any) -> GoalResponse:
+        if not self._live.gate.is_open or not self._queue.has_room():
+            return GoalResponse.REJECT
+        if self._accept is None:
+            return GoalResponse.ACCEPT
+        try:
+            answer = self._accept(self._live.face, goal)
+        except BaseException as error:  # noqa: BLE001 - a behaviour never takes the server down
+            self._live.errors.report(f'{self._owner} (accept)', self._place, error)
+            return GoalResponse.REJECT
+        if answer is False or isinstance(answer, str):
+            reason = f': {answer}' if answer else ''
+            self._live.face.logger.info(f'{self._owner} refused a goal{reason}')
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _cancel(self, goal: Any) -> CancelResponse:
+        if self._queue.take_out(goal):
+            threading.Thread(target=self._end_cancelled, args=(goal,), daemon=True).start()
+        return CancelResponse.ACCEPT
+
+    def _end_cancelled(self, goal: Any) -> None:
+        """Give a goal that was cancelled while it waited its final state."""
+        deadline = time.monotonic() + _CANCEL_SEC
+        while not goal.is_cancel_requested and time.monotonic() < deadline:
+            time.sleep(_POLL_SEC)
+        goal.execute()
+
+
+class _Execution:
+    """Runs the behaviour of an action for one goal after another."""
+
+    def __init__(self, node: LiveNode, spec: ActionSpec, queue: GoalQueue) -> None:
+        action_class: Any = import_interface(spec.type)
+        behaviour = node.function(spec.behaviour)
+        self._node = node
+        self._spec = spec
+        self._queue = queue
+        self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
+        self._kind = kind_of(behaviour)
+        self._result_class = action_class.Result
+        self._feedback_class = action_class.Feedback
+        self._to_result = converter_for(action_class.Result).convert
+        self._to_feedback = converter_for(action_class.Feedback).convert
+        self.is_async = self._kind in (FunctionKind.COROUTINE, FunctionKind.ASYNC_GENERATOR)
+        self.callback: Callable[[Any], Any] = (
+            self._execute_async if self.is_async else self._execute
+        )
+
+    def _execute(self, goal: Any) -> Any:
+        results: list[Any] = []
+        if not self._end_early(goal):
+            drive = self._drive if self._kind is FunctionKind.GENERATOR else self._call
+            call = self._call_of(partial(drive, goal), results)
+            if not call.run():
+                goal.abort()
+        return results[0] if results else self._result_class()
+
+    async def _execute_async(self, goal: Any) -> Any:
+        results: list[Any] = []
+        if not self._end_early(goal):
+            is_generator = self._kind is FunctionKind.ASYNC_GENERATOR
+            drive = self._drive_async if is_generator else self._call_async
+            call = self._call_of(partial(drive, goal), results)
+            await call.as_callback(FunctionKind.COROUTINE)()
+            if goal.is_active:
+                goal.abort()
+        return results[0] if results else self._result_class()
+
+    def _call_of(self, function: Callable[[], Any], results: list[Any]) -> Any:
+        owner = f"action '{self._spec.name}'"
+        call = self._node.call(owner, self._spec.path, function, on_error=self._spec.on_error)
+        return call.delivering(results.append)
+
+    def _call(self, goal: Any) -> Any:
+        return self._succeed(goal, self._begin(goal.request))
+
+    async def _call_async(self, goal: Any) -> Any:
+        return self._succeed(goal, await self._begin(goal.request))
+
+    def _drive(self, goal: Any) -> Any:
+        generator = self._begin(goal.request)
+        while True:
+            try:
+                feedback = next(generator)
+            except StopIteration as end:
+                return self._succeed(goal, end.value)
+            if self._must_end(goal):
+                generator.close()
+                self._end_early(goal)
+                return self._result_class()
+            self._publish(goal, feedback)
+
+    async def _drive_async(self, goal: Any) -> Any:
+        # An async generator cannot return a value: what it yields last is the result.
+        last: Any = None
+        generator = self._begin(goal.request)
+        first = True
+        async for item in generator:
+            if self._must_end(goal):
+                await generator.aclose()
+                self._end_early(goal)
+                return self._result_class()
+            if not first:
+                self._publish(goal, last)
+            last, first = item, False
+        return self._succeed(goal, last)
+
+    def _succeed(self, goal: Any, payload: Any) -> Any:
+        result = self._to_result(payload)
+        goal.succeed()
+        return result
+
+    def _publish(self, goal: Any, payload: Any) -> None:
+        if payload is not None:
+            goal.publish_feedback(self._to_feedback(payload))
+
+    def _must_end(self, goal: Any) -> bool:
+        return (
+            goal.is_cancel_requested
+            or not self._node.gate.is_open
+            or self._queue.is_superseded(goal)
+        )
+
+    def _end_early(self, goal: Any) -> bool:
+        """Give a goal that may not go on its final state; return whether it was such a one."""
+        if goal.is_cancel_requested:
+            goal.canceled()
+        elif self._must_end(goal):
+            goal.abort()
+        else:
+            return False
+        return True

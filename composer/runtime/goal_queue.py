@@ -1,0 +1,81 @@
+"""Which of an action's accepted goals run: the four rules of `concurrency:`."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.specs import Concurrency
+
+
+class GoalQueue:
+    """Starts the goals of one action.
+
+    Args:
+        start: Begins the execution of a goal handle; `finished` is called when it has ended.
+    """
+
+    def __init__(self, concurrency: Concurrency, start: Callable[[Any], None]) -> None:
+        self._concurrency = concurrency
+        self._start = start
+        self._running: dict[bytes, Any] = {}
+        self._waiting: deque[Any] = deque()
+        self._superseded: set[bytes] = set()
+        self._lock = threading.Lock()
+
+    def has_room(self) -> bool:
+        """Return whether another goal may be accepted now."""
+        with self._lock:
+            return self._concurrency != 'reject' or not self._running
+
+    def add(self, goal: Any) -> None:
+        """Run an accepted goal now or later, as the rule says."""
+        superseded: list[Any] = []
+        with self._lock:
+            waits = bool(self._running) and self._concurrency in ('queue', 'preempt')
+            if self._concurrency == 'preempt':
+                self._superseded.update(self._running)
+                superseded = list(self._waiting)
+                self._waiting.clear()
+                self._superseded.update(_key(other) for other in superseded)
+            if waits:
+                self._waiting.append(goal)
+            else:
+                self._running[_key(goal)] = goal
+        for other in superseded:
+            # It never ran: its execution only gives it its final state.
+            self._start(other)
+        if not waits:
+            self._start(goal)
+
+    def is_superseded(self, goal: Any) -> bool:
+        """Return whether a newer goal has taken this one's place."""
+        return _key(goal) in self._superseded
+
+    def take_out(self, goal: Any) -> bool:
+        """Forget a goal that waits; return whether it was waiting."""
+        with self._lock:
+            if goal not in self._waiting:
+                return False
+            self._waiting.remove(goal)
+            return True
+
+    def finished(self, goal: Any) -> None:
+        """Start what waited for this goal."""
+        following = None
+        with self._lock:
+            was_running = self._running.pop(_key(goal), None) is not None
+            self._superseded.discard(_key(goal))
+            if was_running and self._waiting and not self._running:
+                following = self._waiting.popleft()
+                self._running[_key(following)] = following
+        if following is not None:
+            self._start(following)
+
+
+def _key(goal: Any) -> bytes:
+    return bytes(goal.goal_id.uuid)

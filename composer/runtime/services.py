@@ -1,0 +1,69 @@
+"""Services: each request goes to a behaviour, and what it returns is the response."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from composer.interfaces.classes import import_interface
+from composer.python_source import FunctionKind
+from composer.runtime.behaviours import kind_of
+from composer.runtime.executor import NoResponseError
+from composer.runtime.payloads import converter_for
+from composer.runtime.qos import create_qos_profile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.specs import ServiceSpec
+    from composer.runtime.live_node import LiveNode
+
+
+def create_services(node: LiveNode) -> None:
+    """Create the services that the node serves."""
+    for spec in node.spec.services.values():
+        node.ros.create_service(
+            import_interface(spec.type),
+            spec.service,
+            _create_callback(node, spec),
+            qos_profile=create_qos_profile(spec.qos, node.services.profiles),
+            callback_group=node.group(spec.group),
+        )
+
+
+def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
+    service_class: Any = import_interface(spec.type)
+    convert = converter_for(service_class.Response).convert
+    behaviour = node.function(spec.behaviour)
+    function = partial(behaviour, node.face, **spec.behaviour.arguments)
+    owner = f"service '{spec.name}'"
+    full_name = node.ros.resolve_service_name(spec.service)
+    failures = node.services.failures
+
+    def answering(responses: list[Any]) -> Any:
+        """Return the call for one request; its response is appended to `responses`."""
+        call = node.call(owner, spec.path, function, on_error=spec.on_error)
+        return call.delivering(lambda payload: responses.append(convert(payload)))
+
+    def response_of(responses: list[Any]) -> Any:
+        if responses:
+            return responses[0]
+        failures.note(full_name)
+        message = f'{owner} of {spec.name} has no response: its behaviour raised an error'
+        raise NoResponseError(message)
+
+    if kind_of(behaviour) is FunctionKind.COROUTINE:
+
+        async def serve_async(request: Any, _response: Any) -> Any:
+            responses: list[Any] = []
+            await answering(responses).as_callback(FunctionKind.COROUTINE)(request)
+            return response_of(responses)
+
+        return serve_async
+
+    def serve(request: Any, _response: Any) -> Any:
+        responses: list[Any] = []
+        answering(responses).run(request)
+        return response_of(responses)
+
+    return serve
