@@ -67,15 +67,15 @@ class LiveNode:
     """A node with what its entities share.
 
     Attributes:
-        gate: Closed until the node has started, and when it stops.
-        publishers: What publishes a payload, by the publisher's name.
-<<<<<<< HEAD
-        has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
-=======
-        background: A group that no behaviour is in: responses and the like are always taken.
-        serving: The group of requests to action servers; open until the node is destroyed.
-        at_destruction: What ends entities that rclpy's node does not end itself.
->>>>>>> e7a89f03c70a2533182bc8b9df49f034406895cf
+            gate: Closed until the node has started, and when it stops.
+            publishers: What publishes a payload, by the publisher's name.
+    <<<<<<< HEAD
+            has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
+    =======
+            background: A group that no behaviour is in: responses and the like are always taken.
+            serving: The group of requests to action servers; open until the node is destroyed.
+            at_destruction: What ends entities that rclpy's node does not end itself.
+    >>>>>>> e7a89f03c70a2533182bc8b9df49f034406895cf
     """
 
     spec: NodeSpec

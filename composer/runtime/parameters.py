@@ -24,6 +24,8 @@ from composer.runtime.behaviours import kind_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rclpy.node import Node as RosNode
+
     from composer.language.specs import BehaviourSpec, ParameterSpec
     from composer.runtime.live_node import LiveNode
 

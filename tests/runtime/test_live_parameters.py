@@ -116,7 +116,30 @@ def test_all_declared_parameters_are_listed(child, shared_peer):
 
     # The last two are what rclpy gives to every node.
     assert sorted(response.result.names) == sorted(
-        ['text', 'number', 'ratio', 'flag', 'texts', 'numbers', 'ratios', 'flags', 'octets', 'nothing', 'fixed', 'unset', 'group.inner.deep', 'whole', 'speed', 'count', 'positive', 'mode', 'gear', 'serial', 'use_sim_time', 'start_type_description_service']
+        [
+            'text',
+            'number',
+            'ratio',
+            'flag',
+            'texts',
+            'numbers',
+            'ratios',
+            'flags',
+            'octets',
+            'nothing',
+            'fixed',
+            'unset',
+            'group.inner.deep',
+            'whole',
+            'speed',
+            'count',
+            'positive',
+            'mode',
+            'gear',
+            'serial',
+            'use_sim_time',
+            'start_type_description_service',
+        ]
     )
 
 

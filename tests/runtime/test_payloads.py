@@ -318,7 +318,7 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message: object, faul
         (
             Strings,
             {'bounded_string_value': 'x' * 23},
-            'test_msgs/msg/Strings: bounded_string_value: expected string<=22, got text of 23 bytes',  # noqa: E501
+            'test_msgs/msg/Strings: bounded_string_value: expected string<=22, got text of 23 bytes',
             None,
         ),
     ],

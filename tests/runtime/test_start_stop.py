@@ -278,12 +278,15 @@ def test_a_behaviour_that_ends_in_time_is_waited_for(compose):
             timers: {work: {period: 0.02, behaviour: 'parts:work'}}
             on_stop: {behaviour: 'parts:tell', with: {text: stopping}}
     """
-    code = CODE + """
+    code = (
+        CODE
+        + """
 def work(node):
     node.logger.info('begun')
     time.sleep(0.5)
     node.logger.info('done')
 """
+    )
     child = compose(text, code)
     child.wait_for_line('begun')
 
@@ -333,8 +336,7 @@ def test_a_module_that_cannot_be_imported_is_told_with_its_place_before_the_star
 
     assert child.wait() == 1
     assert child.lines == [
-        "system.yaml:4:52: error[broken-behaviour]: importing 'parts' raised "
-        f'{message} ({place})',
+        f"system.yaml:4:52: error[broken-behaviour]: importing 'parts' raised {message} ({place})",
         "  4 |   good: {timers: {tick: {period: 0.01, behaviour: 'parts:tell'}}}",
         '    |                                                   ^^^^^^^^^^',
         '',
