@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from textwrap import dedent
@@ -15,6 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 DEADLINE_SEC = 40.0
+PATIENCE_SEC = 8.0
 
 # Domains of DDS whose ports lie below the range that Linux gives to outgoing connections.
 _FIRST_DOMAIN, _DOMAINS = 10, 91
@@ -110,9 +112,12 @@ class Child:
         self.send(number)
         return self.wait()
 
-    def kill(self):
-        self._process.kill()
-        self._process.wait()
+    def end(self):
+        """End it as a user does, if need be by force, which leaves shared memory behind."""
+        for number in (signal.SIGINT, signal.SIGKILL):
+            self._process.send_signal(number)
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(PATIENCE_SEC)
         self._reader.join()
         self._process.stdout.close()
 
@@ -156,9 +161,9 @@ class Composing:
         """Run `composer up` on a file of this text, with behaviours of the module `parts`."""
         return self.run(self.write(text, code).name, *arguments)
 
-    def kill(self):
+    def end(self):
         for child in self._children:
-            child.kill()
+            child.end()
 
 
 class Peer:
@@ -232,7 +237,7 @@ def compose(tmp_path, domain_id):
     """Run systems in child processes, which are gone when the test ends."""
     composing = Composing(tmp_path, domain_id)
     yield composing
-    composing.kill()
+    composing.end()
 
 
 @pytest.fixture
@@ -248,7 +253,7 @@ def shared_compose(tmp_path_factory):
     """Run systems that all tests of a module look at."""
     composing = Composing(tmp_path_factory.mktemp('shared'), allocate_domain())
     yield composing
-    composing.kill()
+    composing.end()
 
 
 @pytest.fixture(scope='module')

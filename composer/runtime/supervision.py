@@ -90,7 +90,9 @@ def _format_traceback(error: BaseException) -> str:
     """Return the traceback without Composer's own frames at its beginning."""
     own = f'{__name__.partition(".")[0]}.'
     trace = error.__traceback__
-    while trace and trace.tb_next and trace.tb_frame.f_globals.get('__name__', '').startswith(own):
+    while (
+        trace and trace.tb_next and str(trace.tb_frame.f_globals.get('__name__')).startswith(own)
+    ):
         trace = trace.tb_next
     return ''.join(traceback.format_exception(type(error), error, trace)).rstrip()
 

@@ -338,7 +338,7 @@ def test_a_module_that_cannot_be_imported_is_told_with_its_place_before_the_star
     assert child.lines == [
         f"system.yaml:4:52: error[broken-behaviour]: importing 'parts' raised {message} ({place})",
         "  4 |   good: {timers: {tick: {period: 0.01, behaviour: 'parts:tell'}}}",
-        '    |                                                   ^^^^^^^^^^',
+        '    |                                                    ^^^^^^^^^^',
         '',
     ]
 

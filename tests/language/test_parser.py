@@ -1,0 +1,245 @@
+"""Data → specs: each short form means a long one, and defaults are inherited."""
+
+import pytest
+
+from composer.language import load_system, load_system_text
+from composer.language.specs import BehaviourSpec, ParameterSpec, QosSpec
+
+
+def load(text):
+    """Return the spec of a text in which nothing is wrong."""
+    loaded = load_system_text('version: 1\n' + text)
+    assert loaded.diagnostics == ()
+    return loaded.spec
+
+
+def load_node(text, rest=''):
+    return load(f'{rest}\nnodes: {{rover: {text}}}').nodes['rover']
+
+
+def test_a_system_has_the_name_of_its_file(tmp_path):
+    path = tmp_path / 'fleet.of.rovers.yaml'
+    path.write_text('version: 1\nnodes: {}\n')
+    assert load_system(path).spec.name == 'fleet.of.rovers'
+
+
+def test_a_system_without_anything_has_the_defaults():
+    spec = load('nodes: {}')
+    assert (spec.description, dict(spec.qos), dict(spec.nodes)) == ('', {}, {})
+    assert (spec.threads, spec.shutdown_timeout_sec) == (8, 5.0)
+
+
+def test_the_executor_is_as_declared():
+    spec = load('nodes: {}\nexecutor: {threads: 2, shutdown_timeout: 1}')
+    assert (spec.threads, spec.shutdown_timeout_sec) == (2, 1.0)
+    assert isinstance(spec.shutdown_timeout_sec, float)
+
+
+def test_an_empty_node_has_the_defaults():
+    node = load_node('{}')
+    assert node.namespace == '/'
+    assert node.description == ''
+    assert node.log_level is None
+    assert node.use_sim_time is False
+    assert node.on_error == 'log'
+    assert node.remap == ()
+    assert node.on_start is node.on_stop is node.on_parameters is None
+    for entries in (
+        node.parameters, node.state, node.publishers, node.subscriptions, node.timers
+    ):  # fmt: skip
+        assert dict(entries) == {}
+    assert node.path == ('nodes', 'rover')
+
+
+def test_nodes_inherit_what_they_do_not_say():
+    spec = load(
+        'defaults: {namespace: fleet, log_level: warn, use_sim_time: true, on_error: restart, qos: 3}\n'
+        'nodes:\n'
+        '  heir: {publishers: {a: std_msgs/msg/String}}\n'
+        '  own:\n'
+        '    namespace: /elsewhere\n'
+        '    log_level: debug\n'
+        '    use_sim_time: false\n'
+        '    on_error: shutdown\n'
+        '    publishers: {a: {type: std_msgs/msg/String, qos: 4}}\n'
+    )
+    heir, own = spec.nodes['heir'], spec.nodes['own']
+    assert (heir.namespace, heir.log_level, heir.use_sim_time, heir.on_error) == (
+        '/fleet', 'warn', True, 'restart'
+    )  # fmt: skip
+    assert (own.namespace, own.log_level, own.use_sim_time, own.on_error) == (
+        '/elsewhere', 'debug', False, 'shutdown'
+    )  # fmt: skip
+    assert heir.publishers['a'].qos == QosSpec('default', {'depth': 3}, ('defaults', 'qos'))
+    assert own.publishers['a'].qos.policies == {'depth': 4}
+
+
+@pytest.mark.parametrize(
+    ('default', 'own', 'full'),
+    [
+        ('', None, '/'),
+        ('/', None, '/'),
+        ('fleet', None, '/fleet'),
+        ('/fleet', None, '/fleet'),
+        ('fleet', 'first', '/fleet/first'),
+        ('/fleet', 'a/b', '/fleet/a/b'),
+        ('/', 'first', '/first'),
+        ('fleet', '/first', '/first'),
+        ('fleet', '/', '/'),
+        ('fleet', '', '/fleet'),
+    ],
+)
+def test_a_relative_namespace_lies_in_the_default_one(default, own, full):
+    text = '{}' if own is None else f'{{namespace: "{own}"}}'
+    assert load_node(text, f'defaults: {{namespace: "{default}"}}').namespace == full
+
+
+def test_entities_inherit_how_errors_are_met():
+    node = load_node(
+        '{on_error: restart,'
+        ' timers: {a: {period: 1, behaviour: m:f}, b: {period: 1, behaviour: m:f, on_error: log}},'
+        ' subscriptions: {a: {type: p/msg/T, behaviour: m:f},'
+        ' b: {type: p/msg/T, behaviour: m:f, on_error: shutdown}}}'
+    )
+    assert [timer.on_error for timer in node.timers.values()] == ['restart', 'log']
+    assert [sub.on_error for sub in node.subscriptions.values()] == ['restart', 'shutdown']
+
+
+def test_a_publisher_may_be_its_type_alone():
+    node = load_node(
+        '{publishers: {scan: p/msg/T, own: {type: p/msg/T, topic: /x, qos: sensor_data}}}'
+    )
+    short, long = node.publishers.values()
+    assert (short.name, short.type, short.topic) == ('scan', 'p/msg/T', 'scan')
+    assert short.qos == QosSpec('default', {}, ())
+    assert short.path == ('nodes', 'rover', 'publishers', 'scan')
+    assert (long.name, long.type, long.topic) == ('own', 'p/msg/T', '/x')
+    assert long.qos == QosSpec('sensor_data', {}, (*long.path, 'qos'))
+
+
+@pytest.mark.parametrize(
+    ('text', 'profile', 'policies'),
+    [
+        ('10', 'default', {'depth': 10}),
+        ('10.0', 'default', {'depth': 10}),
+        ('sensor_data', 'sensor_data', {}),
+        ('{depth: 3}', 'default', {'depth': 3}),
+        (
+            '{profile: fast, reliability: reliable, deadline: infinite, lifespan: 0.5}',
+            'fast',
+            {'reliability': 'reliable', 'deadline': 'infinite', 'lifespan': 0.5},
+        ),
+    ],
+)
+def test_qos_has_three_forms(text, profile, policies):
+    qos = load_node(f'{{publishers: {{a: {{type: p/msg/T, qos: {text}}}}}}}').publishers['a'].qos
+    assert (qos.profile, qos.policies) == (profile, policies)
+    assert all(type(value) is not float for key, value in policies.items() if key == 'depth')
+
+
+def test_named_qos_profiles_are_kept_by_name():
+    spec = load('nodes: {}\nqos: {fast: {profile: sensor_data, depth: 1}}')
+    assert spec.qos['fast'] == QosSpec('sensor_data', {'depth': 1}, ('qos', 'fast'))
+
+
+def test_a_subscription_has_all_that_is_declared():
+    relay, full = load_node(
+        '{subscriptions: {relay: {type: p/msg/T, publish: out},'
+        ' full: {type: p/msg/T, topic: ~/x, qos: 1, behaviour: a.b:c, with: {d: 1}, publish: out,'
+        ' group: reentrant}}}'
+    ).subscriptions.values()
+    assert (relay.topic, relay.behaviour, relay.publish, relay.group) == (
+        'relay',
+        None,
+        'out',
+        None,
+    )
+    assert (full.topic, full.publish, full.group) == ('~/x', 'out', 'reentrant')
+    assert full.behaviour == BehaviourSpec('a.b', 'c', {'d': 1}, (*full.path, 'behaviour'))
+    assert full.behaviour.name == 'a.b:c'
+
+
+def test_a_timer_has_a_period_or_a_rate():
+    node = load_node('{timers: {a: {period: 2, behaviour: m:f}, b: {rate: 4, behaviour: m:f}}}')
+    assert [timer.period_sec for timer in node.timers.values()] == [2.0, 0.25]
+    assert [timer.clock for timer in node.timers.values()] == ['ros', 'ros']
+    assert [timer.group for timer in node.timers.values()] == [None, None]
+
+
+def test_a_timer_may_publish_a_constant():
+    timer = load_node(
+        '{timers: {a: {period: 1, publish: out, message: {data: 1}, clock: steady, group: g}}}'
+    ).timers['a']
+    assert timer.behaviour is None
+    assert (timer.publish, timer.message, timer.clock, timer.group) == (
+        'out', {'data': 1}, 'steady', 'g'
+    )  # fmt: skip
+
+
+def test_a_hook_has_two_forms():
+    node = load_node('{on_start: m:f, on_stop: {behaviour: m:g, with: {a: [1]}}}')
+    assert node.on_start == BehaviourSpec('m', 'f', {}, ('nodes', 'rover', 'on_start'))
+    path = ('nodes', 'rover', 'on_stop', 'behaviour')
+    assert node.on_stop == BehaviourSpec('m', 'g', {'a': [1]}, path)
+
+
+def test_a_parameter_may_be_its_value_alone():
+    path = ('nodes', 'rover', 'parameters', 'speed')
+    assert load_node('{parameters: {speed: 3}}').parameters['speed'] == ParameterSpec(
+        'speed', 'integer', 3, '', read_only=False,
+        minimum=None, maximum=None, step=None, choices=None, path=path,
+    )  # fmt: skip
+
+
+def test_a_parameter_has_all_that_is_declared():
+    path = ('nodes', 'rover', 'parameters', 'speed')
+    node = load_node(
+        '{parameters: {speed: {default: 1, type: double, description: fast, read_only: true,'
+        ' minimum: 0, maximum: 2.5, step: 0.5, choices: [1, 2]}}}'
+    )
+    parameter = node.parameters['speed']
+    assert parameter == ParameterSpec(
+        'speed', 'double', 1.0, 'fast', read_only=True,
+        minimum=0, maximum=2.5, step=0.5, choices=(1.0, 2.0), path=path,
+    )  # fmt: skip
+    assert [type(value) for value in (parameter.value, *parameter.choices)] == [float] * 3
+
+
+@pytest.mark.parametrize(
+    ('text', 'type_name', 'value'),
+    [
+        ('true', 'bool', True),
+        ('1', 'integer', 1),
+        ('1.0', 'double', 1.0),
+        ('one', 'string', 'one'),
+        ('yes', 'string', 'yes'),
+        ('[true]', 'bool_array', [True]),
+        ('[1, 2]', 'integer_array', [1, 2]),
+        ('[1, 2.5]', 'double_array', [1.0, 2.5]),
+        ('[a]', 'string_array', ['a']),
+        ('{type: double_array}', 'double_array', None),
+        ('{default: [1], type: double_array}', 'double_array', [1.0]),
+        ('{default: [], type: string_array}', 'string_array', []),
+        ('{default: 1, type: double}', 'double', 1.0),
+        ('[]', None, []),
+        ('[1, a]', None, [1, 'a']),
+    ],
+)
+def test_the_type_of_a_parameter_is_told_by_its_value(text, type_name, value):
+    parameter = load_node(f'{{parameters: {{a: {text}}}}}').parameters['a']
+    assert parameter.type == type_name
+    assert repr(parameter.value) == repr(value)
+
+
+def test_remapping_rules_keep_their_order():
+    assert load_node('{remap: {b: c, a: ~/d}}').remap == (('b', 'c'), ('a', '~/d'))
+
+
+def test_specs_cannot_be_changed():
+    node = load_node('{state: {a: 1}, publishers: {a: p/msg/T}}')
+    with pytest.raises(TypeError):
+        node.publishers['b'] = None
+    with pytest.raises(TypeError):
+        node.state['a'] = 2
+    with pytest.raises(AttributeError):
+        node.namespace = '/other'
