@@ -19,6 +19,7 @@ from composer.errors import (
     ParametersRefusedError,
     ServiceFailedError,
     ServiceNotAvailableError,
+    SystemStoppingError,
 )
 from composer.runtime.node import Node
 
@@ -34,6 +35,7 @@ __all__ = [
     'ParametersRefusedError',
     'ServiceFailedError',
     'ServiceNotAvailableError',
+    'SystemStoppingError',
     'check',
     'load',
     'up',

@@ -137,7 +137,8 @@ def up_command(
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
     for argument in arguments:
-        if argument.startswith('--'):
+        # A minus before a digit or a dot belongs to a number.
+        if re.match(r'-[^\W\d]|--', argument):
             raise click.NoSuchOption(argument, ctx=context)
     return up(file, arguments, context.obj, log_levels)
 

@@ -38,6 +38,10 @@ class StartError(ComposerError):
     """The system could not be brought up; all of it has been torn down again."""
 
 
+class SystemStoppingError(ComposerError):
+    """The system stops: what a behaviour waits for is not waited for any more."""
+
+
 class CallError(ComposerError):
     """A service call has no response."""
 

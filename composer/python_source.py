@@ -275,14 +275,22 @@ def _locate(part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
     portions: list[Path] = []
     for folder in folders:
         package = folder / part
-        if (package / '__init__.py').is_file():
+        if _is_there(package / '__init__.py'):
             return package / '__init__.py', [package]
         for suffix in ('.py', *EXTENSION_SUFFIXES):
-            if (module := folder / f'{part}{suffix}').is_file():
+            if _is_there(module := folder / f'{part}{suffix}'):
                 return module, []
-        if package.is_dir():
+        if _is_there(package, is_folder=True):
             portions.append(package)
     return None, portions
+
+
+def _is_there(path: Path, *, is_folder: bool = False) -> bool:
+    try:
+        return path.is_dir() if is_folder else path.is_file()
+    except OSError:
+        # The name is too long, or the folder may not be searched.
+        return False
 
 
 def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:

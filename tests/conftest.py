@@ -232,6 +232,27 @@ def domain_id(monkeypatch):
     return domain
 
 
+@pytest.fixture(scope='session')
+def built_interfaces(tmp_path_factory):
+    """Return a cache folder that has the packages of the shipped systems."""
+    folder = tmp_path_factory.mktemp('cache')
+    for name in ('self_contained', 'fibonacci_client'):
+        subprocess.run(
+            [sys.executable, '-m', 'composer', 'interfaces', 'build', f'configs/{name}.yaml'],
+            cwd=ROOT,
+            env=os.environ | {'XDG_CACHE_HOME': str(folder)},
+            check=True,
+        )
+    return folder
+
+
+@pytest.fixture
+def interface_cache(built_interfaces, monkeypatch):
+    """Let child processes find the packages of the shipped systems built."""
+    monkeypatch.setenv('XDG_CACHE_HOME', str(built_interfaces))
+    return built_interfaces
+
+
 @pytest.fixture
 def compose(tmp_path, domain_id):
     """Run systems in child processes, which are gone when the test ends."""

@@ -41,18 +41,28 @@ def create_context(
     """
     if system.spec is None:
         return None, []
-    catalogue, findings = describe_declared(system, installed)
+    catalogue, unreadable, findings = describe_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.path))
-    return CheckContext(system, system.spec, catalogue, modules), findings
+    return CheckContext(system, system.spec, catalogue, modules, unreadable), findings
 
 
 def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
     """Return all that is wrong with a system, by its place in the file."""
     context, declared = create_context(system, catalogue)
     found = [finding for rule in RULES for finding in rule(context)] if context else []
+    found = [finding for finding in found if not _hangs_on_samples(finding, system)]
     # What several entries share through an alias is wrong once.
     once = dict.fromkeys([*system.diagnostics, *declared, *found])
     return sorted(once, key=lambda finding: finding.sort_key)
+
+
+def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:
+    """Return whether a finding is about a value that is not the real one."""
+    place = finding.span
+    return place is not None and any(
+        span.line == place.line and span.column <= place.column < span.column + span.length
+        for span in system.sampled
+    )
 
 
 def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:

@@ -17,12 +17,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """A system and what there is to hold it against."""
+    """A system and what there is to hold it against.
+
+    Attributes:
+        unreadable: The interface packages of the file that something was wrong with; it has been
+            reported, and nothing is known of their types.
+    """
 
     system: LoadedSystem
     spec: SystemSpec
     catalogue: InterfaceCatalogue
     modules: ModuleFinder
+    unreadable: frozenset[str] = frozenset()
 
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing only because its own fault was reported already."""

@@ -104,7 +104,8 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
             package, kind, _ = entity.type.split('/')
-            unreadable = context.was_dropped(('interfaces', package))
+            dropped = context.was_dropped(('interfaces', package))
+            unreadable = dropped or package in context.unreadable
             if unreadable or entity.type in catalogue.names(cast('InterfaceKind', kind), package):
                 continue
             path = (*entity.path, 'type')

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.declared import provide_declared
+from composer.interfaces.declared import describe_declared, provide_declared
 from composer.interfaces.descriptions import (
     ActionDescription,
     InterfaceDescription,
@@ -17,7 +18,8 @@ from composer.interfaces.descriptions import (
 )
 from composer.interfaces.documentation import describe_interface
 from composer.language import load_system
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
+from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,8 +37,12 @@ class UnknownInterfaceError(ComposerError):
 def build(path: Path) -> int:
     """Build the packages that a file declares, if they are not installed or built already."""
     system = load_system(path)
-    if system.spec is None:
-        raise ComposerError(system.diagnostics[0].message)
+    _, _, findings = describe_declared(system, InterfaceCatalogue())
+    findings = [*system.diagnostics, *findings]
+    for finding in findings:
+        click.echo(render_finding(finding) + '\n', err=True)
+    if has_errors(findings):
+        return ExitCode.FAILED
     packages = provide_declared(system, lambda line: click.echo(line, err=True))
     for package in packages:
         click.echo(f'{package}: ready')
@@ -65,14 +71,30 @@ def show(name: str) -> int:
     """
     description = describe_interface(name, default_prefixes())
     if description is None:
-        catalogue = InterfaceCatalogue()
-        names = [known for kind in _KINDS for known in catalogue.names(kind)]
         message = f"no installed package has an interface '{name}'"
-        near = did_you_mean(name, names)
-        raise UnknownInterfaceError(message, help=near or 'composer interfaces list shows all')
+        raise UnknownInterfaceError(message, help=_advise(name))
     for line in _render(description):
         click.echo(line)
     return ExitCode.DONE
+
+
+def _advise(name: str) -> str:
+    """Return where to look for an interface that is not there."""
+    catalogue = InterfaceCatalogue()
+    package, _, rest = name.partition('/')
+    if package not in catalogue.packages():
+        names = [known for kind in _KINDS for known in catalogue.names(kind)]
+        near = suggest(name, names)
+        return f"did you mean '{near}'?" if near else 'composer interfaces list shows all'
+    listing = f'composer interfaces list {package}'
+    if not rest:
+        return f"'{package}' is a package: {listing} shows what it has"
+    names = [known for kind in _KINDS for known in catalogue.names(kind, package)]
+    by_last_part = {known.rpartition('/')[2]: known for known in names}
+    last_part = suggest(rest.rpartition('/')[2], by_last_part)
+    if last_part is None:
+        return f'{listing} shows what it has'
+    return f"did you mean '{by_last_part[last_part]}'?"
 
 
 def _render(description: InterfaceDescription) -> Iterator[str]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from composer.diagnostics import Diagnostic
     from composer.language import LoadedSystem
 
 
@@ -26,39 +27,60 @@ def declared_folders(system: LoadedSystem) -> dict[str, Path]:
 
 def describe_declared(
     system: LoadedSystem, installed: InterfaceCatalogue
-) -> tuple[InterfaceCatalogue, list[Diagnostic]]:
-    """Return what describes the types of a system, and what is wrong with those it declares."""
+) -> tuple[InterfaceCatalogue, frozenset[str], list[Diagnostic]]:
+    """Read the packages that a file declares.
+
+    Returns:
+        What describes the types of the system, the packages of which nothing is known because
+        something is wrong with them, and what that is.
+    """
     folders = declared_folders(system)
     if not folders:
-        return installed, []
+        return installed, frozenset(), []
     catalogue = InterfaceCatalogue()
-    missing = [
+    absent = {package: folder for package, folder in folders.items() if not _is_folder(folder)}
+    findings = [
         diagnostic_at(
             system.positions.value(('interfaces', package)),
             'unknown-interfaces',
             f"there is no folder '{folder}' with the definitions of '{package}'",
         )
-        for package, folder in folders.items()
-        if not folder.is_dir()
+        for package, folder in absent.items()
     ]
-    present = {package: folder for package, folder in folders.items() if folder.is_dir()}
-    if not present or not catalogue.available:
-        return catalogue, missing
+    present = {package: folder for package, folder in folders.items() if package not in absent}
+    if present and catalogue.available:
+        faults = _describe_folders(present, catalogue, system)
+        absent |= present if faults else {}
+        findings += faults
+    return catalogue, frozenset(absent), findings
+
+
+def _describe_folders(
+    folders: Mapping[str, Path], catalogue: InterfaceCatalogue, system: LoadedSystem
+) -> list[Diagnostic]:
+    """Add what folders define to a catalogue; return what is wrong with it instead, if it is."""
     # The parser of definitions is slow to import, and most files declare no packages.
     from composer.interfaces.packages import DefinitionsError, load_packages
 
     try:
-        packages = load_packages(present)
+        packages = load_packages(folders)
     except DefinitionsError as error:
-        return catalogue, [*missing, *error.diagnostics]
+        return list(error.diagnostics)
     except ComposerError as error:
         span = system.positions.key(('interfaces',))
-        fault = diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)
-        return catalogue, [*missing, fault]
+        return [diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)]
     for package in packages:
         for description in package.interfaces.values():
             catalogue.add(description)
-    return catalogue, missing
+    return []
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:
+        # The path is too long, or leads through what may not be searched.
+        return False
 
 
 def provide_declared(system: LoadedSystem, progress: Callable[[str], None]) -> Sequence[str]:

@@ -17,13 +17,15 @@ from composer.language.arguments import (
     parse_arguments,
     read_arguments,
 )
+from composer.language.filling import FilledDocument
 from composer.language.parser import parse_system
-from composer.language.schema import check_structure
+from composer.language.schema import check_structure, is_sound
 from composer.language.source import Document, parse_document, read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
+    from composer.diagnostics import Span
     from composer.language.positions import DataPath, SourceMap
     from composer.language.specs import SystemSpec
 
@@ -37,6 +39,8 @@ class LoadedSystem:
         spec: The system without the parts that were wrong; `None` if nothing could be read.
         dropped: The paths of the data that were left out of `spec` for that.
         arguments: What the file takes from the command line.
+        sampled: Where values stand that hang on samples of arguments: what is said of these
+            need not hold for the real ones.
     """
 
     path: Path
@@ -45,6 +49,7 @@ class LoadedSystem:
     dropped: frozenset[DataPath]
     diagnostics: tuple[Diagnostic, ...]
     arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
+    sampled: tuple[Span, ...] = ()
 
 
 def load_system(path: Path, words: Sequence[str] | None = None) -> LoadedSystem:
@@ -72,38 +77,60 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
     if document.data is None:
         return LoadedSystem(path, None, positions, frozenset(), document.diagnostics)
     declared = read_arguments(document.data)
-    findings = [*document.diagnostics, *_check_arguments(declared, positions)]
-    if words is None:
-        values = {name: argument.sample for name, argument in declared.items()}
-    else:
-        values = parse_arguments(declared, words)
-    data, failed = _fill(document.data, values, positions, findings)
-    data, dropped, faults = check_structure(data, positions, failed)
-    spec = parse_system(data, path.stem)
-    return LoadedSystem(path, spec, positions, dropped, (*findings, *faults), declared)
+    faults = _check_arguments(declared, positions)
+    sound = not faults and is_sound({'args': document.data.get('args', {})})
+    # Words are not held against declarations that are wrong: those have to be mended first.
+    values, samples = _give_values(declared, words if sound else None)
+    filled = _fill(document.data, values, positions, samples if sound else values)
+    data, dropped, structure_faults = check_structure(
+        filled.data, positions, filled.failed, filled.sampled
+    )
+    return LoadedSystem(
+        path,
+        parse_system(data, path.stem),
+        positions,
+        dropped,
+        (*document.diagnostics, *faults, *filled.faults, *structure_faults),
+        declared,
+        tuple(filled.sampled_spans),
+    )
+
+
+def _give_values(
+    declared: Mapping[str, ArgumentSpec], words: Sequence[str] | None
+) -> tuple[dict[str, Any], Collection[str]]:
+    """Return the value of each argument, and the names of those whose value is a sample."""
+    if words is not None:
+        return parse_arguments(declared, words), ()
+    values = {name: argument.sample for name, argument in declared.items()}
+    return values, [name for name, argument in declared.items() if argument.is_open]
 
 
 def _fill(
     data: dict[str, Any],
     values: Mapping[str, Any],
     positions: SourceMap,
-    findings: list[Diagnostic],
-) -> tuple[dict[str, Any], Sequence[DataPath]]:
+    samples: Collection[str],
+) -> FilledDocument:
     if not any('{{' in line for line in positions.source.lines):
-        return data, ()
+        return FilledDocument(data)
     # jinja2 takes a tenth of a check's time to import, and most files have no templates.
     from composer.language.templates import fill_templates
 
-    filled, faults, failed = fill_templates(data, values, positions)
-    findings += faults
-    return filled, failed
+    declarations = {key: data[key] for key in ('args',) if key in data}
+    system = {key: value for key, value in data.items() if key not in declarations}
+    filled = fill_templates(system, values, positions, samples)
+    filled.data |= declarations
+    return filled
 
 
 def _check_arguments(
     declared: Mapping[str, ArgumentSpec], positions: SourceMap
 ) -> list[Diagnostic]:
-    return [
-        diagnostic_at(positions.value(('args', name)), 'bad-argument-declaration', fault)
-        for name, argument in declared.items()
-        for fault in find_argument_faults(argument)
-    ]
+    found = []
+    for name, argument in declared.items():
+        for key, fault in find_argument_faults(argument):
+            path = ('args', name, *key)
+            span = positions.value(path) if key else positions.key(path)
+            found.append(diagnostic_at(span, 'bad-argument-declaration', fault))
+    return found

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 _SEPARATOR = ':='
 # What a file is checked with where a required argument has no value.
 _SAMPLES: dict[str, Any] = {'bool': True, 'integer': 1, 'double': 1.0, 'string': 'sample'}
+ARGUMENT_TYPES = tuple(_SAMPLES)
+# What an expression reads as a word of its own.
+_RESERVED = frozenset(
+    ('and', 'else', 'if', 'in', 'is', 'not', 'or', 'self', 'true', 'false', 'none')
+) | {'True', 'False', 'None'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +44,11 @@ class ArgumentSpec:
     choices: tuple[Any, ...] = ()
 
     @property
+    def is_open(self) -> bool:
+        """Whether nothing in the file says what the value may be."""
+        return self.default is None and not self.choices
+
+    @property
     def sample(self) -> Any:
         """A value to check the file with when none is given."""
         if self.default is not None:
@@ -49,8 +59,8 @@ class ArgumentSpec:
         """Return name, type, default and choices in one line."""
         text = f'{self.name} ({self.type}'
         if self.choices:
-            text += f', one of {", ".join(map(str, self.choices))}'
-        text += ', required)' if self.default is None else f', default {self.default})'
+            text += f', one of {_listed(self.choices)}'
+        text += ', required)' if self.default is None else f', default {_shown(self.default)})'
         return f'{text}: {self.description}' if self.description else text
 
 
@@ -70,9 +80,9 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
     entry = data if isinstance(data, dict) else {'default': data}
     default = entry.get('default')
     type_name = entry.get('type')
-    if type_name not in _SAMPLES:
+    if type_name not in ARGUMENT_TYPES:
         type_name = infer_parameter_type(default)
-    if type_name not in _SAMPLES:
+    if type_name not in ARGUMENT_TYPES:
         type_name = 'string'
     choices = entry.get('choices')
     return ArgumentSpec(
@@ -84,15 +94,29 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
     )
 
 
-def find_argument_faults(argument: ArgumentSpec) -> Iterator[str]:
-    """Yield what is wrong with a declaration: a default or a choice that does not fit."""
-    for value in (argument.default, *argument.choices):
-        fault = None if value is None else find_type_fault(value, argument.type)
-        if fault:
-            yield fault
-    default = argument.default
-    if default is not None and argument.choices and default not in argument.choices:
-        yield f'the default {default!r} is none of the choices'
+def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with a declaration beyond the schema, each with the keys to its place.
+
+    A name that no expression can use, and a default or a choice that does not fit.
+    """
+    if not argument.name.isidentifier() or argument.name in _RESERVED:
+        yield (), f"'{argument.name}' cannot stand in an expression as a name"
+    default, choices = argument.default, argument.choices
+    places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
+    places += [(('choices', index), choice) for index, choice in enumerate(choices)]
+    for keys, value in places:
+        if value is not None and (fault := _find_value_fault(value, argument.type)):
+            yield keys, fault
+    if default is not None and choices and default not in choices:
+        yield ('default',), f'the default {default!r} is none of the choices'
+
+
+def _find_value_fault(value: Any, type_name: str) -> str | None:
+    if isinstance(value, list | dict):
+        return None  # the schema says so
+    if isinstance(value, str) and '{{' in value:
+        return 'a declaration cannot hold an expression'
+    return find_type_fault(value, type_name)
 
 
 def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) -> dict[str, Any]:
@@ -113,7 +137,7 @@ def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) 
             hint = f' ({near})' if near and near.startswith('did') else ''
             faults.append(f"there is no argument '{name}'{hint}")
         elif name in given:
-            faults.append(f"'{name}' is given twice: {given[name]} and {text}")
+            faults.append(f"'{name}' is given twice: {given[name]!r} and {text!r}")
         else:
             given[name] = text
     values = {name: argument.default for name, argument in declared.items()}
@@ -149,16 +173,32 @@ def _assign_words(
 
 
 def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
-    value: Any = text
-    if argument.type != 'string':
-        try:
-            value = convert_parameter_value(parse_plain_scalar(text), argument.type)
-        except ScalarError:
-            value = text
+    value: Any = text if argument.type == 'string' else _parse_text(text, argument.type)
     fault = find_type_fault(value, argument.type)
     if fault:
         faults.append(f"'{argument.name}': {fault}")
     elif argument.choices and value not in argument.choices:
-        options = ', '.join(map(str, argument.choices))
-        faults.append(f"'{argument.name}': {value!r} is none of {options}")
+        faults.append(f"'{argument.name}': {_shown(value)} is none of {_listed(argument.choices)}")
     return value
+
+
+def _parse_text(text: str, type_name: str) -> Any:
+    """Return the value that YAML reads in a text; the text itself if that is nothing."""
+    try:
+        value = parse_plain_scalar(text)
+    except ScalarError:
+        return text
+    return text if value is None else convert_parameter_value(value, type_name)
+
+
+def _listed(values: Sequence[Any]) -> str:
+    return ', '.join(map(_shown, values))
+
+
+def _shown(value: Any) -> str:
+    """Return a value as it is written, in quotes where a reader could miss it."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, str) and (not value or value != value.strip() or not value.isprintable()):
+        return repr(value)
+    return str(value)

@@ -51,12 +51,10 @@ class _Constructor:
         self._keys = positions.keys
         self._values = positions.values
         self._count = 0
+        self._merging = 0
 
     def construct(self, node: TreeNode, path: DataPath) -> Any:
-        self._count += 1
-        if self._count > MAX_VALUES:
-            entry = self._keys.get(path[:1], node.span)
-            self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
+        self._count_one(node, path)
         self._values[path] = node.span
         if isinstance(node, ScalarNode):
             return self._scalar(node)
@@ -68,6 +66,12 @@ class _Constructor:
         if isinstance(node, SequenceNode):
             return [self.construct(item, (*path, index)) for index, item in enumerate(node.items)]
         return self._mapping(node, path)
+
+    def _count_one(self, node: TreeNode, path: DataPath) -> None:
+        self._count += 1
+        if self._count > MAX_VALUES:
+            entry = self._keys.get(path[:1], node.span)
+            self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
 
     def _scalar(self, node: ScalarNode) -> Any:
         try:
@@ -130,8 +134,12 @@ class _Constructor:
 
     def _merge(self, node: TreeNode, data: dict[str, Any], path: DataPath) -> None:
         """Add what `node` has and `data` lacks; earlier mappings of a list win over later ones."""
+        self._merging += 1
+        if self._merging > MAX_DEPTH:
+            self._stop(node.span, 'too-deep', f'merges nest more than {MAX_DEPTH} levels deep')
         parts = node.items if isinstance(node, SequenceNode) else [node]
         for part in parts:
+            self._count_one(part, path)
             if not isinstance(part, MappingNode):
                 self._fault(
                     part, 'bad-merge', 'the merge key << takes a mapping, or a list of them'
@@ -143,6 +151,7 @@ class _Constructor:
                 if not known:
                     merged.pairs.append((key_node, value_node))
             data.update(self._mapping(merged, path))
+        self._merging -= 1
 
     def _fault(self, node: TreeNode, rule: str, message: str, help: str | None = None) -> None:  # noqa: A002
         self.faults.append(diagnostic_at(node.span, rule, message, help=help))

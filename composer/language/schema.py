@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from importlib import resources
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 SCHEMA_NAME = 'composer.schema.json'
 
+# What editors accept in place of a number, a word and the like. Here, the values are in place.
+_TEMPLATE = {'$ref': '#/$defs/template'}
+
 # What a file without these keys is read on with, once their absence has been reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
 
@@ -36,7 +40,10 @@ def schema_path() -> Path:
 
 
 def check_structure(
-    data: dict[str, Any], positions: SourceMap, failed: Sequence[DataPath] = ()
+    data: dict[str, Any],
+    positions: SourceMap,
+    failed: Sequence[DataPath] = (),
+    sampled: Sequence[DataPath] = (),
 ) -> tuple[dict[str, Any], frozenset[DataPath], list[Diagnostic]]:
     """Hold data against the schema.
 
@@ -45,11 +52,14 @@ def check_structure(
 
     Args:
         failed: The paths of expressions that could not be evaluated; they are left out.
+        sampled: The paths of values that only stand for others; what is wrong with them is left
+            out as well, and not reported.
 
     Returns:
         The data without what was wrong, the paths that were dropped for it, and the findings.
     """
     findings: list[Diagnostic] = []
+    failed = [_entry_of(path) for path in failed]
     dropped: set[DataPath] = set(failed)
     for path in failed:
         data = _without(data, path)
@@ -63,7 +73,9 @@ def check_structure(
     findings += [
         fault.diagnostic(positions)
         for fault in _find_faults(data)
-        if fault.rule != 'missing-key' or fault.path not in incomplete
+        if not (
+            fault.path in sampled or (fault.rule == 'missing-key' and fault.path in incomplete)
+        )
     ]
     while faults := _find_faults(data):
         paths = {fault.drop for fault in faults if fault.drop}
@@ -72,6 +84,27 @@ def check_structure(
         data = _REQUIRED | data
         dropped |= paths
     return data, frozenset(dropped), findings
+
+
+def is_sound(part: dict[str, Any]) -> bool:
+    """Return whether the schema finds nothing wrong with some top-level keys alone."""
+    return not _find_faults(_REQUIRED | part)
+
+
+def without_templates(schema: Any) -> Any:
+    """Return a schema without the alternatives that accept expressions.
+
+    An alternative that is left alone takes the place of its `anyOf`.
+    """
+    if isinstance(schema, list):
+        return [without_templates(item) for item in schema if item != _TEMPLATE]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {key: without_templates(value) for key, value in schema.items()}
+    if _TEMPLATE in schema.get('anyOf', ()) and len(plain['anyOf']) == 1:
+        (only,) = plain.pop('anyOf')
+        plain |= only
+    return plain
 
 
 def _find_faults(data: dict[str, Any]) -> list[StructureFault]:
@@ -102,6 +135,11 @@ def _with_key_renamed(data: Any, path: DataPath, key: str) -> Any:
     return data | {head: _with_key_renamed(data[head], tuple(rest), key)}
 
 
+def _entry_of(path: DataPath) -> DataPath:
+    """Return the path of the mapping entry that holds a value; items of lists cannot go alone."""
+    return tuple(takewhile(lambda key: isinstance(key, str), path))
+
+
 def _without(data: Any, path: DataPath) -> Any:
     """Return a copy of nested mappings without the entry at `path`, if it is there."""
     head, *rest = path
@@ -116,7 +154,7 @@ def _without(data: Any, path: DataPath) -> Any:
 def _validator() -> Any:
     schema = json.loads(schema_path().read_text(encoding='utf-8'))
     strict = extend(Draft202012Validator, {'maximum': _check_maximum})
-    return strict(schema)
+    return strict(without_templates(schema))
 
 
 def _check_maximum(

@@ -9,106 +9,205 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import StrictUndefined, TemplateError, UndefinedError
+from jinja2 import (
+    StrictUndefined,
+    TemplateError,
+    TemplateRuntimeError,
+    TemplateSyntaxError,
+    UndefinedError,
+    meta,
+)
 from jinja2.exceptions import SecurityError
-from jinja2.sandbox import SandboxedEnvironment
 
-from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
+from composer.language.filling import FilledDocument
+from composer.language.sandbox import Sandbox
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from composer.language.positions import DataPath, SourceMap
 
 _OPEN = '{{'
-_WHOLE = re.compile(r'\s*\{\{((?:(?!\{\{|\}\}).)*)\}\}\s*', re.DOTALL)
+_CLOSE = '}}'
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
+# Beyond this no number is even a double; much longer ones Python will not print.
+_MAX_BITS = 1024
 
 
 def fill_templates(
-    data: Any, values: Mapping[str, Any], positions: SourceMap
-) -> tuple[Any, list[Diagnostic], list[DataPath]]:
+    data: dict[str, Any],
+    values: Mapping[str, Any],
+    positions: SourceMap,
+    samples: Collection[str] = (),
+) -> FilledDocument:
     """Evaluate all expressions of a document.
 
     Args:
         values: What is in scope, by name.
-
-    Returns:
-        The data with the values in place, the findings, and the paths of the scalars that could
-        not be evaluated.
+        samples: The names whose values only stand for others of their type.
     """
-    filler = _Filler(values, positions)
-    return filler.fill(data, ()), filler.faults, filler.failed
+    filler = _Filler(values, positions, frozenset(samples))
+    filler.filled.data = filler.fill_mapping(data, ())
+    return filler.filled
 
 
 class _Filler:
-    def __init__(self, values: Mapping[str, Any], positions: SourceMap) -> None:
-        self.faults: list[Diagnostic] = []
-        self.failed: list[DataPath] = []
+    def __init__(
+        self, values: Mapping[str, Any], positions: SourceMap, samples: frozenset[str]
+    ) -> None:
+        self.filled = FilledDocument({})
         self._values = values
         self._positions = positions
-        # Statements have no place in a scalar: their delimiters cannot be written in YAML.
-        self._environment = SandboxedEnvironment(
-            undefined=StrictUndefined,
-            finalize=_as_text,
-            block_start_string='\0{%',
-            block_end_string='%\0}',
-            comment_start_string='\0{#',
-            comment_end_string='#\0}',
-            keep_trailing_newline=True,
-        )
+        self._samples = samples
+        self._sandbox = Sandbox(undefined=StrictUndefined)
 
     def fill(self, data: Any, path: DataPath) -> Any:
         if isinstance(data, dict):
-            return {
-                self._fill_key(key, path): self.fill(value, (*path, key))
-                for key, value in data.items()
-            }
+            return self.fill_mapping(data, path)
         if isinstance(data, list):
             return [self.fill(item, (*path, index)) for index, item in enumerate(data)]
         if isinstance(data, str) and _OPEN in data:
             return self._evaluate(data, path)
         return data
 
-    def _fill_key(self, key: str, path: DataPath) -> str:
-        if _OPEN not in key:
-            return key
-        filled = str(self._evaluate(key, (*path, key)))
-        self._positions.move((*path, key), (*path, filled))
+    def fill_mapping(self, data: dict[str, Any], path: DataPath) -> dict[str, Any]:
+        filled: dict[str, Any] = {}
+        for written, value in data.items():
+            key = written
+            if _OPEN in written:
+                value_path = (*path, written)
+                key = str(_as_text(self._evaluate(written, value_path, is_key=True)))
+            if key != written and (key in data or key in filled):
+                self._report_duplicate(key, (*path, written), (*path, key))
+                continue
+            if key != written:
+                self._positions.move((*path, written), (*path, key))
+            filled[key] = self.fill(value, (*path, key))
         return filled
 
-    def _evaluate(self, text: str, path: DataPath) -> Any:
-        whole = _WHOLE.fullmatch(text)
+    def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
+        span = self._positions.key(path) if is_key else self._positions.value(path)
+        sampled = False
         try:
-            if whole:
-                expression = self._environment.compile_expression(
-                    whole.group(1), undefined_to_none=False
-                )
-                value = expression(**self._values)
-                # A strict undefined raises when it is looked at, not when it is returned.
-                return str(value) if isinstance(value, StrictUndefined) else value
-            return self._environment.from_string(text).render(**self._values)
+            expressions = list(_find_expressions(text, self._sandbox))
+            sampled = self._hangs_on_samples(text, expressions)
+            if sampled:
+                self.filled.sampled_spans.append(span)
+                self.filled.sampled += [] if is_key else [path]
+            return self._compute(text, expressions)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
-            self._report(error, path)
+            self.filled.failed.append(path)
+            # With the real value it may succeed.
+            if not sampled or isinstance(error, UndefinedError):
+                self.filled.faults.append(self._explain(error, span))
             return text
 
-    def _report(self, error: Exception, path: DataPath) -> None:
-        self.failed.append(path)
-        span = self._positions.value(path)
-        message = str(error) or type(error).__name__
-        help_text = None
-        name = ''
-        if isinstance(error, UndefinedError) and (found := _UNDEFINED_NAME.search(message)):
+    def _compute(self, text: str, expressions: list[slice]) -> Any:
+        first, last = expressions[0], expressions[-1]
+        outside = text[: first.start], text[last.stop :]
+        if first is last and not ''.join(outside).strip():
+            return self._value_of(text, first)
+        parts = []
+        start = 0
+        for expression in expressions:
+            parts.append(text[start : expression.start])
+            parts.append(str(_as_text(self._value_of(text, expression))))
+            start = expression.stop
+        return ''.join([*parts, text[start:]])
+
+    def _value_of(self, text: str, expression: slice) -> Any:
+        code = _code(text, expression)
+        compiled = self._sandbox.compile_expression(code, undefined_to_none=False)
+        return _as_data(compiled(self._values))
+
+    def _hangs_on_samples(self, text: str, expressions: list[slice]) -> bool:
+        return bool(self._samples) and any(
+            self._samples & meta.find_undeclared_variables(self._sandbox.parse(text[expression]))
+            for expression in expressions
+        )
+
+    def _explain(self, error: Exception, span: Span) -> Diagnostic:
+        if isinstance(error, UndefinedError) and (
+            found := _UNDEFINED_NAME.fullmatch(str(error.message))
+        ):
             name = found.group(1)
-            message = f"'{name}' is not defined"
-            help_text = did_you_mean(name, self._values, 'in scope are') or 'declare it: args:'
-        elif isinstance(error, SecurityError):
-            message = f'the sandbox refuses the expression: {message}'
-        elif not isinstance(error, TemplateError):
-            message = f'the expression raised {type(error).__name__}: {message}'
-        rule = 'undefined-name' if name else 'bad-expression'
-        self.faults.append(diagnostic_at(span.narrowed_to(name), rule, message, help=help_text))
+            help_text = did_you_mean(name, self._values, 'in scope are')
+            return diagnostic_at(
+                _locate(name, span),
+                'undefined-name',
+                f"'{name}' is not defined",
+                help=help_text or "declare it as an argument, under 'args'",
+            )
+        return diagnostic_at(span, 'bad-expression', _describe(error))
+
+    def _report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
+        self.filled.faults.append(
+            diagnostic_at(
+                self._positions.key(path),
+                'duplicate-key',
+                f"the key '{key}' stands twice in one mapping",
+                related=[Related('it stands here too', self._positions.key(other))],
+            )
+        )
+
+
+def _find_expressions(text: str, sandbox: Sandbox) -> Iterator[slice]:
+    """Yield where each `{{ … }}` is, braces included; the first that has no end raises."""
+    start = text.find(_OPEN)
+    while start >= 0:
+        stop = start + len(_OPEN) + sandbox.measure(text[start + len(_OPEN) :]) + len(_CLOSE)
+        yield slice(start, stop)
+        start = text.find(_OPEN, stop)
+
+
+def _code(text: str, expression: slice) -> str:
+    return text[expression.start + len(_OPEN) : expression.stop - len(_CLOSE)]
+
+
+def _locate(name: str, span: Span) -> Span:
+    """Return where a name stands in an expression of a scalar, which may go over several lines."""
+    pattern = re.compile(rf'\{{\{{(?:(?!\}}\}}).)*?(?<![\w.])({re.escape(name)})(?!\w)')
+    if _OPEN in span.text:
+        found = pattern.search(span.text)
+        start = span.column + found.start(1) if found else 0
+        return Span(span.source, span.line, start, len(name)) if found else span
+    for number, line in enumerate(span.source.lines[span.line - 1 :], start=span.line):
+        if found := pattern.search(line):
+            return Span(span.source, number, found.start(1) + 1, len(name))
+    return span
+
+
+def _describe(error: Exception) -> str:
+    """Return what went wrong in one line."""
+    if isinstance(error, SecurityError):
+        return f'the sandbox refuses the expression: {error.message}'
+    if isinstance(error, TemplateSyntaxError):
+        return str(error.message).replace("'end of template'", 'end of the expression')
+    message = str(error) or type(error).__name__
+    if isinstance(error, TemplateError):
+        return message
+    return f'the expression raised {type(error).__name__}: {message}'
+
+
+def _as_data(value: Any) -> Any:
+    """Return a value as YAML could hold it; what it cannot hold raises."""
+    if isinstance(value, StrictUndefined):
+        str(value)  # raises what is undefined
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, int) and value.bit_length() > _MAX_BITS:
+        message = f'a number of {value.bit_length()} bits fits no type of ROS'
+        raise TemplateRuntimeError(message)
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    if isinstance(value, list | tuple | range):
+        return [_as_data(item) for item in value]
+    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
+        return {str(key): _as_data(item) for key, item in value.items()}
+    message = f'the expression gives a {type(value).__name__}, which YAML has no place for'
+    raise TemplateRuntimeError(message)
 
 
 def _as_text(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import threading
 import time
 from collections import deque
 from functools import partial
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient as RosActionClient
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.qos import QoSProfile
 
 from composer.errors import (
     ActionNotAvailableError,
@@ -20,11 +23,12 @@ from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
 from composer.runtime.payloads import converter_for
-from composer.runtime.waiting import poll_in_thread, wait_in_thread
+from composer.runtime.waiting import stopping_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
     from composer.language.specs import ActionClientSpec, BehaviourSpec
@@ -40,6 +44,11 @@ _STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: 'canceled',
     GoalStatus.STATUS_ABORTED: 'aborted',
 }
+
+# What a wait for feedback gets when a stop is requested.
+_STOPPED = object()
+# The middleware's default of 10 loses what comes faster than it is taken.
+_QOS = QoSProfile(depth=1000)
 
 
 def create_action_clients(node: LiveNode) -> None:
@@ -59,9 +68,7 @@ class ActionClient:
         self._node = node
         self._name = spec.action
         self._convert = converter_for(action_class.Goal).convert
-        self._client = RosActionClient(
-            node.ros, action_class, spec.action, callback_group=node.background
-        )
+        self._client = _Client(node.ros, action_class, spec.action)
         self._feedback = _Hearing(node, f'{owner} (feedback)', spec.feedback)
         self._result = _Hearing(node, f'{owner} (result)', spec.result)
         self.destroy = self._client.destroy
@@ -74,17 +81,18 @@ class ActionClient:
             ActionNotAvailableError: No server appeared in time.
             GoalTimeoutError: The server did not answer in time.
             GoalRejectedError: It refused the goal.
+            SystemStoppingError: A stop was requested while it waited.
         """
         message = self._convert(payload)
         begun = time.monotonic()
-        waiting = self._node.services.waiting
-        if not poll_in_thread(self._client.server_is_ready, timeout_sec, waiting):
+        waits = self._node.waits
+        if not waits.until_true(self._client.server_is_ready, timeout_sec):
             text = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
             raise ActionNotAvailableError(text)
         goal = Goal(self._name, self._node)
         future = self._client.send_goal_async(message, partial(self._take_feedback, goal))
         left = None if timeout_sec is None else max(begun + timeout_sec - time.monotonic(), 0.0)
-        if not wait_in_thread(future, left, waiting):
+        if not waits.until_done(future, left):
             text = f"the server of '{self._name}' did not answer within {timeout_sec:g} s"
             raise GoalTimeoutError(text)
         handle = future.result()
@@ -105,6 +113,64 @@ class ActionClient:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
                 self._node.face.logger.warning(f"the goal of '{self._name}' was {goal.status}")
             self._result.put(response.result)
+
+
+class _Client(RosActionClient):
+    """A client whose goals hear all their feedback in order, and before their result.
+
+    The stock one may take an answer before it has noted the request, and then drops it.
+    """
+
+    def __init__(self, ros: RosNode, action_class: Any, name: str) -> None:
+        self._noting = threading.RLock()
+        super().__init__(
+            ros,
+            action_class,
+            name,
+            # Never beside itself, and never in a group of behaviours, which wait for it.
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            goal_service_qos_profile=_QOS,
+            result_service_qos_profile=_QOS,
+            cancel_service_qos_profile=_QOS,
+            feedback_sub_qos_profile=_QOS,
+        )
+
+    def add_future(self, future: Future) -> None:
+        """Let whoever waits be woken at once, and not by the executor: see the base class."""
+
+    def remove_future(self, future: Future) -> None:
+        """See the base class."""
+
+    def send_goal_async(self, *arguments: Any) -> Future:
+        """See the base class."""
+        with self._noting:
+            return super().send_goal_async(*arguments)
+
+    def _cancel_goal_async(self, goal_handle: Any) -> Future:
+        with self._noting:
+            return super()._cancel_goal_async(goal_handle)
+
+    def _get_result_async(self, goal_handle: Any) -> Future:
+        with self._noting:
+            return super()._get_result_async(goal_handle)
+
+    def take_data(self) -> dict[str, Any]:
+        """See the base class."""
+        with self._noting:
+            data: dict[str, Any] = super().take_data()
+        if 'result' in data:
+            take = partial(
+                self._client_handle.take_feedback, self._action_type.Impl.FeedbackMessage
+            )
+            data['last'] = [data.pop('feedback', None), *iter(take, None)]
+        return data
+
+    async def execute(self, taken_data: dict[str, Any]) -> None:
+        """See the base class."""
+        for message in taken_data.pop('last', ()):
+            if message is not None:
+                await super().execute({'feedback': message})
+        await super().execute(taken_data)
 
 
 class Goal:
@@ -135,11 +201,22 @@ class Goal:
 
     @property
     def feedback(self) -> Iterator[Any]:
-        """The feedback messages as they come, until the goal has ended; each comes once."""
-        with self._node.services.waiting():
-            while (message := self.heard.get()) is not None:
-                yield message
+        """The feedback messages as they come, until the goal has ended; each comes once.
+
+        Raises:
+            SystemStoppingError: A stop was requested while it waited for the next one.
+        """
+        while (message := self._next_feedback()) is not None:
+            yield message
         self.heard.put(None)
+
+    def _next_feedback(self) -> Any:
+        waits = self._node.waits
+        with waits.stop.waking(lambda: self.heard.put(_STOPPED)), waits.make_room():
+            message = self.heard.get()
+        if message is _STOPPED:
+            raise stopping_error()
+        return message
 
     def cancel(self, timeout: float | None = 5.0) -> bool:
         """Ask the server to cancel the goal; return whether it agreed.
@@ -148,7 +225,7 @@ class Goal:
             GoalTimeoutError: It did not answer within `timeout` seconds.
         """
         future = self._handle.cancel_goal_async()
-        if not wait_in_thread(future, timeout, self._node.services.waiting):
+        if not self._node.waits.until_done(future, timeout):
             message = f"the server of '{self._name}' did not answer the request to cancel"
             raise GoalTimeoutError(message)
         return bool(future.result().goals_canceling)
@@ -158,15 +235,17 @@ class Goal:
 
         Raises:
             GoalTimeoutError: It did not end within `timeout` seconds.
+            SystemStoppingError: A stop was requested while it waited.
         """
-        if not wait_in_thread(self.result_future, timeout, self._node.services.waiting):
+        if not self._node.waits.until_done(self.result_future, timeout):
             message = f"the goal of '{self._name}' did not end within {timeout:g} s"
             raise GoalTimeoutError(message)
         return self.result_future.result().result
 
     async def result_async(self) -> Any:
         """As `result`, without holding a thread while it waits."""
-        return (await self.result_future).result
+        await self._node.coroutine_waits.until_done(self.result_future, None)
+        return self.result_future.result().result
 
 
 class _Hearing:

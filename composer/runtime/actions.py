@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 import threading
 import time
+from contextlib import aclosing, closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import RCLError
+from rclpy.qos import QoSProfile
 
 from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
-from composer.runtime.calls import RunningCall
-from composer.runtime.goal_queue import GoalQueue
+from composer.runtime.goal_queue import GoalQueue, goal_key
 from composer.runtime.payloads import converter_for
 
 if TYPE_CHECKING:
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 _POLL_SEC = 0.005
 # A cancel request takes effect right after its callback; this only bounds a fault of the server.
 _CANCEL_SEC = 5.0
+# The middleware's default of 10 loses requests when more goals come at once.
+_SERVICE_QOS = QoSProfile(depth=1000)
 
 
 def create_actions(node: LiveNode) -> None:
@@ -42,12 +47,14 @@ class _Server(ActionServer):
     """
 
     def __init__(self, node: LiveNode, spec: ActionSpec) -> None:
-        self._queue = GoalQueue(spec.concurrency, lambda goal: goal.execute())
+        self._queue = GoalQueue(spec.concurrency, _start)
         self._execution = _Execution(node, spec, self._queue)
         self._live = node
         self._owner = f"action '{spec.name}'"
         self._place = node.place(spec.path)
         self._accept = node.function(spec.accept) if spec.accept else None
+        self._arguments = spec.accept.arguments if spec.accept else {}
+        self._tokens: dict[bytes, int] = {}
         super().__init__(
             node.ros,
             import_interface(spec.type),
@@ -55,9 +62,21 @@ class _Server(ActionServer):
             execute_callback=self._execution.callback,
             callback_group=node.serving,
             goal_callback=self._decide,
-            handle_accepted_callback=self._queue.add,
+            handle_accepted_callback=self._add,
             cancel_callback=self._cancel,
+            goal_service_qos_profile=_SERVICE_QOS,
+            result_service_qos_profile=_SERVICE_QOS,
+            cancel_service_qos_profile=_SERVICE_QOS,
         )
+
+    def add_future(self, future: Any) -> None:
+        """Let results be sent by whom they come from: see the base class.
+
+        The executor, which sends them otherwise, may have been stopped by then.
+        """
+
+    def remove_future(self, future: Any) -> None:
+        """See the base class."""
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
         """See the base class."""
@@ -73,27 +92,34 @@ class _Server(ActionServer):
         try:
             await self._execute_goal(callback, goal)
         finally:
-            self._queue.finished(goal)
+            self._end(goal)
 
     def _execute_in_thread(self, callback: Any, goal: Any) -> None:
-        ledger = self._live.ledger
-        token = ledger.begin(RunningCall(self._owner, threading.get_ident()))
         try:
             # Nothing in it waits: the callback is a plain function.
             self._execute_goal(callback, goal).send(None)
         except StopIteration:
             pass
         finally:
-            self._queue.finished(goal)
-            ledger.end(token)
+            self._end(goal)
 
-    def _decide(self, goal: Any) -> GoalResponse:
-        if not self._live.gate.is_open or not self._queue.has_room():
+    def _add(self, goal: Any) -> None:
+        # The node has not ended before the results of all its goals are sent.
+        self._tokens[goal_key(goal)] = self._live.ledger.begin(None)
+        self._queue.add(goal)
+
+    def _end(self, goal: Any) -> None:
+        self._live.ledger.end(self._tokens.pop(goal_key(goal)))
+
+    async def _decide(self, goal: Any) -> GoalResponse:
+        if self._execution.is_ending() or not self._queue.has_room():
             return GoalResponse.REJECT
         if self._accept is None:
             return GoalResponse.ACCEPT
         try:
-            answer = self._accept(self._live.face, goal)
+            answer = self._accept(self._live.face, goal, **self._arguments)
+            if inspect.isawaitable(answer):
+                answer = await answer
         except BaseException as error:  # noqa: BLE001 - a behaviour never takes the server down
             self._live.errors.report(f'{self._owner} (accept)', self._place, error)
             return GoalResponse.REJECT
@@ -113,6 +139,14 @@ class _Server(ActionServer):
         deadline = time.monotonic() + _CANCEL_SEC
         while not goal.is_cancel_requested and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
+        _start(goal)
+
+
+def _start(goal: Any) -> None:
+    try:
+        goal.execute()
+    except RCLError:
+        # A request to cancel it came in just now; the second time, that is seen.
         goal.execute()
 
 
@@ -138,22 +172,30 @@ class _Execution:
 
     def _execute(self, goal: Any) -> Any:
         results: list[Any] = []
-        if not self._end_early(goal):
-            drive = self._drive if self._kind is FunctionKind.GENERATOR else self._call
-            call = self._call_of(partial(drive, goal), results)
-            if not call.run():
-                goal.abort()
-        return results[0] if results else self._result_class()
+        try:
+            if not self._end_early(goal):
+                drive = self._drive if self._kind is FunctionKind.GENERATOR else self._call
+                self._call_of(partial(drive, goal), results).run()
+            return self._result_of(goal, results)
+        finally:
+            self._queue.finished(goal)
 
     async def _execute_async(self, goal: Any) -> Any:
         results: list[Any] = []
-        if not self._end_early(goal):
-            is_generator = self._kind is FunctionKind.ASYNC_GENERATOR
-            drive = self._drive_async if is_generator else self._call_async
-            call = self._call_of(partial(drive, goal), results)
-            await call.as_callback(FunctionKind.COROUTINE)()
-            if goal.is_active:
-                goal.abort()
+        try:
+            if not self._end_early(goal):
+                is_generator = self._kind is FunctionKind.ASYNC_GENERATOR
+                drive = self._drive_async if is_generator else self._call_async
+                call = self._call_of(partial(drive, goal), results)
+                await call.as_callback(FunctionKind.COROUTINE)()
+            return self._result_of(goal, results)
+        finally:
+            self._queue.finished(goal)
+
+    def _result_of(self, goal: Any, results: list[Any]) -> Any:
+        if goal.is_active:
+            # Its behaviour raised.
+            goal.abort()
         return results[0] if results else self._result_class()
 
     def _call_of(self, function: Callable[[], Any], results: list[Any]) -> Any:
@@ -168,32 +210,32 @@ class _Execution:
         return self._succeed(goal, await self._begin(goal.request))
 
     def _drive(self, goal: Any) -> Any:
-        generator = self._begin(goal.request)
-        while True:
-            try:
-                feedback = next(generator)
-            except StopIteration as end:
-                return self._succeed(goal, end.value)
-            if self._must_end(goal):
-                generator.close()
-                self._end_early(goal)
-                return self._result_class()
-            self._publish(goal, feedback)
+        with closing(self._begin(goal.request)) as generator:
+            while True:
+                try:
+                    feedback = next(generator)
+                except StopIteration as end:
+                    return self._succeed(goal, end.value)
+                if self._must_end(goal):
+                    break
+                self._publish(goal, feedback)
+        self._end_early(goal)
+        return self._result_class()
 
     async def _drive_async(self, goal: Any) -> Any:
         # An async generator cannot return a value: what it yields last is the result.
-        last: Any = None
-        generator = self._begin(goal.request)
-        first = True
-        async for item in generator:
-            if self._must_end(goal):
-                await generator.aclose()
-                self._end_early(goal)
-                return self._result_class()
-            if not first:
-                self._publish(goal, last)
-            last, first = item, False
-        return self._succeed(goal, last)
+        held: list[Any] = []
+        async with aclosing(self._begin(goal.request)) as generator:
+            async for item in generator:
+                if self._must_end(goal):
+                    break
+                for feedback in held:
+                    self._publish(goal, feedback)
+                held = [item]
+            else:
+                return self._succeed(goal, held[0] if held else None)
+        self._end_early(goal)
+        return self._result_class()
 
     def _succeed(self, goal: Any, payload: Any) -> Any:
         result = self._to_result(payload)
@@ -205,11 +247,11 @@ class _Execution:
             goal.publish_feedback(self._to_feedback(payload))
 
     def _must_end(self, goal: Any) -> bool:
-        return (
-            goal.is_cancel_requested
-            or not self._node.gate.is_open
-            or self._queue.is_superseded(goal)
-        )
+        return goal.is_cancel_requested or self.is_ending() or self._queue.is_superseded(goal)
+
+    def is_ending(self) -> bool:
+        """Return whether goals are neither accepted nor continued."""
+        return self._node.services.stop.is_set or not self._node.gate.serves
 
     def _end_early(self, goal: Any) -> bool:
         """Give a goal that may not go on its final state; return whether it was such a one."""

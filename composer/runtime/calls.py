@@ -41,12 +41,16 @@ class CallLedger:
     """The behaviours of a node that are running."""
 
     def __init__(self) -> None:
-        self._running: dict[int, RunningCall] = {}
+        self._running: dict[int, RunningCall | None] = {}
         self._tokens = itertools.count()
         self._changed = threading.Condition()
 
-    def begin(self, call: RunningCall) -> int:
-        """Note that a behaviour begins; return what `end` takes."""
+    def begin(self, call: RunningCall | None) -> int:
+        """Note that a behaviour begins; return what `end` takes.
+
+        Args:
+            call: `None` for what is still to be done but has no stack of its own.
+        """
         token = next(self._tokens)
         self._running[token] = call
         return token
@@ -60,7 +64,7 @@ class CallLedger:
 
     def running(self) -> list[RunningCall]:
         """Return the behaviours that run now."""
-        return list(self._running.values())
+        return [call for call in list(self._running.values()) if call is not None]
 
     def wait_until_idle(self, timeout_sec: float) -> bool:
         """Wait until no behaviour runs; return whether that came to be in time."""

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import threading
 import traceback
-from contextlib import contextmanager
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, ShutdownException
+from rclpy.executors import (
+    ConditionReachedException,
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    TimeoutException,
+)
 
 from composer.errors import ComposerError
+from composer.runtime.thread_pool import ThreadPool
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from rclpy.context import Context
@@ -28,35 +35,26 @@ class NoResponseError(ComposerError):
     """Raised by a service's callback that cannot answer: rclpy sends a response otherwise."""
 
 
-class _ElasticExecutor(MultiThreadedExecutor):
-    """The stock executor with a pool that grows while callbacks wait for other callbacks.
+class _PooledExecutor(Executor):
+    """An executor of rclpy that runs what is ready in a pool of threads.
 
-    Its idle threads end with it, and not with a later collection.
+    The stock one keeps a list of all it has ever offered to its pool until each has ended; a
+    coroutine is in it once for every time that it was resumed.
     """
 
-    def __init__(self, num_threads: int, context: Context) -> None:
-        super().__init__(num_threads=num_threads, context=context)
-        self._growth = threading.Lock()
+    def __init__(self, context: Context, pool: ThreadPool) -> None:
+        super().__init__(context=context)
+        self._pool = pool
 
-    @contextmanager
-    def waiting(self) -> Iterator[None]:
-        """Let another thread work while this one waits for something that callbacks bring."""
-        pool = self._executor
-        with self._growth:
-            # Nothing public lets a pool of the standard library grow.
-            pool._max_workers += 1  # noqa: SLF001
-            pool._adjust_thread_count()  # noqa: SLF001
-        try:
-            yield
-        finally:
-            with self._growth:
-                pool._max_workers -= 1  # noqa: SLF001
-
-    def shutdown(self, timeout_sec: float | None = None) -> bool:
+    def spin_once(self, timeout_sec: float | None = None) -> None:
         """See the base class."""
-        ended = bool(super().shutdown(timeout_sec))
-        self._executor.shutdown(wait=ended, cancel_futures=True)
-        return ended
+        self.submit_next(timeout_sec, lambda: False)
+
+    def submit_next(self, timeout_sec: float | None, is_over: Callable[[], bool]) -> None:
+        """Give the pool what is ready next; return without it when `is_over` at a wake-up."""
+        with suppress(TimeoutException, ConditionReachedException):
+            task, _entity, _node = self.wait_for_ready_callbacks(timeout_sec, None, is_over)
+            self._pool.submit(task)
 
 
 class SystemExecutor:
@@ -70,7 +68,8 @@ class SystemExecutor:
     def __init__(self, context: Context, threads: int, report: Callable[[str], None]) -> None:
         self._context = context
         self._report = report
-        self._executor = _ElasticExecutor(max(threads, 2), context)
+        self._pool = ThreadPool(max(threads, 2), self._run)
+        self._executor = _PooledExecutor(context, self._pool)
         self._spinning = False
         self._thread = threading.Thread(target=self._spin, name='composer-executor', daemon=True)
 
@@ -90,7 +89,7 @@ class SystemExecutor:
 
     def waiting(self) -> AbstractContextManager[None]:
         """Return the context in which a callback may wait for other callbacks."""
-        return self._executor.waiting()
+        return self._pool.waiting()
 
     def wake(self) -> None:
         """Look again which callbacks may run: a gate has opened, say."""
@@ -111,15 +110,25 @@ class SystemExecutor:
         if self._thread.is_alive():
             self._executor.wake()
             self._thread.join(_JOIN_TIMEOUT_SEC)
-        return bool(self._executor.shutdown(timeout_sec=timeout_sec))
+        ended = self._pool.shutdown(timeout_sec)
+        self._executor.shutdown()
+        return ended
 
     def _spin(self) -> None:
         while self._spinning and self._context.ok():
             try:
-                self._executor.spin_once(timeout_sec=_LONGEST_WAIT_SEC)
-            except NoResponseError:
-                continue
+                self._executor.submit_next(_LONGEST_WAIT_SEC, lambda: not self._spinning)
             except (ShutdownException, ExternalShutdownException):
                 return
             except Exception:  # noqa: BLE001 - one fault must not end the dispatch of all nodes
                 self._report(traceback.format_exc())
+
+    def _run(self, task: Task) -> None:
+        try:
+            task()
+            if task.done():
+                task.result()
+        except NoResponseError:
+            pass
+        except BaseException:  # noqa: BLE001 - as above
+            self._report(traceback.format_exc())

@@ -41,11 +41,11 @@ class GoalQueue:
                 self._superseded.update(self._running)
                 superseded = list(self._waiting)
                 self._waiting.clear()
-                self._superseded.update(_key(other) for other in superseded)
+                self._superseded.update(goal_key(other) for other in superseded)
             if waits:
                 self._waiting.append(goal)
             else:
-                self._running[_key(goal)] = goal
+                self._running[goal_key(goal)] = goal
         for other in superseded:
             # It never ran: its execution only gives it its final state.
             self._start(other)
@@ -54,7 +54,7 @@ class GoalQueue:
 
     def is_superseded(self, goal: Any) -> bool:
         """Return whether a newer goal has taken this one's place."""
-        return _key(goal) in self._superseded
+        return goal_key(goal) in self._superseded
 
     def take_out(self, goal: Any) -> bool:
         """Forget a goal that waits; return whether it was waiting."""
@@ -68,14 +68,15 @@ class GoalQueue:
         """Start what waited for this goal."""
         following = None
         with self._lock:
-            was_running = self._running.pop(_key(goal), None) is not None
-            self._superseded.discard(_key(goal))
+            was_running = self._running.pop(goal_key(goal), None) is not None
+            self._superseded.discard(goal_key(goal))
             if was_running and self._waiting and not self._running:
                 following = self._waiting.popleft()
-                self._running[_key(following)] = following
+                self._running[goal_key(following)] = following
         if following is not None:
             self._start(following)
 
 
-def _key(goal: Any) -> bytes:
+def goal_key(goal: Any) -> bytes:
+    """Return what tells a goal handle from others; it is not hashable itself."""
     return bytes(goal.goal_id.uuid)

@@ -1,6 +1,7 @@
 """Callback groups with a gate: entities of a closed group are not run, their messages wait.
 
-The gate is closed until a node's `on_start` has returned, and closed again when the system stops.
+The gate is closed until all nodes have started, and closed again when the system stops. Services
+answer for longer, so that an `on_start` or `on_stop` can call those of other nodes.
 An executor asks a group before it takes an event for it, so nothing is lost at a closed gate.
 """
 
@@ -8,16 +9,39 @@ from __future__ import annotations
 
 from typing import Any
 
+from rclpy.action import ActionServer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.service import Service
 
 
 class Gate:
-    """Whether the behaviours of a node may run."""
+    """Whether the behaviours of a node may run.
 
-    __slots__ = ('is_open',)
+    Attributes:
+        is_open: All of them: when all nodes have started, until a stop is requested.
+        serves: Those of services and actions: from the end of the node's own `on_start` until
+            its `on_stop`.
+    """
+
+    __slots__ = ('is_open', 'serves')
 
     def __init__(self) -> None:
         self.is_open = False
+        self.serves = False
+
+    def open(self) -> None:
+        """Let all behaviours run."""
+        self.serves = True
+        self.is_open = True
+
+    def close(self) -> None:
+        """Let no behaviour begin."""
+        self.is_open = False
+        self.serves = False
+
+    def lets(self, entity: Any) -> bool:
+        """Return whether the callback of an entity may begin."""
+        return self.is_open or (self.serves and isinstance(entity, (Service, ActionServer)))
 
 
 class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):
@@ -29,11 +53,11 @@ class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):
 
     def can_execute(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.is_open and bool(super().can_execute(entity))
+        return self._gate.lets(entity) and bool(super().can_execute(entity))
 
     def beginning_execution(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.is_open and bool(super().beginning_execution(entity))
+        return self._gate.lets(entity) and bool(super().beginning_execution(entity))
 
 
 class GatedReentrantGroup(ReentrantCallbackGroup):
@@ -45,8 +69,8 @@ class GatedReentrantGroup(ReentrantCallbackGroup):
 
     def can_execute(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.is_open and bool(super().can_execute(entity))
+        return self._gate.lets(entity) and bool(super().can_execute(entity))
 
     def beginning_execution(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.is_open and bool(super().beginning_execution(entity))
+        return self._gate.lets(entity) and bool(super().beginning_execution(entity))

@@ -8,17 +8,18 @@ from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
+from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
 from composer.runtime.calls import BehaviourCall, CallLedger
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.node import Node, Publish
 from composer.runtime.remote_parameters import RemoteParameters
 from composer.runtime.supervision import ErrorReporter
-from composer.runtime.waiting import CoroutineWaits
+from composer.runtime.waiting import CoroutineWaits, ThreadWaits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
     from composer.runtime.service_clients import ServiceClient
+    from composer.runtime.waiting import StopSignal
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class SystemServices:
         shutdown: Ends the system with an exit code.
         create_task: Runs a function or coroutine function among the callbacks.
         waiting: The context in which a callback may wait for other callbacks.
+        stop: Whether the system is to stop.
         failures: Which services failed lately.
     """
 
@@ -59,6 +62,7 @@ class SystemServices:
     shutdown: Callable[[int], None]
     create_task: Callable[..., Task]
     waiting: Callable[[], AbstractContextManager[None]]
+    stop: StopSignal
     failures: ServiceFailures
 
 
@@ -67,15 +71,13 @@ class LiveNode:
     """A node with what its entities share.
 
     Attributes:
-            gate: Closed until the node has started, and when it stops.
-            publishers: What publishes a payload, by the publisher's name.
-    <<<<<<< HEAD
-            has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
-    =======
-            background: A group that no behaviour is in: responses and the like are always taken.
-            serving: The group of requests to action servers; open until the node is destroyed.
-            at_destruction: What ends entities that rclpy's node does not end itself.
-    >>>>>>> e7a89f03c70a2533182bc8b9df49f034406895cf
+        gate: Closed until the node has started, and when it stops.
+        publishers: What publishes a payload, by the publisher's name.
+        has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
+        waits: How its plain functions wait; `coroutine_waits` is for coroutines.
+        background: A group that no behaviour is in: responses and the like are always taken.
+        serving: The group of requests to action servers.
+        at_destruction: What ends entities that rclpy's node does not end itself.
     """
 
     spec: NodeSpec
@@ -86,12 +88,13 @@ class LiveNode:
     publishers: dict[str, Publish]
     service_clients: dict[str, ServiceClient]
     action_clients: dict[str, ActionClient]
+    waits: ThreadWaits
     coroutine_waits: CoroutineWaits
     background: CallbackGroup
+    gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
-    gate: Gate = field(default_factory=Gate)
     ledger: CallLedger = field(default_factory=CallLedger)
     has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
@@ -127,6 +130,8 @@ class LiveNode:
         place = self.place(path)
 
         def failed(owner: str, error: BaseException) -> None:
+            if isinstance(error, SystemStoppingError):
+                return
             self.errors.report(owner, place, error)
             self.services.act_on_error(self.spec.name, on_error or self.spec.on_error)
 
@@ -135,17 +140,27 @@ class LiveNode:
         )
 
     def hook(
-        self, owner: str, behaviour: BehaviourSpec, failed: Callable[[BaseException], None]
+        self,
+        owner: str,
+        behaviour: BehaviourSpec,
+        failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of `on_start` or `on_stop`, which takes the node's face."""
+        """Return the wrapped call of `on_start` or `on_stop`, which takes the node's face.
+
+        Args:
+            failed: Takes what it raised, after that has been reported.
+        """
         function = partial(self.function(behaviour), **behaviour.arguments)
-        return BehaviourCall(
-            owner,
-            function,
-            self.ledger,
-            deliver=_discard,
-            failed=lambda _owner, error: failed(error),
-        )
+        place = self.place(behaviour.path)
+
+        def report(owner: str, error: BaseException) -> None:
+            if isinstance(error, SystemStoppingError):
+                return
+            self.errors.report(owner, place, error)
+            if failed is not None:
+                failed(error)
+
+        return BehaviourCall(owner, function, self.ledger, deliver=_discard, failed=report)
 
     def place(self, path: DataPath) -> str:
         """Return `file:line` of a place in the file."""
@@ -189,6 +204,8 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
     service_clients: dict[str, ServiceClient] = {}
     action_clients: dict[str, ActionClient] = {}
     background = ReentrantCallbackGroup()
+    gate = Gate()
+    waits = ThreadWaits(services.waiting, services.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
     node = LiveNode(
@@ -200,9 +217,11 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
         publishers=publishers,
         service_clients=service_clients,
         action_clients=action_clients,
-        coroutine_waits=CoroutineWaits(ros, background),
+        waits=waits,
+        coroutine_waits=CoroutineWaits(ros, background, waits),
         background=background,
-        serving=MutuallyExclusiveCallbackGroup(),
+        gate=gate,
+        serving=GatedMutuallyExclusiveGroup(gate),
     )
     node.face.connect(service_clients, action_clients, RemoteParameters(node))
     return node

@@ -14,7 +14,6 @@ from composer.errors import (
     ServiceNotAvailableError,
 )
 from composer.names import expand_namespace, join_names
-from composer.runtime.waiting import poll_in_thread, wait_in_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -78,16 +77,19 @@ class RemoteParameters:
             full_name = join_names(self._node.spec.namespace, node_name)
         client = self._client(kind, join_names(full_name, service))
         begun = time.monotonic()
-        waiting = self._node.services.waiting
-        if not poll_in_thread(client.service_is_ready, timeout_sec, waiting):
+        waits = self._node.waits
+        if not waits.until_true(client.service_is_ready, timeout_sec):
             message = f"no node '{full_name}' with parameter services appeared in time"
             raise ServiceNotAvailableError(message)
         future = client.call_async(request)
         left = None if timeout_sec is None else max(begun + timeout_sec - time.monotonic(), 0.0)
-        if not wait_in_thread(future, left, waiting):
-            client.remove_pending_request(future)
-            message = f"node '{full_name}' did not answer in time"
-            raise CallTimeoutError(message)
+        try:
+            if not waits.until_done(future, left):
+                message = f"node '{full_name}' did not answer in time"
+                raise CallTimeoutError(message)
+        finally:
+            if not future.done():
+                client.remove_pending_request(future)
         return future.result()
 
     def _client(self, kind: Any, service: str) -> Any:

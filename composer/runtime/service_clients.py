@@ -14,7 +14,6 @@ from composer.errors import (
 from composer.interfaces.classes import import_interface
 from composer.runtime.payloads import converter_for
 from composer.runtime.qos import create_qos_profile
-from composer.runtime.waiting import poll_in_thread, wait_in_thread
 
 if TYPE_CHECKING:
     from rclpy.task import Future
@@ -52,15 +51,19 @@ class ServiceClient:
         Raises:
             PayloadError: The payload does not fit the request.
             CallError: There is no response; its subclasses say why.
+            SystemStoppingError: A stop was requested while it waited.
         """
         request = self._convert(payload)
         begun = time.monotonic()
-        waiting = self._node.services.waiting
-        if not poll_in_thread(self._client.service_is_ready, timeout_sec, waiting):
+        waits = self._node.waits
+        if not waits.until_true(self._client.service_is_ready, timeout_sec):
             raise self._not_available(timeout_sec)
         future = self._client.call_async(request)
-        if not wait_in_thread(future, _remaining(timeout_sec, begun), waiting):
-            raise self._no_response(future, begun, timeout_sec)
+        try:
+            if not waits.until_done(future, _remaining(timeout_sec, begun)):
+                raise self._no_response(begun, timeout_sec)
+        finally:
+            self._forget(future)
         return future.result()
 
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
@@ -73,10 +76,9 @@ class ServiceClient:
         future = self._client.call_async(request)
         try:
             if not await waits.until_done(future, _remaining(timeout_sec, begun)):
-                raise self._no_response(future, begun, timeout_sec)
+                raise self._no_response(begun, timeout_sec)
         finally:
-            if not future.done():
-                self._client.remove_pending_request(future)
+            self._forget(future)
         return future.result()
 
     def is_ready(self) -> bool:
@@ -87,8 +89,11 @@ class ServiceClient:
         message = f"no server of '{self._service}' appeared within {timeout_sec:g} s"
         return ServiceNotAvailableError(message, help='is it running, and is that its name?')
 
-    def _no_response(self, future: Future, begun: float, timeout_sec: float | None) -> CallError:
-        self._client.remove_pending_request(future)
+    def _forget(self, future: Future) -> None:
+        if not future.done():
+            self._client.remove_pending_request(future)
+
+    def _no_response(self, begun: float, timeout_sec: float | None) -> CallError:
         if self._node.services.failures.since(self._service, begun):
             message = f"'{self._service}' did not answer: its behaviour raised an error"
             return ServiceFailedError(message, help="the server's log has the traceback")

@@ -19,6 +19,7 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
 
     A node's `on_stop` is called when its behaviours have ended, and after half the time if they
     have not: what must be switched off is switched off even beside a callback that hangs.
+    Services of nodes without an `on_stop` answer until all of them have ended.
 
     Returns:
         Whether all of them ended in time; the stacks of those that did not have been logged.
@@ -37,6 +38,8 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
         thread.start()
     for thread in hooks:
         thread.join(max(deadline - time.monotonic(), 0.0))
+    for node in nodes:
+        node.gate.close()
     ended = [_wait_until_idle(node, deadline) for node in nodes]
     return all(ended) and not any(thread.is_alive() for thread in hooks)
 
@@ -46,8 +49,9 @@ def _run_on_stop(node: LiveNode, timeout_sec: float) -> None:
     if hook is None:
         return
     node.ledger.wait_until_idle(timeout_sec / 2)
-    place = node.place(hook.path)
-    call = node.hook('on_stop', hook, lambda error: node.errors.report('on_stop', place, error))
+    node.gate.serves = False
+    node.waits.allow()
+    call = node.hook('on_stop', hook)
     if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
         done = threading.Event()
         task = node.services.create_task(call.as_callback(FunctionKind.COROUTINE), node.face)

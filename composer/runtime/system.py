@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy.context import Context
@@ -16,6 +18,7 @@ from composer.runtime.live_node import LiveNode, SystemServices, create_live_nod
 from composer.runtime.logs import system_logger
 from composer.runtime.stopping import stop_nodes
 from composer.runtime.supervision import Supervisor
+from composer.runtime.waiting import StopSignal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -45,7 +48,8 @@ class System:
         self._spec = spec
         self._begun = time.monotonic()
         self._exit_code: int = ExitCode.DONE
-        self._stop_requested = threading.Event()
+        self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._stop_signal = StopSignal()
         self._rebuilding = threading.Lock()
         self._nodes: dict[str, LiveNode] = {}
         self._context = Context()
@@ -62,19 +66,27 @@ class System:
             shutdown=self.request_stop,
             create_task=self._executor.create_task,
             waiting=self._executor.waiting,
+            stop=self._stop_signal,
             failures=ServiceFailures(),
         )
 
     @property
     def stop_requested(self) -> bool:
         """Whether somebody wants the system to end."""
-        return self._stop_requested.is_set()
+        return self._stop_signal.is_set
 
     def request_stop(self, code: int = ExitCode.DONE) -> None:
-        """Let `wait` return; the first request that is not 0 decides the exit code."""
+        """Let `wait` return; the first request that is not 0 decides the exit code.
+
+        A signal handler may call it while the main thread is anywhere, so it takes no lock that
+        `wait` holds; a `threading.Event` would.
+        """
         if self._exit_code == ExitCode.DONE:
             self._exit_code = code
-        self._stop_requested.set()
+        self._stop_signal.set()
+        self._wake_ups.put(None)
+        # Coroutines that waited are resumed when the executor looks at them again.
+        self._executor.wake()
 
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
@@ -88,6 +100,8 @@ class System:
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._executor.start()
+            for node in self._nodes.values():
+                node.gate.serves = node.spec.on_start is None
             for node in list(self._nodes.values()):
                 self._run_on_start(node)
         except BaseException:
@@ -95,16 +109,19 @@ class System:
             raise
         if self.stop_requested:
             return
-        for node in self._nodes.values():
-            self._open(node)
         count = len(self._nodes)
         nodes = '1 node' if count == 1 else f'{count} nodes'
         elapsed = time.monotonic() - self._begun
         system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
+        for node in self._nodes.values():
+            self._open(node)
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
-        self._stop_requested.wait()
+        while not self.stop_requested:
+            # A signal that comes right before the wait begins does not interrupt it.
+            with suppress(queue.Empty):
+                self._wake_ups.get(timeout=_LONGEST_DEAF_SEC)
 
     def stop(self) -> tuple[int, bool]:
         """End the system.
@@ -147,12 +164,13 @@ class System:
         while not done.wait(_POLL_SEC) and not self.stop_requested:
             pass
         if failures:
-            node.errors.report('on_start', node.place(hook.path), failures[0])
             message = f"node '{node.spec.name}': on_start raised {failures[0]!r}"
             raise StartError(message) from failures[0]
+        node.gate.serves = not self.stop_requested
+        self._executor.wake()
 
     def _open(self, node: LiveNode) -> None:
-        node.gate.is_open = True
+        node.gate.open()
         for timer in node.timers:
             timer.reset()
         self._executor.wake()
@@ -163,10 +181,10 @@ class System:
             old = self._nodes[name]
             if self.stop_requested:
                 return
-            old.gate.is_open = False
+            old.gate.close()
             if not old.ledger.wait_until_idle(self._spec.shutdown_timeout_sec):
                 system_logger.error(f"node '{name}' is not restarted: one of its behaviours hangs")
-                old.gate.is_open = True
+                old.gate.open()
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
@@ -193,6 +211,7 @@ class System:
 
 
 _POLL_SEC = 0.05
+_LONGEST_DEAF_SEC = 0.5
 
 
 def _init_context(context: Context, ros_arguments: Sequence[str]) -> None:

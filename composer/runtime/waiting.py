@@ -1,16 +1,24 @@
-"""Waiting for futures of rclpy with a deadline, in a thread or in a coroutine."""
+"""Waiting with a deadline, in a thread or in a coroutine; a stop of the system ends every wait.
+
+A wait that began before the stop was requested ends by `SystemStoppingError`, so that the
+behaviour ends too. One that begins later is for what must be switched off, and goes on; but
+nothing except `on_stop` waits for somebody who is not there yet.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 
+from composer.errors import SystemStoppingError
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
     from rclpy.callback_groups import CallbackGroup
@@ -19,38 +27,122 @@ if TYPE_CHECKING:
 _POLL_SEC = 0.01
 
 
-def wait_in_thread(
-    future: Future, timeout_sec: float | None, waiting: Callable[[], AbstractContextManager[None]]
-) -> bool:
-    """Wait until a future is done; return whether it came to be in time.
+class StopSignal:
+    """Whether the system is to stop, for those who wait.
+
+    Attributes:
+        is_set: Whether a stop was requested.
+    """
+
+    def __init__(self) -> None:
+        self.is_set = False
+        self._wakers: dict[Callable[[], None], None] = {}
+
+    def set(self) -> None:
+        """Wake all who wait; a signal handler may call it, so it takes no lock."""
+        self.is_set = True
+        for wake in list(self._wakers):
+            wake()
+
+    @contextmanager
+    def waking(self, wake: Callable[[], None]) -> Iterator[bool]:
+        """Let `wake` be called when a stop is requested.
+
+        Returns:
+            Whether that is yet to come; `wake` is not called for a stop of before.
+        """
+        if self.is_set:
+            yield False
+            return
+        self._wakers[wake] = None
+        if self.is_set:
+            # It came while the line above was on its way.
+            wake()
+        try:
+            yield True
+        finally:
+            del self._wakers[wake]
+
+
+def stopping_error() -> SystemStoppingError:
+    """Return what ends a wait."""
+    return SystemStoppingError('the system stops, and nothing more is waited for')
+
+
+class ThreadWaits:
+    """Waits of behaviours that are plain functions.
 
     Args:
-        timeout_sec: `None` for no end.
-        waiting: The executor's context for callbacks that wait for others.
+        make_room: The executor's context for callbacks that wait for others.
     """
-    done = threading.Event()
-    future.add_done_callback(lambda _future: done.set())
-    if done.is_set():
-        return True
-    with waiting():
-        return done.wait(timeout_sec)
 
+    def __init__(
+        self, make_room: Callable[[], AbstractContextManager[None]], stop: StopSignal
+    ) -> None:
+        self.make_room = make_room
+        self.stop = stop
+        self._is_patient = False
 
-def poll_in_thread(
-    condition: Callable[[], bool],
-    timeout_sec: float | None,
-    waiting: Callable[[], AbstractContextManager[None]],
-) -> bool:
-    """Wait until a condition holds; return whether it came to hold in time."""
-    if condition():
+    def allow(self) -> None:
+        """Let `on_stop` wait for whom it needs."""
+        self._is_patient = True
+
+    def until_done(self, future: Future, timeout_sec: float | None) -> bool:
+        """Wait until a future is done; return whether it came to be in time.
+
+        Args:
+            timeout_sec: `None` for no end.
+
+        Raises:
+            SystemStoppingError: A stop was requested meanwhile.
+        """
+        woken = threading.Event()
+
+        def wake(_future: Future | None = None) -> None:
+            woken.set()
+
+        future.add_done_callback(wake)
+        if future.done():
+            return True
+        with self.stop.waking(wake) as yields, self.make_room():
+            woken.wait(timeout_sec)
+        return self.ended(future, wake, yields=yields)
+
+    def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
+        """Wait until a condition holds; return whether it came to hold in time.
+
+        Raises:
+            SystemStoppingError: A stop was requested, and `on_stop` has not been called yet.
+        """
+        if condition():
+            return True
+        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        with self.make_room():
+            while not condition():
+                if self.gives_up():
+                    raise stopping_error()
+                if deadline is not None and time.monotonic() >= deadline:
+                    return False
+                time.sleep(_POLL_SEC)
         return True
-    deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
-    with waiting():
-        while not condition():
-            if deadline is not None and time.monotonic() >= deadline:
-                return False
-            time.sleep(_POLL_SEC)
-    return True
+
+    def ended(self, future: Future, wake: Callable[..., None], *, yields: bool) -> bool:
+        """Say how a wait has ended, as `until_done` does.
+
+        Args:
+            wake: The future's callback, which is taken back.
+            yields: Whether the wait began before a stop.
+        """
+        if future.done():
+            return True
+        future.remove_done_callback(wake)
+        if yields and self.stop.is_set:
+            raise stopping_error()
+        return False
+
+    def gives_up(self) -> bool:
+        """Return whether nobody is to be waited for who is not there."""
+        return self.stop.is_set and not self._is_patient
 
 
 class CoroutineWaits:
@@ -58,52 +150,57 @@ class CoroutineWaits:
 
     Args:
         group: A group that no behaviour is in, so that its timers always run.
+        threads: The waits of the same node's threads.
     """
 
-    def __init__(self, ros: RosNode, group: CallbackGroup) -> None:
+    def __init__(self, ros: RosNode, group: CallbackGroup, threads: ThreadWaits) -> None:
         self._ros = ros
         self._group = group
+        self._threads = threads
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     async def until_done(self, future: Future, timeout_sec: float | None) -> bool:
-        """Wait until a future is done; return whether it came to be in time."""
-        if timeout_sec is None:
-            await future
-            return True
+        """See `ThreadWaits.until_done`."""
         first: Future = Future()
-        future.add_done_callback(lambda _future: _set_once(first))
-        timer = self._timer(timeout_sec, lambda: _set_once(first))
-        try:
-            await first
-        finally:
-            self._ros.destroy_timer(timer)
-        return bool(future.done())
+
+        def wake(_future: Future | None = None) -> None:
+            if not first.done():
+                first.set_result(None)
+
+        future.add_done_callback(wake)
+        with self._threads.stop.waking(wake) as yields:
+            if timeout_sec is None:
+                await first
+            else:
+                await self._with_timer(timeout_sec, wake, first)
+        return self._threads.ended(future, wake, yields=yields)
 
     async def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
-        """Wait until a condition holds; return whether it came to hold in time."""
+        """See `ThreadWaits.until_true`."""
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         first: Future = Future()
 
         def look() -> None:
-            if condition() or (deadline is not None and time.monotonic() >= deadline):
-                _set_once(first)
+            late = deadline is not None and time.monotonic() >= deadline
+            if (late or condition() or self._threads.gives_up()) and not first.done():
+                first.set_result(None)
 
         look()
-        if first.done():
-            return condition()
-        timer = self._timer(_POLL_SEC, look)
-        try:
-            await first
-        finally:
-            self._ros.destroy_timer(timer)
-        return condition()
+        if not first.done():
+            await self._with_timer(_POLL_SEC, look, first)
+        if condition():
+            return True
+        if self._threads.gives_up():
+            raise stopping_error()
+        return False
 
-    def _timer(self, period_sec: float, callback: Callable[[], None]) -> Any:
-        return self._ros.create_timer(
+    async def _with_timer(
+        self, period_sec: float, callback: Callable[[], Any], awaited: Future
+    ) -> None:
+        timer = self._ros.create_timer(
             period_sec, callback, callback_group=self._group, clock=self._clock
         )
-
-
-def _set_once(future: Future) -> None:
-    if not future.done():
-        future.set_result(None)
+        try:
+            await awaited
+        finally:
+            self._ros.destroy_timer(timer)

@@ -32,8 +32,7 @@ def test_the_schema_is_one():
 def test_the_schema_describes_every_key():
     def keys(schema):
         if isinstance(schema, dict):
-            for name, key in schema.get('properties', {}).items():
-                yield name, key
+            yield from schema.get('properties', {}).items()
             for value in schema.values():
                 yield from keys(value)
         elif isinstance(schema, list):

@@ -162,15 +162,21 @@ def test_an_impossible_alias_is_a_finding(text, line):
 
 
 @pytest.mark.parametrize('merged', [False, True])
-def test_aliases_in_aliases_do_not_explode(merged):
-    lines = ['x0: &x0 {a: 1}']
+@pytest.mark.parametrize('innermost', ['{a: 1}', '{}'])
+def test_aliases_in_aliases_do_not_explode(innermost, merged):
+    lines = [f'x0: &x0 {innermost}']
     for level in range(1, 40):
-        aliases = ', '.join([f'*x{level - 1}'] * 10)
+        aliases = ', '.join([f'*x{level - 1}'] * 100)
         value = f'{{<<: [{aliases}]}}' if merged else f'[{aliases}]'
         lines.append(f'x{level}: &x{level} {value}')
     line = first_line('\n'.join(lines))
     assert line.endswith(': error[alias-bomb]: aliases expand to more than 1,000,000 values')
-    assert int(line.split(':')[1]) in range(5, 9)
+    assert int(line.split(':')[1]) in range(3, 6)
+
+
+def test_merges_do_not_nest_deeper_than_text():
+    lines = ['x0: &x0 {a: 1}', *(f'x{n}: &x{n} {{<<: *x{n - 1}}}' for n in range(1, 2_000))]
+    assert 'error[too-deep]: merges nest more than 100 levels deep' in first_line('\n'.join(lines))
 
 
 def test_aliases_do_not_nest_deeper_than_text():
@@ -418,7 +424,7 @@ snippets = st.sampled_from(
         *'{}[]:,-?*&!|>\'"#%@` \t\n\0\x85\u2028é',
         '<<: ', '*a', '&a ', '!!int ', '---\n', '~', 'null', '.nan', '-.inf', '0x' + 'f' * 300,
         'version', 'nodes: ', 'timers: ', 'publishers: ', 'qos: ', 'behaviour: ', 'with: ', '{}',
-        '[]', '1', '1e999', 'true', '"\\0"', '{a: {a: {a: []}}}', 'message: ', 'publish: ',
+        '[]', '1', '1e999', 'true', '"\\0"', '{a: {a: {a: []}}}', '{{ ', ' }}', 'args: ', 'message: ', 'publish: ',
     ]
 )  # fmt: skip
 
@@ -433,6 +439,19 @@ def test_a_damaged_file_never_raises(text, edits):
         at = position % (len(text) + 1)
         text = text[:at] + insertion + text[at + length :]
     check(text.encode(errors='ignore').decode())
+
+
+@pytest.mark.parametrize('name', ['a' * 300, 'a' * 5000, 'é' * 200])
+def test_endless_names_never_raise(name):
+    rules = {
+        finding.rule
+        for finding in check(
+            f'version: 1\ninterfaces: {{{name}: {name}, b: a/{name}}}\n'
+            f'nodes: {{{name}: {{on_start: "{name}:f", on_stop: "behaviours.{name}:f",'
+            f' publishers: {{{name}: {name}/msg/{name}}}}}}}\n'
+        )
+    }
+    assert 'unknown-behaviour' in rules
 
 
 @settings(max_examples=100, deadline=None)

@@ -1,0 +1,27 @@
+"""What is left of a document when its expressions have been evaluated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic, Span
+    from composer.language.positions import DataPath
+
+
+@dataclass(slots=True)
+class FilledDocument:
+    """A document with the values of its expressions in place.
+
+    Attributes:
+        failed: The paths of the scalars that could not be evaluated.
+        sampled: The paths of the scalars whose values hang on samples, and are not the real ones.
+        sampled_spans: Where these and such keys are written.
+    """
+
+    data: dict[str, Any]
+    faults: list[Diagnostic] = field(default_factory=list)
+    failed: list[DataPath] = field(default_factory=list)
+    sampled: list[DataPath] = field(default_factory=list)
+    sampled_spans: list[Span] = field(default_factory=list)

@@ -1,0 +1,60 @@
+"""The expressions' sandbox: jinja2's own, without what is only for pages of text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jinja2 import TemplateRuntimeError, TemplateSyntaxError
+from jinja2.sandbox import SandboxedEnvironment
+
+# No field or parameter needs more; a larger result is a mistake that would take all memory.
+_MAX_ITEMS = 10_000_000
+_MAX_BITS = 10_000
+
+
+class Sandbox(SandboxedEnvironment):
+    """Evaluates expressions; their globals are `range` alone."""
+
+    intercepted_binops = frozenset(('*', '**'))
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.globals = {'range': self.globals['range']}
+
+    def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
+        """Multiply or raise to a power, unless the result would be enormous."""
+        too_large = _is_power_too_large if operator == '**' else _is_product_too_large
+        if too_large(left, right):
+            message = f"the result of '{operator}' is too large"
+            raise TemplateRuntimeError(message)
+        return super().call_binop(context, operator, left, right)
+
+    def measure(self, text: str) -> int:
+        """Return the length of the expression at the beginning of a text, up to its `}}`.
+
+        Raises:
+            TemplateSyntaxError: It has no end.
+        """
+        # A blank keeps jinja2 from reading a minus as its sign for stripping blanks. It would
+        # count other line breaks as one character less.
+        begin = '{{ '
+        length = -len(begin)
+        for _, kind, value in self.lex(begin + text.replace('\r', ' ')):
+            if kind == 'variable_end':
+                return length + value.index('}}')
+            length += len(value)
+        message = "the expression has no end: '}}' is missing"
+        raise TemplateSyntaxError(message, 1)
+
+
+def _is_power_too_large(base: Any, exponent: Any) -> bool:
+    if not (isinstance(base, int) and isinstance(exponent, int)):
+        return False
+    return base.bit_length() * exponent > _MAX_BITS
+
+
+def _is_product_too_large(left: Any, right: Any) -> bool:
+    for items, times in ((left, right), (right, left)):
+        if isinstance(items, str | list | tuple) and isinstance(times, int):
+            return len(items) * times > _MAX_ITEMS
+    return False

@@ -1,0 +1,133 @@
+"""Plain rclpy servers and clients of the shipped systems, one a process: `foreign_peers.py ROLE`.
+
+A server says `ready` and serves until its standard input closes; a client prints its result as
+JSON and ends. Both have their types from packages that this process provides for itself.
+"""
+
+import json
+import sys
+import threading
+from pathlib import Path
+
+import rclpy
+from rclpy.action import ActionClient, ActionServer, GoalResponse
+from rclpy.parameter import Parameter
+
+from composer.interfaces.packages import provide_packages
+
+DEADLINE_SEC = 40.0
+FOLDER = Path(__file__).resolve().parent.parent / 'interfaces'
+PACKAGES = ('example_interfaces', 'action_tutorials_interfaces')
+
+provide_packages({name: FOLDER / name for name in PACKAGES}, print)
+
+from action_tutorials_interfaces.action import Fibonacci  # noqa: E402
+from example_interfaces.srv import AddTwoInts  # noqa: E402
+from rcl_interfaces.srv import SetParameters  # noqa: E402
+
+
+def finish(future):
+    rclpy.spin_until_future_complete(node, future, timeout_sec=DEADLINE_SEC)
+    if not future.done():
+        sys.exit('nothing came')
+    return future.result()
+
+
+def call(service_class, name, **fields):
+    client = node.create_client(service_class, name)
+    if not client.wait_for_service(DEADLINE_SEC):
+        sys.exit(f'there is no service {name}')
+    return finish(client.call_async(service_class.Request(**fields)))
+
+
+def serve():
+    sys.stdout.write('ready\n')
+    sys.stdout.flush()
+    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    sys.stdin.read()
+
+
+def serve_sums(service):
+    def answer(request, response):
+        response.sum = request.a + request.b
+        if node.has_parameter('operation') and (
+            node.get_parameter('operation').value == 'subtract'
+        ):
+            response.sum = request.a - request.b
+        return response
+
+    node.create_service(AddTwoInts, service, answer)
+    serve()
+
+
+def serve_calculator():
+    node.declare_parameter('operation', 'add')
+    serve_sums('calculate')
+
+
+def serve_fibonacci(answer='accept'):
+    def compute(goal):
+        sequence = [0, 1]
+        for _ in range(1, goal.request.order):
+            sequence.append(sequence[-1] + sequence[-2])
+            goal.publish_feedback(Fibonacci.Feedback(partial_sequence=sequence))
+        goal.succeed()
+        return Fibonacci.Result(sequence=sequence)
+
+    def decide(_goal):
+        return GoalResponse.ACCEPT if answer == 'accept' else GoalResponse.REJECT
+
+    ActionServer(node, Fibonacci, 'fibonacci', compute, goal_callback=decide)
+    serve()
+
+
+def ask_for_sum(service, a, b):
+    return call(AddTwoInts, service, a=int(a), b=int(b)).sum
+
+
+def set_operation(operation):
+    change = Parameter('operation', value=operation).to_parameter_msg()
+    response = call(SetParameters, 'calculator_server/set_parameters', parameters=[change])
+    return response.results[0].successful, response.results[0].reason
+
+
+def send_goal(order, cancel='no'):
+    """Send a goal, cancel it at its first feedback if so wanted."""
+    client = ActionClient(node, Fibonacci, 'fibonacci')
+    if not client.wait_for_server(DEADLINE_SEC):
+        sys.exit('there is no action fibonacci')
+    feedback = []
+
+    def hear(message):
+        feedback.append(list(message.feedback.partial_sequence))
+
+    goal = finish(client.send_goal_async(Fibonacci.Goal(order=int(order)), feedback_callback=hear))
+    accepted = goal.accepted
+    if cancel == 'cancel':
+        while not feedback:
+            rclpy.spin_once(node, timeout_sec=1.0)
+        finish(goal.cancel_goal_async())
+    outcome = finish(goal.get_result_async())
+    return {
+        'accepted': accepted,
+        'feedback': feedback,
+        'status': outcome.status,
+        'sequence': list(outcome.result.sequence),
+    }
+
+
+SERVERS = {
+    'add_two_ints_server': lambda: serve_sums('add_two_ints'),
+    'calculator_server': serve_calculator,
+    'fibonacci_server': serve_fibonacci,
+}
+CLIENTS = {'ask_for_sum': ask_for_sum, 'set_operation': set_operation, 'send_goal': send_goal}
+
+if __name__ == '__main__':
+    role, *arguments = sys.argv[1:]
+    rclpy.init()
+    node = rclpy.create_node('calculator_server' if 'calc' in role else 'foreign_peer')
+    if role in SERVERS:
+        SERVERS[role](*arguments)
+    else:
+        sys.stdout.write(f'result {json.dumps(CLIENTS[role](*arguments))}\n')

@@ -1,0 +1,58 @@
+"""Findings as text: the excerpt shows the fault whatever the line looks like."""
+
+import pytest
+
+from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
+from composer.reports.text import render_finding
+
+
+def excerpt(line, column, length=1):
+    """Return the line as it is shown and the line with the carets, without their margins."""
+    span = Span(SourceFile('a.yaml', (line,)), 1, column, length)
+    _, shown, carets = render_finding(diagnostic_at(span, 'rule', 'message')).splitlines()
+    return shown.removeprefix('  1 | '), carets.removeprefix('    | ')
+
+
+def test_a_finding_without_a_place_names_the_file():
+    assert render_finding(Diagnostic('rule', 'message', 'a.yaml', help='do so')) == (
+        'a.yaml: error[rule]: message\n  help: do so'
+    )
+
+
+def test_an_empty_line_is_not_shown():
+    span = Span(SourceFile('a.yaml', ('', '   ')), 2, 1)
+    assert render_finding(diagnostic_at(span, 'rule', 'message')) == (
+        'a.yaml:2:1: error[rule]: message'
+    )
+
+
+@pytest.mark.parametrize(
+    ('line', 'column', 'length', 'shown', 'carets'),
+    [
+        ('key: value', 6, 5, 'key: value', '     ^^^^^'),
+        ('key: ', 6, 0, 'key: ', '     ^'),
+        ('a:\tb', 4, 1, 'a: b', '   ^'),
+        ('日本: é', 5, 1, '日本: é', '      ^'),
+        ('a: 日本', 4, 2, 'a: 日本', '   ^^^^'),
+        ('e\u0301: x', 5, 1, 'e\u0301: x', '   ^'),
+        ('a: \u202ex', 4, 2, 'a: \ufffdx', '   ^^'),
+    ],
+)
+def test_the_carets_are_below_the_fault(line, column, length, shown, carets):
+    assert excerpt(line, column, length) == (shown, carets)
+
+
+@pytest.mark.parametrize('column', [1, 80, 81, 161, 162, 500, 999, 1000])
+def test_of_a_long_line_the_surroundings_of_the_fault_are_shown(column):
+    line = 'x' * (column - 1) + '!' + 'x' * (1000 - column)
+    shown, carets = excerpt(line, column)
+    assert len(shown) == 160
+    assert shown[carets.index('^')] == '!'
+
+
+def test_what_a_terminal_would_obey_is_escaped():
+    span = Span(SourceFile('a.yaml', ('a',)), 1, 1)
+    finding = diagnostic_at(span, 'rule', 'one\n\x1b[31mtwo', help="write '\x07'")
+    lines = render_finding(finding).splitlines()
+    assert lines[0] == r'a.yaml:1:1: error[rule]: one\n\x1b[31mtwo'
+    assert lines[-1] == r"  help: write '\x07'"

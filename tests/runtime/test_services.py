@@ -1,0 +1,213 @@
+"""Services that systems serve, called by a plain rclpy node."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Empty, SetBool, Trigger
+from test_msgs.srv import BasicTypes
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import threading
+import time
+
+from std_srvs.srv import Trigger
+
+def as_mapping(node, request):
+    return {'success': request.data, 'message': 'said'}
+
+def as_message(node, request):
+    return Trigger.Response(success=True, message='message')
+
+async def as_coroutine(node, request):
+    return {'success': True, 'message': 'async'}
+
+def nothing(node, request):
+    node.logger.info('nothing to say')
+    return {}
+
+def with_constant(node, request, text):
+    return {'success': True, 'message': text}
+
+def wrong_field(node, request):
+    return {'succes': True}
+
+def fail(node, request):
+    raise OSError('no such device')
+
+async def fail_async(node, request):
+    raise OSError('no such device either')
+
+def echo(node, request):
+    return {'int64_value': request.int64_value, 'string_value': request.string_value * 2}
+
+def alone(node, *request):
+    node.state.inside += 1
+    most = node.state.inside
+    time.sleep(0.02)
+    node.state.inside -= 1
+    return {'success': most == 1}
+
+def alone_in_timer(node):
+    alone(node)
+
+barrier = threading.Barrier(2)
+
+def meet(node, request):
+    barrier.wait(timeout=30)
+    return {'success': True}
+"""
+
+SYSTEM = """
+    version: 1
+    nodes:
+      server:
+        namespace: /robot
+        remap: {old_name: /moved/new_name}
+        services:
+          mapping: {type: std_srvs/srv/SetBool, behaviour: 'parts:as_mapping'}
+          message: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
+          coroutine: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_coroutine'}
+          nothing: {type: std_srvs/srv/Empty, behaviour: 'parts:nothing'}
+          constant:
+            type: std_srvs/srv/Trigger
+            behaviour: parts:with_constant
+            with: {text: constant}
+          own: {type: std_srvs/srv/Trigger, service: ~/own, behaviour: 'parts:as_message'}
+          old_name: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
+          top: {type: std_srvs/srv/Trigger, service: /top, behaviour: 'parts:as_message'}
+          echo: {type: test_msgs/srv/BasicTypes, behaviour: 'parts:echo'}
+          wrong_field: {type: std_srvs/srv/Trigger, behaviour: 'parts:wrong_field'}
+          fail: {type: std_srvs/srv/Trigger, behaviour: 'parts:fail'}
+          fail_async: {type: std_srvs/srv/Trigger, behaviour: 'parts:fail_async'}
+          best_effort:
+            type: std_srvs/srv/Trigger
+            behaviour: parts:as_message
+            qos: {reliability: best_effort, depth: 3}
+"""
+
+
+@pytest.fixture(scope='module')
+def child(shared_compose):
+    """Return a running system that serves all of these."""
+    child = shared_compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    return child
+
+
+def test_a_mapping_becomes_the_response(child, shared_peer):
+    yes = shared_peer.call(SetBool, '/robot/mapping', data=True)
+    no = shared_peer.call(SetBool, '/robot/mapping', data=False)
+
+    assert (yes.success, yes.message) == (True, 'said')
+    assert (no.success, no.message) == (False, 'said')
+
+
+@pytest.mark.parametrize('name', ['message', 'coroutine', 'constant'])
+def test_messages_coroutines_and_constants_become_the_response(child, shared_peer, name):
+    response = shared_peer.call(Trigger, f'/robot/{name}')
+
+    assert (response.success, response.message) == (
+        True,
+        {'coroutine': 'async'}.get(name, name),
+    )
+
+
+def test_a_response_without_fields_is_sent(child, shared_peer):
+    assert shared_peer.call(Empty, '/robot/nothing') == Empty.Response()
+    child.wait_for_line('[robot.server]: nothing to say')
+
+
+@pytest.mark.parametrize('name', ['/robot/server/own', '/moved/new_name', '/top'])
+def test_private_remapped_and_absolute_names_are_served(child, shared_peer, name):
+    assert shared_peer.call(Trigger, name).message == 'message'
+
+
+def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
+    client = shared_peer.node.create_client(BasicTypes, '/robot/echo')
+    assert client.wait_for_service(30)
+    futures = [
+        client.call_async(BasicTypes.Request(int64_value=number, string_value=str(number)))
+        for number in range(8)
+    ]
+    wait_for(lambda: all(future.done() for future in futures), 'all responses')
+
+    answers = [(future.result().int64_value, future.result().string_value) for future in futures]
+    assert answers == [(number, str(number) * 2) for number in range(8)]
+    shared_peer.node.destroy_client(client)
+
+
+@pytest.mark.parametrize(
+    ('name', 'summary', 'function'),
+    [
+        ('fail', 'OSError: no such device', 'in fail\n'),
+        ('fail_async', 'OSError: no such device either', 'in fail_async\n'),
+        ('wrong_field', "PayloadError: std_srvs/srv/Trigger_Response has no field 'succes'", ''),
+    ],
+)
+def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
+    child, shared_peer, wait_for, name, summary, function
+):
+    client = shared_peer.node.create_client(Trigger, f'/robot/{name}')
+    assert client.wait_for_service(30)
+    future = client.call_async(Trigger.Request())
+    line = child.wait_for_line(f"service '{name}'")
+    # What is asked later is answered: the former answer would have come before it.
+    assert shared_peer.call(Trigger, '/robot/message').success
+
+    assert line.startswith(f"[ERROR] [robot.server]: service '{name}' (system.yaml:")
+    assert summary in line
+    assert function in child.output
+    assert not future.done()
+    shared_peer.node.destroy_client(client)
+
+
+def test_the_quality_of_service_is_the_declared_one(child, shared_peer):
+    profile = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
+    client = shared_peer.node.create_client(Trigger, '/robot/best_effort', qos_profile=profile)
+    assert client.wait_for_service(30)
+
+    readers = shared_peer.node.get_subscriptions_info_by_topic(
+        'rq/robot/best_effortRequest', no_mangle=True
+    )
+    theirs = [info for info in readers if info.node_name == 'server']
+    assert [info.qos_profile.reliability for info in theirs] == [ReliabilityPolicy.BEST_EFFORT]
+    shared_peer.node.destroy_client(client)
+
+
+def test_a_service_runs_never_beside_the_nodes_other_behaviours(compose, peer):
+    text = """
+        version: 1
+        nodes:
+          server:
+            state: {inside: 0}
+            timers: {tick: {period: 0.005, behaviour: 'parts:alone_in_timer'}}
+            services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:alone'}}
+    """
+    child = compose(text, CODE)
+    child.wait_until_ready()
+
+    assert [peer.call(Trigger, 'ask').success for _ in range(10)] == [True] * 10
+    assert child.stop() == 0
+
+
+def test_requests_of_a_reentrant_service_run_beside_each_other(compose, peer, wait_for):
+    text = """
+        version: 1
+        nodes:
+          server:
+            services:
+              meet: {type: std_srvs/srv/Trigger, behaviour: 'parts:meet', group: reentrant}
+    """
+    child = compose(text, CODE)
+    client = peer.node.create_client(Trigger, 'meet')
+    assert client.wait_for_service(30)
+    futures = [client.call_async(Trigger.Request()) for _ in range(2)]
+    wait_for(lambda: all(future.done() for future in futures), 'both responses')
+
+    assert [future.result().success for future in futures] == [True, True]
+    assert child.stop() == 0

@@ -1,0 +1,235 @@
+"""Each shipped system with services or actions against plain rclpy peers in other processes."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parent.parent
+SUCCEEDED, CANCELED = 4, 5
+WAITING = 'service not available, waiting again...'
+
+
+@pytest.fixture(autouse=True)
+def _built(interface_cache):
+    """Build the packages once, for all tests of the session."""
+
+
+@pytest.fixture
+def up(compose):
+    """Run a shipped system from the project's root."""
+
+    def run(name, *arguments):
+        return compose.run(f'configs/{name}.yaml', *arguments, folder=ROOT)
+
+    return run
+
+
+class Foreigners:
+    """Plain rclpy peers, each in a process of its own."""
+
+    def __init__(self):
+        self._servers = []
+
+    def serve(self, *arguments):
+        server = self._start(arguments, stdin=subprocess.PIPE)
+        self._servers.append(server)
+        lines = iter(server.stdout.readline, '')
+        assert 'ready\n' in lines, f'the foreign peer {arguments} did not start'
+
+    def ask(self, *arguments):
+        """Return the result of a client."""
+        client = self._start(arguments)
+        try:
+            output, _ = client.communicate(timeout=60)
+        finally:
+            client.kill()
+        assert client.returncode == 0, output
+        (result,) = (line for line in output.splitlines() if line.startswith('result '))
+        return json.loads(result.removeprefix('result '))
+
+    def end(self):
+        for server in self._servers:
+            server.kill()
+            server.communicate()
+
+    def _start(self, arguments, **options):
+        return subprocess.Popen(
+            [sys.executable, ROOT / 'tests' / 'foreign_peers.py', *map(str, arguments)],
+            env=os.environ | {'PYTHONPATH': str(ROOT)},
+            stdout=subprocess.PIPE,
+            text=True,
+            **options,
+        )
+
+
+@pytest.fixture
+def foreigners(domain_id):
+    """Return a way to start plain rclpy peers, which are gone when the test ends."""
+    foreigners = Foreigners()
+    yield foreigners
+    foreigners.end()
+
+
+def said_by(child, node):
+    """Return what a node has logged, without what the first line begins with."""
+    prefix = f'[INFO] [{node}]: '
+    return [line.removeprefix(prefix) for line in child.matching(prefix)]
+
+
+def test_add_two_ints_server_answers_a_foreign_client(up, foreigners):
+    child = up('add_two_ints_server')
+    assert foreigners.ask('ask_for_sum', 'add_two_ints', 2, 3) == 5
+    assert foreigners.ask('ask_for_sum', 'add_two_ints', -7, 2**40) == 2**40 - 7
+
+    assert child.stop() == 0
+    # A log message of two lines has its prefix before the first alone.
+    start = child.lines.index('[INFO] [minimal_service]: Incoming request')
+    assert child.lines[start : start + 6] == [
+        '[INFO] [minimal_service]: Incoming request',
+        'a: 2 b: 3',
+        '[INFO] [minimal_service]: Sending back response: [5]',
+        '[INFO] [minimal_service]: Incoming request',
+        'a: -7 b: 1099511627776',
+        '[INFO] [minimal_service]: Sending back response: [1099511627769]',
+    ]
+
+
+def test_add_two_ints_client_waits_for_a_foreign_server_and_ends(up, foreigners):
+    child = up('add_two_ints_client', '5', '10')
+    child.wait_for_line(f'[INFO] [minimal_client_async]: {WAITING}')
+    foreigners.serve('add_two_ints_server')
+
+    assert child.wait() == 0
+    said = said_by(child, 'minimal_client_async')
+    assert said[-1] == 'Result of add_two_ints: for 5 + 10 = 15'
+    assert set(said[:-1]) == {WAITING}
+
+
+def test_add_two_ints_client_takes_names_and_negative_numbers(up, foreigners):
+    foreigners.serve('add_two_ints_server')
+    child = up('add_two_ints_client', 'b:=-3', '-4')
+
+    assert child.wait() == 0
+    said = said_by(child, 'minimal_client_async')
+    assert said[-1] == 'Result of add_two_ints: for -4 + -3 = -7'
+
+
+def test_fibonacci_server_gives_a_foreign_client_feedback_and_the_sequence(up, foreigners):
+    child = up('fibonacci_server')
+    outcome = foreigners.ask('send_goal', 3)
+
+    assert outcome == {
+        'accepted': True,
+        'feedback': [[0, 1, 1], [0, 1, 1, 2]],
+        'status': SUCCEEDED,
+        'sequence': [0, 1, 1, 2],
+    }
+    assert said_by(child, 'fibonacci_action_server') == [
+        'Executing goal...',
+        'Feedback: [0, 1, 1]',
+        'Feedback: [0, 1, 1, 2]',
+    ]
+    assert child.stop() == 0
+
+
+def test_fibonacci_server_stops_when_a_foreign_client_cancels(up, foreigners):
+    child = up('fibonacci_server')
+    outcome = foreigners.ask('send_goal', 40, 'cancel')
+
+    assert outcome['status'] == CANCELED
+    assert len(outcome['feedback']) < 38
+    assert child.stop() == 0
+
+
+def test_fibonacci_client_sends_order_10_to_a_foreign_server_and_ends(up, foreigners):
+    foreigners.serve('fibonacci_server')
+    child = up('fibonacci_client')
+
+    assert child.wait() == 0
+    sequence = [0, 1, 1, 2, 3, 5, 8, 13, 21, 34, 55]
+    said = said_by(child, 'fibonacci_action_client')
+    feedback = [f'Received feedback: {sequence[:n]}' for n in range(3, 12)]
+    # A foreign server need not wait for the goal's answer before its first feedback.
+    assert sorted(said[:-1]) == sorted(['Goal accepted :)', *feedback])
+    assert [line for line in said if line in feedback] == feedback
+    assert said[-1] == f'Result: {sequence}'
+
+
+def test_fibonacci_client_takes_an_order(up, foreigners):
+    foreigners.serve('fibonacci_server')
+    child = up('fibonacci_client', 'order:=3')
+
+    assert child.wait() == 0
+    assert said_by(child, 'fibonacci_action_client')[-1] == 'Result: [0, 1, 1, 2]'
+
+
+def test_fibonacci_client_says_that_it_was_refused(up, foreigners):
+    foreigners.serve('fibonacci_server', 'refuse')
+    child = up('fibonacci_client')
+
+    assert child.wait() == 1
+    assert said_by(child, 'fibonacci_action_client') == ['Goal rejected :(']
+
+
+def test_calculator_server_does_what_its_parameter_says(up, foreigners):
+    child = up('calculator_server')
+    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 15
+    assert foreigners.ask('set_operation', 'subtract') == [True, '']
+    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 5
+
+    accepted, reason = foreigners.ask('set_operation', 'multiply')
+    assert not accepted
+    assert 'add' in reason
+    assert 'subtract' in reason
+    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 5
+    assert said_by(child, 'calculator_server') == ['10 + 5 = 15', '10 - 5 = 5', '10 - 5 = 5']
+    assert child.stop() == 0
+
+
+def test_calculator_client_takes_a_foreign_server_as_it_is_or_sets_it(up, foreigners):
+    foreigners.serve('calculator_server')
+    results = []
+    for words in (
+        ['10', '5'],
+        ['10', '5', 'subtract'],
+        ['10', '5'],
+        ['operation:=add', '10', '5'],
+    ):
+        child = up('calculator_client', *words)
+        assert child.wait() == 0, child.output
+        results.append(said_by(child, 'calculator_client')[-1])
+
+    assert results == ['Result: 15', 'Result: 5', 'Result: 5', 'Result: 15']
+
+
+def test_calculator_client_and_server_work_together(up):
+    server = up('calculator_server')
+    server.wait_until_ready()
+    child = up('calculator_client', '10', '5', 'subtract')
+
+    assert child.wait() == 0
+    assert said_by(child, 'calculator_client') == ['Result: 5']
+    assert server.stop() == 0
+
+
+def test_self_contained_ends_by_itself_with_the_right_numbers(up):
+    child = up('self_contained')
+
+    assert child.wait() == 0
+    assert said_by(child, 'clients') == [
+        '2 + 3 = 5',
+        'feedback: [0, 1, 1]',
+        'feedback: [0, 1, 1, 2]',
+        'feedback: [0, 1, 1, 2, 3]',
+        'feedback: [0, 1, 1, 2, 3, 5]',
+        'succeeded: [0, 1, 1, 2, 3, 5]',
+    ]
+    assert 'Sending back response: [5]' in said_by(child, 'servers')
