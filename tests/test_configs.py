@@ -51,16 +51,15 @@ def test_talker_listener_counts_from_zero_and_is_heard_inside_and_outside(up, pe
 
 def test_talker_listener_has_the_nodes_and_endpoints_of_the_tutorial(up, peer, wait_for):
     up('talker_listener').wait_until_ready()
-    (publisher,) = wait_for(
-        lambda: peer.node.get_publishers_info_by_topic('/topic'), 'the publisher'
-    )
-    (subscription,) = wait_for(
-        lambda: peer.node.get_subscriptions_info_by_topic('/topic'), 'the subscription'
-    )
 
-    assert publisher.node_name == 'minimal_publisher'
-    assert subscription.node_name == 'minimal_subscriber'
-    for endpoint in (publisher, subscription):
+    def endpoints():
+        publishers = peer.node.get_publishers_info_by_topic('/topic')
+        return publishers + peer.node.get_subscriptions_info_by_topic('/topic')
+
+    # An endpoint may be found before the node that it is of.
+    names = ['minimal_publisher', 'minimal_subscriber']
+    wait_for(lambda: [endpoint.node_name for endpoint in endpoints()] == names, 'both ends')
+    for endpoint in endpoints():
         assert endpoint.node_namespace == '/'
         assert endpoint.topic_type == 'std_msgs/msg/String'
         assert endpoint.qos_profile.reliability is ReliabilityPolicy.RELIABLE

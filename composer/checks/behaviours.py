@@ -20,7 +20,8 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     """Check all behaviours by the text of their modules; none is imported."""
     for node in context.spec.nodes.values():
         for binding in node_bindings(node):
-            yield from _check_source(context, binding)
+            if not context.was_dropped(binding.behaviour.path):
+                yield from _check_source(context, binding)
 
 
 def check_behaviour_call(

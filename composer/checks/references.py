@@ -51,7 +51,9 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
         relays = subscription.behaviour is None and not context.was_dropped(
             (*subscription.path, 'behaviour')
         )
-        if relays and publisher and publisher.type != subscription.type:
+        if not relays or publisher is None or publisher.type == subscription.type:
+            continue
+        if not any(context.was_dropped((*end.path, 'type')) for end in (subscription, publisher)):
             yield context.at_value(
                 (*subscription.path, 'publish'),
                 'type-mismatch',
@@ -106,7 +108,12 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
             package, kind, _ = entity.type.split('/')
             dropped = context.was_dropped(('interfaces', package))
             unreadable = dropped or package in context.unreadable
-            if unreadable or entity.type in catalogue.names(cast('InterfaceKind', kind), package):
+            stands_in = context.was_dropped((*entity.path, 'type'))
+            if (
+                unreadable
+                or stands_in
+                or entity.type in catalogue.names(cast('InterfaceKind', kind), package)
+            ):
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path

@@ -99,8 +99,6 @@ def _advise(name: str) -> str:
 
 def _render(description: InterfaceDescription) -> Iterator[str]:
     yield f'# {description.name}'
-    for line in description.comment.splitlines():
-        yield f'# {line}'.rstrip()
     for index, part in enumerate(_parts(description)):
         if index:
             yield '---'
@@ -116,6 +114,7 @@ def _parts(description: InterfaceDescription) -> tuple[MessageDescription, ...]:
 
 
 def _render_message(message: MessageDescription) -> Iterator[str]:
+    yield from _render_comment(message.comment)
     for constant in message.constants:
         yield from _render_comment(constant.comment)
         yield f'{constant.type} {constant.name}={_written(constant.value)}'

@@ -178,7 +178,7 @@ def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
     if fault:
         faults.append(f"'{argument.name}': {fault}")
     elif argument.choices and value not in argument.choices:
-        faults.append(f"'{argument.name}': {_shown(value)} is none of {_listed(argument.choices)}")
+        faults.append(f"'{argument.name}': {text!r} is none of {_listed(argument.choices)}")
     return value
 
 

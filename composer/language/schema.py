@@ -78,11 +78,15 @@ def check_structure(
         )
     ]
     while faults := _find_faults(data):
-        paths = {fault.drop for fault in faults if fault.drop}
-        for path in paths:
-            data = _without(data, path)
+        for fault in faults:
+            if fault.stand_in:
+                path = (*fault.path, fault.stand_in[0])
+                data = _with_entry(data, path, fault.stand_in[1])
+            else:
+                path = fault.drop
+                data = _without(data, path) if path else data
+            dropped.add(path)
         data = _REQUIRED | data
-        dropped |= paths
     return data, frozenset(dropped), findings
 
 
@@ -138,6 +142,14 @@ def _with_key_renamed(data: Any, path: DataPath, key: str) -> Any:
 def _entry_of(path: DataPath) -> DataPath:
     """Return the path of the mapping entry that holds a value; items of lists cannot go alone."""
     return tuple(takewhile(lambda key: isinstance(key, str), path))
+
+
+def _with_entry(data: Any, path: DataPath, value: Any) -> Any:
+    """Return a copy of nested mappings with an entry more, if there is a mapping for it."""
+    head, *rest = path
+    if not isinstance(data, dict) or (rest and head not in data):
+        return data
+    return data | {head: _with_entry(data[head], tuple(rest), value) if rest else value}
 
 
 def _without(data: Any, path: DataPath) -> Any:

@@ -26,6 +26,18 @@ _TYPE_WORDS = {
 }
 _LONGEST_SHOWN = 40
 
+# What an entry without one of these keys is read on with; the checks pass over them, since the
+# paths of stand-ins count as dropped.
+_STAND_INS: dict[str, dict[str, Any]] = {
+    'publisher': {'type': 'unknown/msg/Unknown'},
+    'subscription': {'type': 'unknown/msg/Unknown', 'behaviour': 'unknown:unknown'},
+    'timer': {'period': 1.0, 'behaviour': 'unknown:unknown'},
+    'service': {'type': 'unknown/srv/Unknown', 'behaviour': 'unknown:unknown'},
+    'service client': {'type': 'unknown/srv/Unknown'},
+    'action': {'type': 'unknown/action/Unknown', 'behaviour': 'unknown:unknown'},
+    'action client': {'type': 'unknown/action/Unknown'},
+}
+
 
 @dataclass(frozen=True, slots=True)
 class StructureFault:
@@ -36,6 +48,7 @@ class StructureFault:
         at_key: Whether the key is wrong and not the value.
         drop: The smallest mapping entry without which the data can be read on.
         meant: Of an unknown key, the one that it is nearest to.
+        stand_in: Of a missing key, the key and a value to read the rest of its mapping with.
     """
 
     rule: str
@@ -45,6 +58,7 @@ class StructureFault:
     at_key: bool = False
     help: str | None = None
     meant: str | None = None
+    stand_in: tuple[str, Any] | None = None
 
     def diagnostic(self, positions: SourceMap) -> Diagnostic:
         """Return the finding for it."""
@@ -80,7 +94,7 @@ def _explain_missing_keys(error: ValidationError) -> Iterator[StructureFault]:
     missing = [key for key in error.validator_value if key not in error.instance]
     # The validator reports each missing key on its own; its message begins with the key.
     key = next((key for key in missing if error.message.startswith(repr(key))), missing[0])
-    yield _missing(error, f"the key '{key}' is missing{_owner(error)}")
+    yield _missing(error, key, f"the key '{key}' is missing{_owner(error)}")
 
 
 def _explain_type(error: ValidationError) -> Iterator[StructureFault]:
@@ -219,7 +233,8 @@ def _explain_key_alternatives(
     absent = [[key for key in keys if key not in error.instance] for keys in alternatives]
     wanted = ' or '.join(' and '.join(f"'{key}'" for key in keys) for keys in absent)
     verb = 'is' if all(len(keys) == 1 for keys in absent) else 'are'
-    return _missing(error, f'{wanted} {verb} missing{_owner(error)}')
+    first = alternatives[0][0]
+    return _missing(error, first, f'{wanted} {verb} missing{_owner(error)}')
 
 
 def _explain_otherwise(error: ValidationError) -> Iterator[StructureFault]:
@@ -253,9 +268,13 @@ def _droppable(path: DataPath) -> DataPath:
     return path
 
 
-def _missing(error: ValidationError, message: str) -> StructureFault:
+def _missing(error: ValidationError, key: str, message: str) -> StructureFault:
     path = _path(error)
-    return StructureFault('missing-key', message, path, _droppable(path), at_key=True)
+    known = _STAND_INS.get(error.schema.get('title', ''), {})
+    stand_in = (key, known[key]) if key in known else None
+    return StructureFault(
+        'missing-key', message, path, _droppable(path), at_key=True, stand_in=stand_in
+    )
 
 
 def _conflict(error: ValidationError, keys: list[str]) -> StructureFault:

@@ -48,10 +48,14 @@ class _PooledExecutor(Executor):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """See the base class."""
-        self.submit_next(timeout_sec, lambda: False)
+        self.submit_next(timeout_sec, _never)
 
     def submit_next(self, timeout_sec: float | None, is_over: Callable[[], bool]) -> None:
-        """Give the pool what is ready next; return without it when `is_over` at a wake-up."""
+        """Give the pool what is ready next; return without it when `is_over` at a wake-up.
+
+        Args:
+            is_over: The same one each time: rclpy drops what else is ready when it is another.
+        """
         with suppress(TimeoutException, ConditionReachedException):
             task, _entity, _node = self.wait_for_ready_callbacks(timeout_sec, None, is_over)
             self._pool.submit(task)
@@ -117,11 +121,14 @@ class SystemExecutor:
     def _spin(self) -> None:
         while self._spinning and self._context.ok():
             try:
-                self._executor.submit_next(_LONGEST_WAIT_SEC, lambda: not self._spinning)
+                self._executor.submit_next(_LONGEST_WAIT_SEC, self._is_over)
             except (ShutdownException, ExternalShutdownException):
                 return
             except Exception:  # noqa: BLE001 - one fault must not end the dispatch of all nodes
                 self._report(traceback.format_exc())
+
+    def _is_over(self) -> bool:
+        return not self._spinning
 
     def _run(self, task: Task) -> None:
         try:
@@ -132,3 +139,7 @@ class SystemExecutor:
             pass
         except BaseException:  # noqa: BLE001 - as above
             self._report(traceback.format_exc())
+
+
+def _never() -> bool:
+    return False

@@ -429,7 +429,9 @@ snippets = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
 @given(
     texts,
     st.lists(st.tuples(st.integers(0, 900), st.integers(0, 12), snippets | st.text(max_size=6))),
@@ -441,7 +443,7 @@ def test_a_damaged_file_never_raises(text, edits):
     check(text.encode(errors='ignore').decode())
 
 
-@pytest.mark.parametrize('name', ['a' * 300, 'a' * 5000, 'é' * 200])
+@pytest.mark.parametrize('name', ['a' * 300, 'a' * 1000, 'é' * 200])
 def test_endless_names_never_raise(name):
     rules = {
         finding.rule
@@ -454,7 +456,7 @@ def test_endless_names_never_raise(name):
     assert 'unknown-behaviour' in rules
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_bytes_never_raise(content):
     document = parse(content)

@@ -185,7 +185,7 @@ def test_a_service_runs_never_beside_the_nodes_other_behaviours(compose, peer):
         nodes:
           server:
             state: {inside: 0}
-            timers: {tick: {period: 0.005, behaviour: 'parts:alone_in_timer'}}
+            timers: {tick: {period: 0.05, behaviour: 'parts:alone_in_timer'}}
             services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:alone'}}
     """
     child = compose(text, CODE)

@@ -55,7 +55,7 @@ def look(node):
 
 # What a program in trouble may do: call `up` many times, in this thread and in others.
 PROGRAM = """
-import json, os, signal, sys, threading
+import json, os, signal, sys, threading, time
 import composer
 
 handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
@@ -70,7 +70,11 @@ for turn in range(int(sys.argv[2])):
         codes.append(composer.up(sys.argv[1]))
     if turn == 0:
         before = [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
-after = [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
+# A thread that has been joined may take a moment to leave the kernel's list.
+deadline = time.monotonic() + 20
+after = None
+while after != before and time.monotonic() < deadline:
+    after = [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
 import parts
 print(json.dumps({
     'codes': codes,

@@ -1,0 +1,156 @@
+"""What a file takes from the command line: declarations, and the words that give values."""
+
+import pytest
+
+from composer.errors import UsageError
+from composer.language import load_system_text
+from composer.language.arguments import describe_arguments
+
+ARGUMENTS = """
+version: 1
+args:
+  name: {type: string, description: Whose it is.}
+  count: {default: 3}
+  rate: {type: double, default: 1}
+  loud: {default: false, description: Whether it shouts.}
+  mode: {default: "", choices: ["", fast, "very slow"]}
+nodes: {}
+
+
+"""
+
+DECLARED = """the file declares
+    name (string, required): Whose it is.
+    count (integer, default 3)
+    rate (double, default 1.0)
+    loud (bool, default false): Whether it shouts.
+    mode (string, one of '', fast, very slow, default '')"""
+
+
+def values(*words, text=ARGUMENTS):
+    """Return the values of the arguments, as state of a node that is made of them."""
+    declared = load_system_text(text).arguments
+    state = ', '.join(f'{name}: "{{{{ {name} }}}}"' for name in declared)
+    text = text.replace('nodes: {}', f'nodes: {{n: {{state: {{{state}}}}}}}')
+    loaded = load_system_text(text, words=words)
+    assert loaded.diagnostics == ()
+    return dict(loaded.spec.nodes['n'].state)
+
+
+def refusal(*words, text=ARGUMENTS):
+    with pytest.raises(UsageError) as caught:
+        load_system_text(text, words=words)
+    return str(caught.value)
+
+
+DEFAULTS = {'name': 'a', 'count': 3, 'rate': 1.0, 'loud': False, 'mode': ''}
+
+
+@pytest.mark.parametrize(
+    ('words', 'changes'),
+    [
+        (['a'], {}),
+        (['name:=a'], {}),
+        (
+            ['b', '7', '0.5', 'true', 'fast'],
+            {'name': 'b', 'count': 7, 'rate': 0.5, 'loud': True, 'mode': 'fast'},
+        ),
+        (['mode:=very slow', 'a', '5'], {'mode': 'very slow', 'count': 5}),
+        (['a', 'mode:='], {}),
+        (['', '-7', '-1e3'], {'name': '', 'count': -7, 'rate': -1000.0}),
+        (['a', 'rate:=5'], {'rate': 5.0}),
+        (['a', 'count:=0x10'], {'count': 16}),
+        (['7'], {'name': '7'}),
+        (['true'], {'name': 'true'}),
+        (['name:=x:=y'], {'name': 'x:=y'}),
+    ],
+)
+def test_words_give_values_by_name_or_in_the_order_of_the_declarations(words, changes):
+    found = values(*words)
+    assert found == DEFAULTS | changes
+    assert [type(value) for value in found.values()] == [str, int, float, bool, str]
+
+
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        ([], "'name' is missing"),
+        (['a', 'cuont:=3'], "there is no argument 'cuont' (did you mean 'count'?)"),
+        (['a', 'zzz:=3'], "there is no argument 'zzz'"),
+        (['a', 'name:=b'], "'name' is given twice: 'a' and 'b'"),
+        (['a', '3', '1', 'true', 'fast', 'x', '-1'],
+         "'x' is one value too many; '-1' is one value too many"),
+        (['a', 'three'], "'count': expected an integer, got 'three'"),
+        (['a', '3.0'], "'count': expected an integer, got 3.0"),
+        (['a', ''], "'count': expected an integer, got ''"),
+        (['a', 'null'], "'count': expected an integer, got 'null'"),
+        (['a', '9223372036854775808'], "'count': 9223372036854775808 does not fit 64 bits"),
+        (['a', 'loud:=yes'], "'loud': expected a bool, got 'yes'"),
+        (['a', 'loud:=1'], "'loud': expected a bool, got 1"),
+        (['a', 'mode:=slow'], "'mode': 'slow' is none of '', fast, very slow"),
+    ],
+)  # fmt: skip
+def test_words_that_do_not_fit_are_refused(words, message):
+    assert refusal(*words) == message
+
+
+def test_a_number_beyond_all_bounds_is_refused():
+    assert refusal('a', '9' * 300).startswith("'count': expected an integer, got '999")
+
+
+def test_all_that_is_wrong_is_one_error_that_shows_what_is_declared():
+    with pytest.raises(UsageError) as caught:
+        load_system_text(ARGUMENTS, words=['cuont:=3', 'rate:=fast', 'loud:=true', 'loud:=false'])
+    assert str(caught.value) == (
+        "there is no argument 'cuont' (did you mean 'count'?); "
+        "'loud' is given twice: 'true' and 'false'; "
+        "'name' is missing; "
+        "'rate': expected a double, got 'fast'"
+    )
+    assert caught.value.help == DECLARED
+
+
+def test_a_file_without_arguments_takes_no_words():
+    text = 'version: 1\nnodes: {}'
+    assert refusal('a:=1', '3', text=text) == (
+        "there is no argument 'a'; '3' is one value too many"
+    )
+
+
+def test_a_file_without_arguments_says_so():
+    assert describe_arguments({}) == 'the file declares no arguments'
+
+
+@pytest.mark.parametrize(
+    ('declaration', 'fault'),
+    [
+        ('a: {type: [x]}', ('bad-value', '2:18')),
+        ('a: {type: int}', ('bad-value', '2:18')),
+        ('a: {defualt: 3}', ('unknown-key', '2:12')),
+        ('a: [1]', ('wrong-type', '2:11')),
+        ('a: {default: {b: 1}}', ('wrong-type', '2:21')),
+        ('a: {default: fast, type: integer}', ('bad-argument-declaration', '2:21')),
+        ('a: {default: 4, choices: [1, 2]}', ('bad-argument-declaration', '2:21')),
+        ('a: {choices: [1, two], type: integer}', ('bad-argument-declaration', '2:25')),
+        ('a: "{{ b }}"', ('bad-argument-declaration', '2:8')),
+        ('a: {default: "{{ b }}"}', ('bad-argument-declaration', '2:21')),
+        ('my-name: 1', ('bad-argument-declaration', '2:8')),
+        ('true_: 1, "true": 2', ('bad-argument-declaration', '2:18')),
+    ],
+)
+def test_a_wrong_declaration_is_said_before_any_word_is_held_against_it(declaration, fault):
+    text = f'version: 1\nargs: {{{declaration}}}\nnodes: {{}}\n'
+    for words in (None, [], ['a:=x', 'b:=3']):
+        findings = load_system_text(text, words=words).diagnostics
+        assert [(each.rule, f'{each.span.line}:{each.span.column}') for each in findings] == [
+            fault
+        ]
+
+
+@pytest.mark.parametrize(
+    'block', ['args: 3', 'args: [a]', 'args: {{a}: 1}', 'args: {: 1}', 'args:']
+)
+def test_a_block_that_is_no_mapping_of_names_is_said(block):
+    loaded = load_system_text(f'version: 1\n{block}\nnodes: {{}}\n', words=[])
+    assert len(loaded.diagnostics) == 1
+    assert loaded.diagnostics[0].span.line == 2

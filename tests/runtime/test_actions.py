@@ -1,0 +1,435 @@
+"""Actions that systems serve: how each goal ends, under each rule, for a plain rclpy client."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient
+from rclpy.qos import QoSProfile
+from test_msgs.action import Fibonacci
+
+pytestmark = pytest.mark.ros
+
+STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
+    GoalStatus.STATUS_CANCELED: 'canceled',
+    GoalStatus.STATUS_ABORTED: 'aborted',
+}
+
+CODE = """
+import threading
+import time
+
+released = threading.Event()
+
+def plain(node, goal):
+    return [goal.order]
+
+async def coroutine(node, goal):
+    return {'sequence': [goal.order]}
+
+def generator(node, goal):
+    for step in range(goal.order):
+        yield [step]
+        time.sleep(0.02)
+    return [goal.order]
+
+async def async_generator(node, goal):
+    for step in range(goal.order):
+        yield [step]
+    yield [goal.order]
+
+def forever(node, goal):
+    try:
+        while True:
+            yield [goal.order]
+            time.sleep(0.01)
+    finally:
+        node.logger.info(f'cleaned up {goal.order}')
+
+async def forever_async(node, goal):
+    try:
+        while True:
+            yield [goal.order]
+            time.sleep(0.01)
+    finally:
+        node.logger.info(f'cleaned up {goal.order}')
+
+def fail(node, goal):
+    yield [1]
+    raise OSError('no such device')
+
+async def fail_async(node, goal):
+    raise OSError('no such device')
+
+def wrong_feedback(node, goal):
+    try:
+        yield {'sequense': [1]}
+    finally:
+        node.logger.info('closed')
+
+def wrong_result(node, goal):
+    return {'sequense': [1]}
+
+def accept(node, goal, most=5):
+    if goal.order > 100:
+        raise OSError('cannot decide')
+    if goal.order < 0:
+        return False
+    return None if goal.order <= most else f'{goal.order} is more than {most}'
+
+async def accept_async(node, goal):
+    return accept(node, goal)
+
+def short(node, goal):
+    node.state.running += 1
+    node.state.most = max(node.state.most, node.state.running)
+    for _ in range(3):
+        yield [goal.order]
+        time.sleep(0.002)
+    node.state.running -= 1
+    return [goal.order]
+"""
+
+SYSTEM = """
+    version: 1
+    nodes:
+      server:
+        state: {running: 0, most: 0}
+        actions:
+"""
+KINDS = [
+    'plain',
+    'coroutine',
+    'generator',
+    'async_generator',
+    'forever',
+    'forever_async',
+    'fail',
+    'fail_async',
+    'wrong_feedback',
+    'wrong_result',
+]
+
+
+def serving(*names, more=''):
+    """Return a system with an action for each behaviour."""
+    lines = [
+        f"          {name}: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{name}'{more}}}"
+        for name in names
+    ]
+    return SYSTEM + '\n'.join(lines) + '\n'
+
+
+class Client:
+    """A plain action client of a peer."""
+
+    def __init__(self, peer, name, wait_for):
+        deep = QoSProfile(depth=1000)
+        self._peer, self._wait_for = peer, wait_for
+        self._client = ActionClient(
+            peer.node,
+            Fibonacci,
+            name,
+            goal_service_qos_profile=deep,
+            result_service_qos_profile=deep,
+            cancel_service_qos_profile=deep,
+            feedback_sub_qos_profile=deep,
+        )
+        assert self._client.wait_for_server(30)
+
+    def send(self, order, heard=None):
+        """Return the future of a goal handle."""
+        hear = (
+            None
+            if heard is None
+            else lambda message: heard.append(list(message.feedback.sequence))
+        )
+        future = self._client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=hear)
+        self._peer._executor.wake()
+        return future
+
+    def accepted(self, future):
+        self._wait_for(future.done, 'the answer to a goal')
+        return future.result()
+
+    def begin(self, order, heard=None):
+        """Return the handle of a goal that is accepted."""
+        handle = self.accepted(self.send(order, heard))
+        assert handle.accepted
+        return handle
+
+    def end(self, handle):
+        """Return how a goal ended, and its result."""
+        future = handle.get_result_async()
+        self._wait_for(future.done, 'the result of a goal')
+        return STATUS[future.result().status], list(future.result().result.sequence)
+
+    def cancel(self, handle):
+        future = handle.cancel_goal_async()
+        self._wait_for(future.done, 'the answer to the request to cancel')
+        return len(future.result().goals_canceling)
+
+    def close(self):
+        self._client.destroy()
+
+
+@pytest.fixture
+def connect(peer, wait_for):
+    """Return a function that returns a client of an action."""
+    clients = []
+
+    def connect(name):
+        clients.append(Client(peer, name, wait_for))
+        return clients[-1]
+
+    yield connect
+    for client in clients:
+        client.close()
+
+
+@pytest.fixture(scope='module')
+def child(shared_compose):
+    child = shared_compose(serving(*KINDS), CODE)
+    child.wait_until_ready()
+    return child
+
+
+@pytest.fixture
+def shared_connect(child, shared_peer, wait_for):
+    clients = []
+
+    def connect(name):
+        clients.append(Client(shared_peer, name, wait_for))
+        return clients[-1]
+
+    yield connect
+    for client in clients:
+        client.close()
+
+
+@pytest.mark.parametrize(
+    ('name', 'feedback'),
+    [
+        ('plain', []),
+        ('coroutine', []),
+        ('generator', [[0], [1], [2]]),
+        ('async_generator', [[0], [1], [2]]),
+    ],
+)
+def test_a_goal_succeeds_with_its_feedback_in_order_and_its_result(
+    shared_connect, wait_for, name, feedback
+):
+    client = shared_connect(name)
+    heard = []
+
+    assert client.end(client.begin(3, heard)) == ('succeeded', [3])
+    wait_for(lambda: len(heard) == len(feedback), 'the feedback')
+    assert heard == feedback
+
+
+@pytest.mark.parametrize('name', ['forever', 'forever_async'])
+def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(
+    child, shared_connect, wait_for, name
+):
+    client = shared_connect(name)
+    heard = []
+    order = KINDS.index(name)
+    handle = client.begin(order, heard)
+    wait_for(lambda: heard, 'feedback')
+
+    assert client.cancel(handle) == 1
+    assert client.end(handle) == ('canceled', [])
+    child.wait_for_line(f'[server]: cleaned up {order}')
+
+
+@pytest.mark.parametrize(
+    ('name', 'summary'),
+    [
+        ('fail', 'OSError: no such device'),
+        ('fail_async', 'OSError: no such device'),
+        (
+            'wrong_feedback',
+            "PayloadError: test_msgs/action/Fibonacci_Feedback has no field 'sequense'",
+        ),
+        (
+            'wrong_result',
+            "PayloadError: test_msgs/action/Fibonacci_Result has no field 'sequense'",
+        ),
+    ],
+)
+def test_a_behaviour_that_raises_aborts_its_goal_and_is_in_the_log(
+    child, shared_connect, name, summary
+):
+    client = shared_connect(name)
+
+    assert client.end(client.begin(1)) == ('aborted', [])
+    assert summary in child.wait_for_line(f"[server]: action '{name}' (system.yaml:")
+    if name == 'wrong_feedback':
+        child.wait_for_line('[server]: closed')
+
+
+@pytest.mark.parametrize('accept', ['accept', 'accept_async'])
+def test_accept_decides_about_goals(compose, connect, accept):
+    child = compose(serving('plain', more=f", accept: 'parts:{accept}'"), CODE)
+    client = connect('plain')
+
+    assert client.end(client.begin(5)) == ('succeeded', [5])
+    assert not client.accepted(client.send(-1)).accepted
+    child.wait_for_line("[INFO] [server]: action 'plain' refused a goal")
+    assert not client.accepted(client.send(6)).accepted
+    child.wait_for_line("[INFO] [server]: action 'plain' refused a goal: 6 is more than 5")
+    assert not client.accepted(client.send(101)).accepted
+    assert 'OSError: cannot decide' in child.wait_for_line("action 'plain' (accept) (system.yaml:")
+    assert child.stop() == 0
+
+
+RULES = ['parallel', 'queue', 'reject', 'preempt']
+
+
+@pytest.mark.parametrize('rule', RULES)
+@pytest.mark.parametrize('behaviour', ['short', 'forever'])
+def test_of_many_goals_at_once_each_ends_in_one_right_state(
+    compose, connect, wait_for, rule, behaviour
+):
+    count = 50
+    child = compose(serving(behaviour, more=f', concurrency: {rule}'), CODE)
+    client = connect(behaviour)
+    handles = [client.accepted(future) for future in [client.send(n) for n in range(count)]]
+    accepted = [n for n, handle in enumerate(handles) if handle.accepted]
+    results = {n: handles[n].get_result_async() for n in accepted}
+    if behaviour == 'forever':
+        cancels = [handles[n].cancel_goal_async() for n in accepted]
+        wait_for(lambda: all(future.done() for future in cancels), 'all answers')
+    wait_for(lambda: all(future.done() for future in results.values()), 'all results')
+
+    ends = {n: STATUS[future.result().status] for n, future in results.items()}
+    tally = Counter(ends.values())
+    good = 'succeeded' if behaviour == 'short' else 'canceled'
+    if rule in ('parallel', 'queue'):
+        assert tally == {good: count}
+    elif rule == 'reject':
+        assert set(tally) == {good}
+    else:
+        assert tally.keys() <= {good, 'aborted'}
+        assert ends[count - 1] == good
+    if behaviour == 'short':
+        assert all(
+            list(results[n].result().result.sequence) == ([n] if ends[n] == good else [])
+            for n in accepted
+        )
+    if rule != 'parallel':
+        # Nothing is left that would keep another goal from running.
+        handle = client.begin(1000)
+        assert behaviour == 'short' or client.cancel(handle) == 1
+        assert client.end(handle)[0] == good
+    assert child.stop() == 0
+    assert 'rror' not in child.output
+
+
+def test_goals_of_a_queue_run_in_order_and_one_that_waits_can_be_cancelled(
+    compose, connect, wait_for
+):
+    child = compose(serving('forever', more=', concurrency: queue'), CODE)
+    client = connect('forever')
+    heard = [[], [], []]
+    handles = [client.begin(n, heard[n]) for n in range(3)]
+    wait_for(lambda: heard[0], 'feedback of the first')
+
+    assert client.cancel(handles[1]) == 1
+    assert client.end(handles[1]) == ('canceled', [])
+    assert heard[1:] == [[], []]
+    assert client.cancel(handles[0]) == 1
+    assert client.end(handles[0]) == ('canceled', [])
+    wait_for(lambda: heard[2], 'feedback of the last')
+    assert client.cancel(handles[2]) == 1
+    assert client.end(handles[2]) == ('canceled', [])
+    assert heard[1] == []
+    assert child.stop() == 0
+
+
+def test_a_goal_is_refused_while_another_runs(compose, connect):
+    compose(serving('forever', more=', concurrency: reject'), CODE)
+    client = connect('forever')
+    first = client.begin(1)
+
+    assert not client.accepted(client.send(2)).accepted
+    assert client.cancel(first) == 1
+    assert client.end(first) == ('canceled', [])
+    assert client.accepted(client.send(3)).accepted
+
+
+def test_a_new_goal_takes_the_place_of_the_one_that_runs(compose, connect, wait_for):
+    child = compose(serving('forever', more=', concurrency: preempt'), CODE)
+    client = connect('forever')
+    first = client.begin(1)
+    heard = []
+    second = client.begin(2, heard)
+
+    assert client.end(first) == ('aborted', [])
+    child.wait_for_line('cleaned up 1')
+    wait_for(lambda: heard, 'feedback of the second')
+    assert client.cancel(second) == 1
+    assert client.end(second) == ('canceled', [])
+
+
+@pytest.mark.parametrize('rule', RULES)
+def test_goals_in_flight_are_aborted_with_a_result_when_the_system_stops(
+    compose, connect, wait_for, rule
+):
+    child = compose(serving('forever', more=f', concurrency: {rule}'), CODE)
+    client = connect('forever')
+    heard = []
+    handles = [client.accepted(client.send(n, heard)) for n in range(5)]
+    results = [handle.get_result_async() for handle in handles if handle.accepted]
+    wait_for(lambda: heard, 'feedback')
+
+    assert child.stop(signal.SIGINT) == 0
+    wait_for(lambda: all(future.done() for future in results), 'all results')
+    assert {STATUS[future.result().status] for future in results} == {'aborted'}
+
+
+# A plain client in a process of its own, which sends one goal and lives until it is killed.
+CLIENT_CODE = """
+import rclpy
+from rclpy.action import ActionClient
+from test_msgs.action import Fibonacci
+
+rclpy.init()
+node = rclpy.create_node('doomed')
+client = ActionClient(node, Fibonacci, 'generator')
+client.wait_for_server()
+future = client.send_goal_async(Fibonacci.Goal(order=10), lambda _message: print('heard', flush=True))
+rclpy.spin_until_future_complete(node, future)
+result = future.result().get_result_async()
+rclpy.spin(node)
+"""
+
+
+def test_a_client_killed_in_mid_goal_leaves_the_server_sound(compose, connect, domain_id):
+    child = compose(serving('generator', more=', concurrency: queue'), CODE)
+    doomed = subprocess.Popen(
+        [sys.executable, '-c', CLIENT_CODE],
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert doomed.stdout.readline() == 'heard\n'
+    finally:
+        doomed.kill()
+        doomed.wait()
+        doomed.stdout.close()
+    client = connect('generator')
+
+    # It waits for the killed client's goal, which runs to its end.
+    assert client.end(client.begin(2)) == ('succeeded', [2])
+    assert child.stop() == 0
