@@ -6,14 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.python_source import (
-    FunctionKind,
-    MissingModule,
-    ModuleFinder,
-    ModuleSource,
-    project_search_path,
-    read_module,
-)
+from composer.module_finder import MissingModule, ModuleFinder, project_search_path
+from composer.python_source import FunctionKind, ModuleSource, read_module
 
 
 @pytest.fixture

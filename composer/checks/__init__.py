@@ -13,7 +13,7 @@ from composer.checks.references import check_publish, check_qos, check_types
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
-from composer.python_source import ModuleFinder, project_search_path
+from composer.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -6,14 +6,15 @@ import inspect
 from typing import TYPE_CHECKING
 
 from composer.language.bindings import Binding, node_bindings
+from composer.module_finder import MissingModule
 from composer.names import did_you_mean, suggest
-from composer.python_source import FunctionKind, MissingModule, ModuleSource
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.python_source import FunctionKind, ModuleSource
 
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:

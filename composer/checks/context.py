@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from composer.language import LoadedSystem
     from composer.language.positions import DataPath
     from composer.language.specs import SystemSpec
-    from composer.python_source import ModuleFinder
+    from composer.module_finder import ModuleFinder
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from composer.interfaces.declared import provide_declared
 from composer.language import LoadedSystem, load_system
 from composer.language.arguments import describe_arguments
 from composer.language.bindings import node_bindings
-from composer.python_source import project_search_path
+from composer.module_finder import project_search_path
 from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
