@@ -11,6 +11,8 @@ from jinja2.sandbox import SandboxedEnvironment
 _MAX_ITEMS = 10_000_000
 _MAX_BITS = 10_000
 
+_BEGIN = '{{'
+
 
 class Sandbox(SandboxedEnvironment):
     """Evaluates expressions; their globals are `range` alone."""
@@ -35,11 +37,9 @@ class Sandbox(SandboxedEnvironment):
         Raises:
             TemplateSyntaxError: It has no end.
         """
-        # A blank keeps jinja2 from reading a minus as its sign for stripping blanks. It would
-        # count other line breaks as one character less.
-        begin = '{{ '
-        length = -len(begin)
-        for _, kind, value in self.lex(begin + text.replace('\r', ' ')):
+        length = -len(_BEGIN)
+        # jinja2 makes one character of a line break of two.
+        for _, kind, value in self.lex(_BEGIN + text.replace('\r', ' ')):
             if kind == 'variable_end':
                 return length + value.index('}}')
             length += len(value)

@@ -79,7 +79,10 @@ def test_show_prints_fields_types_constants_and_comments(run, text):
 def test_show_prints_the_three_parts_of_an_action(run):
     pytest.importorskip('test_msgs')
     expected = (
-        '# test_msgs/action/Fibonacci\nint32 order\n---\nint32[] sequence\n---\nint32[] sequence\n'
+        '# test_msgs/action/Fibonacci\n'
+        '# goal definition\nint32 order\n---\n'
+        '# result definition\nint32[] sequence\n---\n'
+        '# feedback\nint32[] sequence\n'
     )
     assert run('interfaces', 'show', 'test_msgs/action/Fibonacci') == (0, expected, '')
 

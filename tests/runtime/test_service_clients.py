@@ -343,7 +343,7 @@ def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
 def test_of_thousands_of_calls_at_once_no_answer_is_lost_or_swapped(compose, behaviour):
     timers = '\n'.join(
         f"              t{number}: {{period: 0.02, behaviour: 'parts:{behaviour}', group: g{number},"
-        f' with: {{first: {number * 1000000}, count: 125}}}}'
+        f' with: {{first: {number * 1000000}, count: 250}}}}'
         for number in range(8)
     )
     text = f"""
@@ -356,7 +356,7 @@ def test_of_thousands_of_calls_at_once_no_answer_is_lost_or_swapped(compose, beh
           server: {{services: {{echo: {{type: test_msgs/srv/BasicTypes, behaviour: 'parts:echo'}}}}}}
     """
     child = compose(text, CODE)
-    child.wait_for_line('right: 125', times=8)
+    child.wait_for_line('right: 250', times=8)
 
     assert child.stop() == 0
 

@@ -190,7 +190,7 @@ nodes:
   phoenix:
     on_error: restart
     parameters: {mode: calm}
-    state: {ticks: 0}
+    state: {ticks: 0, all: []}
     publishers: {ticks: std_msgs/msg/Int32}
     subscriptions:
       number: {type: std_msgs/msg/Int32, behaviour: 'parts:hear'}
@@ -208,7 +208,7 @@ from pathlib import Path
 from rclpy.parameter import Parameter
 
 def start(node):
-    node.logger.info(f'start: {node.parameters.mode}, {node.state.ticks} ticks')
+    node.logger.info(f'start: {node.parameters.mode}, {node.state.ticks} ticks, {node.state.all}')
     if Path('no_start').exists():
         raise OSError('no such device')
 
@@ -217,6 +217,7 @@ def stop(node):
 
 def tick(node):
     node.state.ticks += 1
+    getattr(node.state, 'all', []).append(node.state.ticks)
     if node.state.ticks == 3 and not Path('calm').exists():
         node.ros.set_parameters([Parameter('mode', value='wild')])
         raise RuntimeError('out of order')
@@ -236,7 +237,7 @@ def test_on_error_restart_rebuilds_the_node_as_at_the_start(compose, peer, wait_
     names = peer.node.get_node_names()
     assert child.stop() == 0
 
-    assert set(child.matching('start: ')) == {'[INFO] [phoenix]: start: calm, 0 ticks'}
+    assert set(child.matching('start: ')) == {'[INFO] [phoenix]: start: calm, 0 ticks, []'}
     assert child.matching(']: stop') == ['[INFO] [phoenix]: stop']
     assert names.count('phoenix') == 1
     assert not child.matching('InvalidHandle')

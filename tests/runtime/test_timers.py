@@ -25,16 +25,16 @@ nodes:
       silent: std_msgs/msg/Int32
       by_name: std_msgs/msg/String
     timers:
-      count: {period: 0.02, behaviour: 'parts:count', publish: counted}
-      generate: {rate: 50, behaviour: 'parts:generate', with: {stop: 3}, publish: generated}
-      await: {period: 0.02, behaviour: 'parts:await_word', with: {word: hi}, publish: awaited}
+      count: {period: 0.05, behaviour: 'parts:count', publish: counted}
+      generate: {rate: 20, behaviour: 'parts:generate', with: {stop: 3}, publish: generated}
+      await: {period: 0.05, behaviour: 'parts:await_word', with: {word: hi}, publish: awaited}
       generate_async:
-        {period: 0.02, behaviour: 'parts:generate_async', publish: async_generated}
-      repeat: {period: 0.02, publish: constant, message: {linear: {x: 1}, angular: {z: 0.5}}}
-      nothing: {period: 0.02, behaviour: 'parts:nothing', publish: silent}
-      steady: {period: 0.02, clock: steady, behaviour: 'parts:tick', with: {clock: steady}}
-      system: {period: 0.02, clock: system, behaviour: 'parts:tick', with: {clock: system}}
-      by_name: {period: 0.02, behaviour: 'parts:by_name'}
+        {period: 0.05, behaviour: 'parts:generate_async', publish: async_generated}
+      repeat: {period: 0.05, publish: constant, message: {linear: {x: 1}, angular: {z: 0.5}}}
+      nothing: {period: 0.05, behaviour: 'parts:nothing', publish: silent}
+      steady: {period: 0.05, clock: steady, behaviour: 'parts:tick', with: {clock: steady}}
+      system: {period: 0.05, clock: system, behaviour: 'parts:tick', with: {clock: system}}
+      by_name: {period: 0.05, behaviour: 'parts:by_name'}
 """
 
 KINDS_CODE = """
@@ -68,6 +68,7 @@ def tick(node, *, clock):
     node.logger.info(f'{clock} tick')
 
 def by_name(node):
+    node.logger.info(f'ended: {sum(timer.is_canceled() for timer in node.ros.timers)}')
     node.publish('by_name', f'{node.name} {node.state.nested["deep"]}')
     try:
         node.publish('by_nam', 'hello')
@@ -124,6 +125,7 @@ def test_a_generator_is_resumed_each_tick_and_ends_its_timer_when_it_returns(hea
     assert [message.data for message in messages['generated']] == [0, 1, 2, 3]
     assert len(child.matching('generating 0')) == 1
     assert len([line for line in child.lines if line.endswith('generated all')]) == 1
+    child.wait_for_line('ended: 2')
 
 
 def test_an_async_function_is_awaited(heard, wait_for):
@@ -191,10 +193,14 @@ def test_simulated_time_drives_ros_timers_and_no_others(compose, peer, wait_for)
     child.wait_for_line('steady at 0')
     assert not child.matching('ros at')
 
-    clock.publish(Clock(clock=Time(sec=100)))
-    child.wait_for_line('steady at 100')
-    clock.publish(Clock(clock=Time(sec=111)))
-    child.wait_for_line('ros at 111')
+    def set_time(seconds, line):
+        # The clock is heard without any guarantee of delivery.
+        clock.publish(Clock(clock=Time(sec=seconds)))
+        return child.matching(line)
+
+    wait_for(lambda: set_time(100, 'steady at 100'), 'a tick at 100 s')
+    assert not child.matching('ros at 111')
+    wait_for(lambda: set_time(111, 'ros at 111'), 'a tick of simulated time')
     assert child.stop() == 0
 
 

@@ -1,0 +1,400 @@
+"""Calls of services from behaviours: of this process and of others, one and thousands."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+from std_srvs.srv import Trigger
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import time
+
+import composer
+
+def answer(node, request):
+    return {'success': True, 'message': f'answer of {node.name}'}
+
+def ask(node, *_):
+    node.logger.info('heard: ' + node.call('ask', timeout=30).message)
+    return {'success': True, 'message': 'asked'}
+
+async def ask_async(node, *_):
+    node.logger.info('heard: ' + (await node.call_async('ask', timeout=30)).message)
+    return {'success': True, 'message': 'asked'}
+
+def once(node):
+    node.logger.info('heard: ' + node.call('ask', timeout=30).message)
+    yield
+
+def pending(node):
+    return sum(len(client._pending_requests) for client in node.ros.clients)
+
+def report(node, error):
+    node.logger.info(f'{type(error).__name__}: {error} ({error.help}), {pending(node)} pending')
+
+def ask_and_tell(node, timeout):
+    try:
+        node.call('ask', timeout=timeout)
+    except composer.CallError as error:
+        report(node, error)
+    yield
+
+async def ask_and_tell_async(node, timeout):
+    try:
+        await node.call_async('ask', timeout=timeout)
+    except composer.CallError as error:
+        report(node, error)
+    yield
+
+def fail(node, request):
+    raise OSError('no such device')
+
+def hold(node, request):
+    time.sleep(1.0)
+    return {'success': True}
+
+def forward(node, request):
+    response = node.call('further', {'int64_value': request.int64_value + 1}, timeout=30)
+    return {'int64_value': response.int64_value}
+
+def end_of_chain(node, request):
+    return {'int64_value': request.int64_value}
+
+def ask_chain(node):
+    node.logger.info(f"end: {node.call('first', {'int64_value': 1}, timeout=30).int64_value}")
+    yield
+
+arrived = []
+
+def gather(node, request):
+    arrived.append(node)
+    while len(arrived) < 8:
+        node.call('ask', timeout=30)
+    return {'success': True}
+
+def ask_to_meet(node):
+    node.call('ask', timeout=30)
+    node.logger.info('met')
+    yield
+
+def echo(node, request):
+    return {'int64_value': request.int64_value}
+
+def ask_often(node, first, count):
+    right = 0
+    for number in range(first, first + count):
+        right += node.call('echo', {'int64_value': number}, timeout=60).int64_value == number
+    node.logger.info(f'right: {right}')
+    yield
+
+async def ask_often_async(node, first, count):
+    right = 0
+    for number in range(first, first + count):
+        response = await node.call_async('echo', {'int64_value': number}, timeout=60)
+        right += response.int64_value == number
+    node.logger.info(f'right: {right}')
+    yield
+
+def wait_long(node, *_):
+    node.logger.info('asking')
+    node.call('ask', timeout=None)
+
+async def wait_long_async(node, *_):
+    node.logger.info('asking')
+    await node.call_async('ask', timeout=None)
+
+def insist(node):
+    while True:
+        try:
+            node.call('ask', timeout=0.05)
+            break
+        except composer.ServiceNotAvailableError:
+            node.logger.info('asking')
+            time.sleep(0.05)
+
+def undeclared(node):
+    node.call('asc')
+
+def wrong_request(node):
+    node.call('ask', {'dat': True})
+"""
+
+SERVER = """
+          server: {services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}}
+"""
+
+# A plain rclpy server in a process of its own; of the requests of 'hang', none is answered.
+PEER_CODE = """
+import sys
+import time
+import rclpy
+from std_srvs.srv import Trigger
+
+def answer(request, response):
+    if sys.argv[1] == 'hang':
+        print('asked', flush=True)
+        time.sleep(600)
+    response.success, response.message = True, 'answer of a plain server'
+    return response
+
+rclpy.init()
+node = rclpy.create_node('plain')
+node.create_service(Trigger, 'ask', answer)
+print('up', flush=True)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def plain_server(domain_id):
+    """Start a plain rclpy server; it is gone when the test ends."""
+    processes = []
+
+    def start(how):
+        process = subprocess.Popen(
+            [sys.executable, '-c', PEER_CODE, how],
+            env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        assert process.stdout.readline() == 'up\n'
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def asking(client, *, server=SERVER, threads=2):
+    """Return a system with a node `client`, which has a client `ask`."""
+    return f"""
+        version: 1
+        executor: {{threads: {threads}}}
+        nodes:
+          client:
+            service_clients: {{ask: std_srvs/srv/Trigger}}
+            {client}
+{server}"""
+
+
+CALLERS = {
+    'on_start': 'on_start: parts:ask',
+    'async on_start': 'on_start: parts:ask_async',
+    'timer': "timers: {tick: {period: 0.05, behaviour: 'parts:once'}}",
+    'async timer': "timers: {tick: {period: 0.05, behaviour: 'parts:ask_async'}}",
+    'subscription': (
+        "subscriptions: {heard: {type: std_msgs/msg/Empty, behaviour: 'parts:ask'}}\n"
+        '            publishers: {heard: std_msgs/msg/Empty}\n'
+        '            timers: {tick: {period: 0.05, publish: heard, message: {}}}'
+    ),
+}
+
+
+@pytest.mark.parametrize('caller', CALLERS)
+def test_every_behaviour_can_call_a_service_of_its_process(compose, caller):
+    child = compose(asking(CALLERS[caller]), CODE)
+    child.wait_for_line('[client]: heard: answer of server')
+
+    assert child.stop() == 0
+    assert 'Error' not in child.output
+
+
+@pytest.mark.parametrize('hook', ['ask', 'ask_async'])
+def test_on_stop_can_call_a_service_of_its_process(compose, hook):
+    child = compose(asking(f'on_stop: parts:{hook}'), CODE)
+    child.wait_until_ready()
+
+    assert child.stop() == 0
+    assert child.matching('[client]: heard: answer of server')
+
+
+def test_a_node_can_call_a_service_of_its_own_in_another_group(compose):
+    own = """services:
+              ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:answer', group: other}
+            timers: {tick: {period: 0.05, behaviour: 'parts:once'}}
+    """
+    child = compose(asking(own, server=''), CODE)
+
+    child.wait_for_line('[client]: heard: answer of client')
+
+
+@pytest.mark.parametrize('hook', ['on_start', 'on_stop'])
+def test_on_start_and_on_stop_can_call_a_service_of_another_process(compose, plain_server, hook):
+    plain_server('answer')
+    child = compose(asking(f'{hook}: parts:ask', server=''), CODE)
+    child.wait_until_ready()
+
+    assert child.stop() == 0
+    assert child.matching('[client]: heard: answer of a plain server')
+
+
+@pytest.mark.parametrize('behaviour', ['ask', 'ask_async'])
+def test_a_service_can_call_one_of_another_process(compose, peer, plain_server, behaviour):
+    plain_server('answer')
+    service = (
+        f"services: {{asked: {{type: std_srvs/srv/Trigger, behaviour: 'parts:{behaviour}'}}}}"
+    )
+    child = compose(asking(service, server=''), CODE)
+
+    assert peer.call(Trigger, 'asked').message == 'asked'
+    child.wait_for_line('[client]: heard: answer of a plain server')
+
+
+def test_calls_may_nest_deeper_than_there_are_threads(compose):
+    links = '\n'.join(
+        f'          link_{number}:\n'
+        f'            service_clients: {{further: {{type: test_msgs/srv/BasicTypes, service: s{number + 1}}}}}\n'
+        f"            services: {{s{number}: {{type: test_msgs/srv/BasicTypes, behaviour: 'parts:forward'}}}}"
+        for number in range(6)
+    )
+    text = f"""
+        version: 1
+        executor: {{threads: 2}}
+        nodes:
+          client:
+            service_clients: {{first: {{type: test_msgs/srv/BasicTypes, service: s0}}}}
+            timers: {{tick: {{period: 0.05, behaviour: 'parts:ask_chain'}}}}
+{links}
+          last: {{services: {{s6: {{type: test_msgs/srv/BasicTypes, behaviour: 'parts:end_of_chain'}}}}}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('[client]: end: 7')
+
+    assert child.stop() == 0
+
+
+def test_more_calls_wait_at_once_than_there_are_threads(compose):
+    timers = '\n'.join(
+        f"              t{number}: {{period: 0.02, behaviour: 'parts:ask_to_meet', group: g{number}}}"
+        for number in range(8)
+    )
+    # All of the calls wait until the last has come: each goes to a service that calls again.
+    server = """
+          relay:
+            service_clients: {ask: {type: std_srvs/srv/Trigger, service: gathering}}
+            services:
+              ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:gather', group: reentrant}
+          gathering: {services: {gathering: {type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}}
+    """
+    child = compose(asking(f'timers:\n{timers}', server=server), CODE)
+    child.wait_for_line('[client]: met', times=8)
+
+    assert child.stop() == 0
+
+
+ERRORS = {
+    'missing': (
+        '',
+        '0.2',
+        "ServiceNotAvailableError: no server of '/ask' appeared within 0.2 s"
+        ' (is it running, and is that its name?), 0 pending',
+    ),
+    'slow': (
+        SERVER.replace('parts:answer', 'parts:hold'),
+        '0.3',
+        "CallTimeoutError: '/ask' did not answer within 0.3 s (None), 0 pending",
+    ),
+    'failing': (
+        SERVER.replace('parts:answer', 'parts:fail'),
+        '0.5',
+        "ServiceFailedError: '/ask' did not answer: its behaviour raised an error"
+        " (the server's log has the traceback), 0 pending",
+    ),
+}
+
+
+@pytest.mark.parametrize('kind', ERRORS)
+@pytest.mark.parametrize('behaviour', ['ask_and_tell', 'ask_and_tell_async'])
+def test_a_call_says_why_it_has_no_response_and_leaves_nothing_behind(compose, behaviour, kind):
+    server, timeout, message = ERRORS[kind]
+    timer = f"timers: {{tick: {{period: 0.02, behaviour: 'parts:{behaviour}', with: {{timeout: {timeout}}}}}}}"
+    child = compose(asking(timer, server=server), CODE)
+
+    assert child.wait_for_line('[client]: ').endswith(f'[INFO] [client]: {message}')
+    assert child.stop() == 0
+
+
+def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
+    server = plain_server('hang')
+    timer = "timers: {tick: {period: 0.02, behaviour: 'parts:ask_and_tell', with: {timeout: 2.0}}}"
+    child = compose(asking(timer, server=''), CODE)
+    assert server.stdout.readline() == 'asked\n'
+    server.kill()
+
+    line = child.wait_for_line("'/ask'")
+    assert line == (
+        "[INFO] [client]: CallTimeoutError: '/ask' did not answer within 2 s (None), 0 pending"
+    )
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize('behaviour', ['ask_often', 'ask_often_async'])
+def test_of_thousands_of_calls_at_once_no_answer_is_lost_or_swapped(compose, behaviour):
+    timers = '\n'.join(
+        f"              t{number}: {{period: 0.02, behaviour: 'parts:{behaviour}', group: g{number},"
+        f' with: {{first: {number * 1000000}, count: 1250}}}}'
+        for number in range(8)
+    )
+    text = f"""
+        version: 1
+        nodes:
+          client:
+            service_clients: {{echo: test_msgs/srv/BasicTypes}}
+            timers:
+{timers}
+          server: {{services: {{echo: {{type: test_msgs/srv/BasicTypes, behaviour: 'parts:echo'}}}}}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('right: 1250', times=8)
+
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize(
+    'client',
+    [
+        'on_start: parts:wait_long',
+        'on_start: parts:wait_long_async',
+        'on_start: parts:insist',
+        "timers: {tick: {period: 0.02, behaviour: 'parts:wait_long'}}",
+        "timers: {tick: {period: 0.02, behaviour: 'parts:wait_long_async'}}",
+    ],
+)
+@pytest.mark.parametrize('server', ['nobody', 'hang'])
+def test_a_signal_ends_behaviours_that_wait_for_a_response(compose, plain_server, client, server):
+    if server == 'hang':
+        plain = plain_server('hang')
+        client = client.replace('insist', 'wait_long')
+    child = compose(asking(client, server=''), CODE)
+    child.wait_for_line('asking')
+    if server == 'hang':
+        assert plain.stdout.readline() == 'asked\n'
+
+    assert child.stop(signal.SIGINT) == 0
+    assert 'rror' not in child.output
+    assert 'did not end' not in child.output
+
+
+@pytest.mark.parametrize(
+    ('behaviour', 'summary'),
+    [
+        ('undeclared', "UndeclaredError: node 'client' declares no service client 'asc'"),
+        ('wrong_request', "PayloadError: std_srvs/srv/Trigger_Request has no field 'dat'"),
+    ],
+)
+def test_a_call_that_cannot_be_is_an_error_of_the_behaviour(compose, behaviour, summary):
+    timer = f"timers: {{tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}}}"
+    child = compose(asking(timer), CODE)
+
+    assert summary in child.wait_for_line("timer 'tick' (system.yaml:")
