@@ -7,6 +7,7 @@ import traceback
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     ConditionReachedException,
     Executor,
@@ -124,6 +125,9 @@ class SystemExecutor:
                 self._executor.submit_next(_LONGEST_WAIT_SEC, self._is_over)
             except (ShutdownException, ExternalShutdownException):
                 return
+            except InvalidHandle:
+                # A node was removed, and an entity of it destroyed just as the wait for it began.
+                continue
             except Exception:  # noqa: BLE001 - one fault must not end the dispatch of all nodes
                 self._report(traceback.format_exc())
 

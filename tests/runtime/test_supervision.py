@@ -234,19 +234,18 @@ def test_on_error_restart_rebuilds_the_node_as_at_the_start(compose, peer, wait_
     wait_for(lambda: ticks and ticks[-1].data > 5, 'ticks after the last restart')
     peer.advertise(Int32, 'number').publish(Int32(data=5))
     child.wait_for_line('[INFO] [phoenix]: heard 5')
-    names = peer.node.get_node_names()
+    wait_for(lambda: peer.node.get_node_names().count('phoenix') == 1, 'one such node')
     assert child.stop() == 0
 
     assert set(child.matching('start: ')) == {'[INFO] [phoenix]: start: calm, 0 ticks, []'}
     assert child.matching(']: stop') == ['[INFO] [phoenix]: stop']
-    assert names.count('phoenix') == 1
     assert not child.matching('InvalidHandle')
     assert len(child.matching('Traceback')) == len(child.matching('raised RuntimeError'))
 
 
 def test_a_restart_that_fails_is_tried_again(compose):
     child = compose(RESTARTING, RESTARTING_CODE)
-    child.wait_for_line('[phoenix]: start: ')
+    child.wait_until_ready()
     (compose.folder / 'no_start').touch()
     child.wait_for_line("[ERROR] [composer]: restart: node 'phoenix': on_start raised", times=2)
     alive = len(child.matching('[bystander]: alive'))
