@@ -195,15 +195,35 @@ class Peer:
         wait_for(publisher.get_subscription_count, f'a subscription to {topic}')
         return publisher
 
-    def call(self, service_class, name, **fields):
+    def call(self, service_class, name, /, **fields):
         """Call a service and return its response."""
-        client = self.node.create_client(service_class, name)
-        assert client.wait_for_service(DEADLINE_SEC), f'there is no service {name}'
-        future = client.call_async(service_class.Request(**fields))
+        (response,) = self.call_all(service_class, [name], **fields)
+        return response
+
+    def call_all(self, service_class, names, /, **fields):
+        """Call several services at the same time and return their responses."""
+        clients = [self.node.create_client(service_class, name) for name in names]
+        for client in clients:
+            assert client.wait_for_service(DEADLINE_SEC), f'there is no {client.srv_name}'
+        request = service_class.Request(**fields)
+        calls = [client.call_async(request) for client in clients]
+        sent = time.monotonic()
+
+        def all_done():
+            nonlocal sent
+            # A server that has not found the client's end yet answers into the void.
+            if time.monotonic() > sent + PATIENCE_SEC:
+                sent = time.monotonic()
+                for index, client in enumerate(clients):
+                    if not calls[index].done():
+                        calls[index] = client.call_async(request)
+            return all(call.done() for call in calls)
+
         self._executor.wake()
-        wait_for(future.done, f'a response of {name}')
-        self.node.destroy_client(client)
-        return future.result()
+        wait_for(all_done, f'the responses of {names}')
+        for client in clients:
+            self.node.destroy_client(client)
+        return [call.result() for call in calls]
 
     def close(self):
         self._spinning = False

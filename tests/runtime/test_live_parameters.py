@@ -327,7 +327,7 @@ def test_on_parameters_hears_an_atomic_change_as_one(child, shared_peer, get):
     assert get('other', 'judging') == 'a'
 
 
-def test_many_async_on_parameters_at_once_do_not_starve_each_other(compose, peer, wait_for):
+def test_many_async_on_parameters_at_once_do_not_starve_each_other(compose, peer):
     nodes = '\n'.join(
         f'  judge_{n}: {{parameters: {{limit: 0}}, on_parameters: parts:judge}}' for n in range(6)
     )
@@ -338,15 +338,11 @@ def test_many_async_on_parameters_at_once_do_not_starve_each_other(compose, peer
             time.sleep(0.2)
     """
     compose(f'version: 1\nexecutor: {{threads: 2}}\nnodes:\n{nodes}\n', code).wait_until_ready()
-    clients = [
-        peer.node.create_client(SetParameters, f'judge_{n}/set_parameters') for n in range(6)
-    ]
-    wait_for(lambda: all(client.service_is_ready() for client in clients), 'the services')
-    request = SetParameters.Request(parameters=[Parameter('limit', value=1).to_parameter_msg()])
-    futures = [client.call_async(request) for client in clients]
+    names = [f'judge_{n}/set_parameters' for n in range(6)]
+    change = Parameter('limit', value=1).to_parameter_msg()
 
-    wait_for(lambda: all(future.done() for future in futures), 'all answers')
-    assert all(future.result().results[0].successful for future in futures)
+    responses = peer.call_all(SetParameters, names, parameters=[change])
+    assert [response.results[0].successful for response in responses] == [True] * 6
 
 
 OVERRIDDEN = """
