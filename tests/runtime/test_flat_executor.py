@@ -326,9 +326,33 @@ except KeyboardInterrupt:
     assert process.stdout.readline() == 'ready\n'
     time.sleep(0.3)
     process.send_signal(getattr(signal, name))
-    output, _ = process.communicate(timeout=DEADLINE_SEC)
+    try:
+        output, _ = process.communicate(timeout=DEADLINE_SEC)
+    finally:
+        process.kill()
+        process.communicate()
     assert output in ('interrupted\n', 'returned\n')
     assert process.returncode == 0
+
+
+def test_spin_ends_when_a_signal_ends_the_context_during_a_look_at_events(
+    node: Any, executor: Any, context: Context, monkeypatch: Any
+) -> None:
+    lane = executor._engine.lane
+    sweep = lane._sweep
+
+    def sweep_in_vain() -> None:
+        if lane._default.sources:
+            context.handle.shutdown()  # As rclpy's handler of signals does it.
+            lane._default.due = 0.0
+        sweep()
+
+    monkeypatch.setattr(lane, '_sweep', sweep_in_vain)
+    node.create_subscription(Empty, 'looked_at', lambda _: None, 1)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
 
 
 def test_two_executors_of_two_contexts_do_not_meet(executor: Any, node: Any) -> None:

@@ -179,8 +179,10 @@ class Lane:
             self._engine.report(error)
         finally:
             with self._answered:
-                self._thread = None
+                if self._thread is threading.current_thread():
+                    self._thread = None
                 self._answered.notify_all()
+            self._engine.wake()  # Also after an error that only told of a lost context.
 
     def _wait_and_look(self) -> None:
         unused_since: float | None = None
@@ -198,8 +200,6 @@ class Lane:
                 if self._closing or over or not self._engine.context_is_valid():
                     self._thread = None
                     self._wait_set = None
-                    self._answered.notify_all()
-                    self._engine.wake()
                     return
             self._wait(_UNUSED_SEC if unused else None)
             self._sweep()
