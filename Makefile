@@ -9,7 +9,7 @@ else
 EXTRAS := ros,interfaces,ros-test,test
 endif
 
-.PHONY: up test check format clean
+.PHONY: up test check format bench clean
 
 up: .venv/ready
 	@$(BIN)/composer up $(CONFIG)
@@ -25,6 +25,9 @@ check: .venv/ready
 format: .venv/ready
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+bench: .venv/ready
+	$(BIN)/python -m benchmarks.run --json build/bench.json $(ARGS)
 
 clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache

@@ -289,6 +289,38 @@ def peer(domain_id):
     peer.close()
 
 
+@pytest.fixture
+def context(domain_id):
+    """Return a context of rclpy in the test's domain."""
+    import rclpy
+
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain_id)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def executor(context):
+    """Return an executor that does what rclpy's do."""
+    from composer.runtime.flat_executor import ComposerExecutor
+
+    executor = ComposerExecutor(context=context)
+    yield executor
+    executor.shutdown(5.0)
+
+
+@pytest.fixture
+def node(context, executor):
+    """Return a node in the executor."""
+    import rclpy
+
+    node = rclpy.create_node('node', context=context)
+    executor.add_node(node)
+    yield node
+    node.destroy_node()
+
+
 @pytest.fixture(scope='module')
 def shared_compose(tmp_path_factory):
     """Run systems that all tests of a module look at."""

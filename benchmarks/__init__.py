@@ -1,0 +1,1 @@
+"""What executors cost: `ComposerExecutor` beside those of rclpy."""

@@ -1,0 +1,182 @@
+"""The threads: a leader that runs everything, and others for when a callback holds it up.
+
+The leader waits for events and runs the callbacks itself, so that a short callback costs no
+thread switch. A standby sleeps on a kernel timer that the leader sets before a callback; if the
+leader is still in that callback when it wakes, the standby leads, and another thread stands by.
+A callback that was slow last time makes the standby lead at once. Spare threads end by themselves.
+"""
+
+import _thread
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from composer.runtime.flat_executor.rcl import TimerFd
+
+PATIENCE_SEC = 0.001
+_SPARE_SEC = 2.0
+
+
+class Worker:
+    """A thread that does one job after the other."""
+
+    def __init__(self, crew: 'Crew', job: Callable[['Worker'], None]) -> None:
+        self.busy_since = 0.0
+        self.job: Callable[[Worker], None] | None = job
+        self.called = threading.Lock()
+        self.called.acquire()
+        self._crew = crew
+        _thread.start_new_thread(self._work, ())  # Unlike `Thread.start`, it does not wait.
+
+    def _work(self) -> None:
+        threading.current_thread().name = 'executor-worker'
+        with self._crew.enlisted(self):
+            while self.job is not None:
+                self.job(self)
+                self.job = None
+                self._crew.rest(self)
+
+
+class Crew:
+    """The threads of one executor."""
+
+    def __init__(self, lead: Callable[[Worker], None]) -> None:
+        self.lock = threading.Lock()
+        self.leader: Worker | None = None
+        self._standby: Worker | None = None
+        self._lead = lead
+        self._timer = TimerFd(blocking=True)
+        self._armed = False
+        self._spares: list[Worker] = []
+        self._workers: dict[int, Worker] = {}
+        self._handover: threading.Lock | None = None
+
+    @contextmanager
+    def enlisted(self, worker: Worker) -> Iterator[None]:
+        """Know `worker`, which is the present thread, meanwhile."""
+        ident = threading.get_ident()
+        self._workers[ident] = worker
+        try:
+            yield
+        finally:
+            del self._workers[ident]
+
+    def is_in_callback(self) -> bool:
+        """Tell whether this is called from a callback that a worker runs."""
+        worker = self._workers.get(threading.get_ident())
+        return worker is not None and worker.busy_since > 0
+
+    def muster(self) -> None:
+        """See that there are a leader and a standby."""
+        with self.lock:
+            if self.leader is None:
+                self.leader = self._call(self._lead)
+            self._appoint_standby()
+
+    def leads(self, worker: Worker, is_wanted: Callable[[], bool]) -> bool:
+        """Tell whether `worker` is to lead on; if nobody is wanted, nobody leads from now on."""
+        if self.leader is worker and is_wanted():
+            return True
+        with self.lock:
+            if self.leader is not worker:
+                return False
+            if is_wanted():
+                return True
+            self.leader = None
+            worker.busy_since = 0.0
+            self._wake_standby()
+            return False
+
+    def dispatch(self, job: Callable[[Worker], None]) -> None:
+        """Have some thread do `job`."""
+        with self.lock:
+            self._call(job)
+
+    def begin(self, worker: Worker) -> None:
+        """Note that `worker` begins a callback."""
+        worker.busy_since = time.monotonic()
+        if not self._armed:
+            self._armed = True
+            self._timer.after_ns(int(PATIENCE_SEC * 1e9))
+
+    def end_watch(self, worker: Worker) -> None:
+        """Let the standby sleep: `worker` leads and will wait, and others want the interpreter."""
+        with self.lock:
+            if self._armed and self.leader is worker:
+                self._armed = False
+                self._timer.disarm()
+
+    def pass_on(self, worker: Worker) -> None:
+        """Let the standby lead at once, for what `worker` begins will take long.
+
+        Wait until it does, lest it has to wrest the interpreter from a computing callback.
+        """
+        with self.lock:
+            if self.leader is not worker or self._standby is None:
+                return
+            self.leader = self._standby
+            self._handover = handover = threading.Lock()
+            handover.acquire()
+            self._wake_standby()
+        handover.acquire(timeout=PATIENCE_SEC)
+
+    def rest(self, worker: Worker) -> None:
+        """Wait for the next job; return without one to end the thread."""
+        with self.lock:
+            self._spares.append(worker)
+        if worker.called.acquire(timeout=_SPARE_SEC):
+            return
+        with self.lock:
+            if worker in self._spares:
+                self._spares.remove(worker)
+                return
+        worker.called.acquire()
+
+    def _call(self, job: Callable[[Worker], None]) -> Worker:
+        if self._spares:
+            worker = self._spares.pop()
+            worker.job = job
+            worker.called.release()
+            return worker
+        return Worker(self, job)
+
+    def _appoint_standby(self) -> None:
+        if self._standby is None:
+            self._standby = self._call(self._stand_by)
+
+    def _wake_standby(self) -> None:
+        if self._standby is not None:
+            self._armed = True
+            self._timer.after_ns(1)
+
+    def _stand_by(self, me: Worker) -> None:
+        while True:
+            self._timer.read()
+            with self.lock:
+                self._armed = False
+                leader = self.leader
+                if leader is None:
+                    self._standby = None
+                    return
+                if leader is me or self._is_late(leader):
+                    self.leader = me
+                    self._standby = None
+                    self._appoint_standby()
+                    if self._handover is not None:
+                        self._handover.release()
+                        self._handover = None
+                    break
+        self._lead(me)
+
+    def _is_late(self, leader: Any) -> bool:
+        since = leader.busy_since
+        if not since:
+            return False
+        left = PATIENCE_SEC - (time.monotonic() - since)
+        if left <= 0:
+            return True
+        self._armed = True
+        self._timer.after_ns(int(left * 1e9))
+        return False

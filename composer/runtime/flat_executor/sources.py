@@ -1,0 +1,223 @@
+"""What sources are, and the plain ones: subscriptions, services and clients.
+
+A source knows how to hear of news of an entity, take it and run the callback. Each does what
+`rclpy.executors.Executor` does for its kind (`_take_subscription` and so on).
+"""
+
+import inspect
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from rclpy.exceptions import InvalidHandle
+from rclpy.subscription import Subscription
+
+from composer.runtime.flat_executor import rcl
+from composer.runtime.flat_executor.schedule import Group, Schedule
+from composer.runtime.flat_executor.signals import UNKNOWN
+
+if TYPE_CHECKING:
+    from composer.runtime.flat_executor.alarms import Alarms
+    from composer.runtime.flat_executor.signals import Signal, SignalBoard
+
+NOTHING = object()
+"""What `Source.run` returns when there was nothing to take."""
+
+
+class Desk:
+    """What sources work with: the parts of one executor."""
+
+    def __init__(
+        self,
+        executor: Any,
+        schedule: Schedule,
+        board: 'SignalBoard',
+        alarms: 'Alarms',
+    ) -> None:
+        self.executor = executor
+        self.schedule = schedule
+        self.board = board
+        self.alarms = alarms
+        self.look_again: Callable[[Source], None] = _look_at_nothing
+
+
+def _look_at_nothing(_: 'Source') -> None:
+    """Stand in until there is a lane."""
+
+
+class Source:
+    """An entity in an executor; subclasses know its kind."""
+
+    __slots__ = (
+        '__weakref__',
+        '_asynchronous',
+        '_callback',
+        'alive',
+        'desk',
+        'entity',
+        'group',
+        'node',
+        'pending',
+        'queued',
+        'signal',
+        'slow',
+        'stamp',
+    )
+
+    def __init__(self, entity: Any, node: Any, desk: Desk) -> None:
+        self.entity = entity
+        self.node = node
+        self.desk = desk
+        self.group: Group = desk.schedule.group_of(entity.callback_group)
+        self.alive = True
+        self.queued = False
+        self.pending = 0
+        self.stamp = 0
+        self.slow = False
+        self.signal: Signal | None = None
+        self._callback: Any = None
+        self._asynchronous = False
+
+    def open(self, shared: 'Signal | None' = None) -> None:
+        """Begin to listen."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Listen no more."""
+        raise NotImplementedError
+
+    def run(self) -> Any:
+        """Take and run the callback; returns its coroutine if it is one, or `NOTHING`."""
+        raise NotImplementedError
+
+    def on_signal(self, count: int) -> None:
+        """Hear of news."""
+        self.desk.schedule.announce(self, count)
+
+    def _is_async(self, callback: Any) -> bool:
+        if callback is not self._callback:
+            self._callback = callback
+            self._asynchronous = inspect.iscoroutinefunction(callback)
+        return self._asynchronous
+
+    def _watch(self, watch: Callable[[int, int | None], None], shared: 'Signal | None') -> None:
+        self.signal = self.desk.board.attach(self, shared)
+        try:
+            with self.entity.handle:
+                watch(self.entity.handle.pointer, self.signal.fd)
+        except BaseException:
+            self.desk.board.detach(self, self.signal)
+            raise
+        self.desk.schedule.announce(self, UNKNOWN)
+
+    def _unwatch(self, watch: Callable[[int, int | None], None]) -> None:
+        self.alive = False
+        with suppress(InvalidHandle, rcl.ExecutorError), self.entity.handle:
+            watch(self.entity.handle.pointer, None)
+        if self.signal is not None:
+            self.desk.board.detach(self, self.signal)
+
+
+class SubscriptionSource(Source):
+    """A subscription."""
+
+    __slots__ = ()
+
+    def open(self, shared: 'Signal | None' = None) -> None:
+        """See the base class."""
+        self._watch(rcl.watch_subscription, shared)
+
+    def close(self) -> None:
+        """See the base class."""
+        self._unwatch(rcl.watch_subscription)
+
+    def run(self) -> Any:
+        """See the base class."""
+        entity = self.entity
+        stamp = self.stamp
+        handle = entity.handle
+        try:
+            with handle:
+                taken = handle.take_message(entity.msg_type, entity.raw)
+        except InvalidHandle:
+            return NOTHING
+        if taken is None:
+            self.desk.schedule.drained(self, stamp)
+            return NOTHING
+        callback = entity.callback
+        if entity._callback_type is Subscription.CallbackType.MessageOnly:  # noqa: SLF001
+            result = callback(taken[0])
+        else:
+            result = callback(*taken)
+        return result if self._is_async(callback) else None
+
+
+class ClientSource(Source):
+    """A service client."""
+
+    __slots__ = ()
+
+    def open(self, shared: 'Signal | None' = None) -> None:
+        """See the base class."""
+        self._watch(rcl.watch_client, shared)
+
+    def close(self) -> None:
+        """See the base class."""
+        self._unwatch(rcl.watch_client)
+
+    def run(self) -> Any:
+        """See the base class."""
+        stamp = self.stamp
+        try:
+            handle = self.entity.handle
+            with handle:
+                header, response = handle.take_response(self.entity.srv_type.Response)
+        except InvalidHandle:
+            return NOTHING
+        if header is None:
+            self.desk.schedule.drained(self, stamp)
+            return NOTHING
+        try:
+            future = self.entity.get_pending_request(header.request_id.sequence_number)
+        except KeyError:
+            return NOTHING  # The request was given up.
+        future._set_executor(self.desk.executor)  # noqa: SLF001
+        future.set_result(response)
+        return None
+
+
+class ServiceSource(Source):
+    """A service."""
+
+    __slots__ = ()
+
+    def open(self, shared: 'Signal | None' = None) -> None:
+        """See the base class."""
+        self._watch(rcl.watch_service, shared)
+
+    def close(self) -> None:
+        """See the base class."""
+        self._unwatch(rcl.watch_service)
+
+    def run(self) -> Any:
+        """See the base class."""
+        stamp = self.stamp
+        service = self.entity
+        try:
+            handle = service.handle
+            with handle:
+                request, header = handle.service_take_request(service.srv_type.Request)
+        except InvalidHandle:
+            return NOTHING
+        if header is None:
+            self.desk.schedule.drained(self, stamp)
+            return NOTHING
+        callback = service.callback
+        response = callback(request, service.srv_type.Response())
+        if self._is_async(callback):
+            return self._respond(response, header)
+        service.send_response(response, header)
+        return None
+
+    async def _respond(self, response: Any, header: Any) -> None:
+        self.entity.send_response(await response, header)
