@@ -107,7 +107,11 @@ class _Constructor:
         if isinstance(value, str):
             return value
         if not isinstance(node, ScalarNode):
-            self._fault(node, 'bad-key', 'a key is a string, not a list or a mapping')
+            # `{{ name }}` without quotes is a mapping whose key is a mapping.
+            template = isinstance(node, MappingNode)
+            quoting = 'put an expression in quotes: "{{ name }}"' if template else None
+            message = 'a key is a string, not a list or a mapping'
+            self._fault(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
             self._fault(node, 'bad-key', 'a key is a string, and nothing stands here')
