@@ -14,7 +14,7 @@ from composer.runtime.behaviours import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import CoroutineType
+    from types import CoroutineType, FrameType
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,9 @@ class RunningCall:
     def format_stack(self) -> str:
         """Return where it is now, innermost call last."""
         if self.coroutine is not None:
-            return ''.join(traceback.format_stack(self.coroutine.cr_frame)).rstrip()
-        frame = sys._current_frames().get(self.thread or 0)  # noqa: SLF001 - the only way to it
+            frame: FrameType | None = getattr(self.coroutine, 'cr_frame', None)
+        else:
+            frame = sys._current_frames().get(self.thread or 0)  # noqa: SLF001 - the only way
         return ''.join(traceback.format_stack(frame)).rstrip() if frame else '  (it has ended)'
 
 
@@ -132,7 +133,12 @@ class BehaviourCall:
         return True
 
     async def _run_async(self, *arguments: Any) -> None:
-        coroutine: CoroutineType[Any, Any, Any] = self._function(*arguments)
+        try:
+            # A wrapper of an async function may itself be a plain one, and raise at once.
+            coroutine: CoroutineType[Any, Any, Any] = self._function(*arguments)
+        except BaseException as error:  # noqa: BLE001 - a behaviour never takes another node down
+            self._failed(self._owner, error)
+            return
         token = self._ledger.begin(RunningCall(self._owner, None, coroutine))
         try:
             self._deliver(await coroutine)
