@@ -118,6 +118,8 @@ def _check_signature(
     # What is given, with misspelt names as they were meant: their finding is enough.
     was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
     given = set(free if was_dropped else behaviour.arguments)
+    # An argument whose expression failed is given all the same.
+    given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
             given.remove(keyword)

@@ -10,7 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 from rclpy.action import ActionServer
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import (
+    CallbackGroup,
+    MutuallyExclusiveCallbackGroup,
+    ReentrantCallbackGroup,
+)
 from rclpy.service import Service
 
 
@@ -44,33 +48,25 @@ class Gate:
         return self.is_open or (self.serves and isinstance(entity, (Service, ActionServer)))
 
 
-class GatedMutuallyExclusiveGroup(MutuallyExclusiveCallbackGroup):
+class _GatedGroup(CallbackGroup):
+    """Asks its gate before it asks the kind of group that it is mixed with."""
+
+    def __init__(self, gate: Gate) -> None:
+        super().__init__()
+        self._gate = gate
+
+    def can_execute(self, entity: Any) -> bool:
+        """See the base class."""
+        return self._gate.lets(entity) and bool(super().can_execute(entity))
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """See the base class."""
+        return self._gate.lets(entity) and bool(super().beginning_execution(entity))
+
+
+class GatedMutuallyExclusiveGroup(_GatedGroup, MutuallyExclusiveCallbackGroup):
     """One callback at a time, and none while the gate is closed."""
 
-    def __init__(self, gate: Gate) -> None:
-        super().__init__()
-        self._gate = gate
 
-    def can_execute(self, entity: Any) -> bool:
-        """See the base class."""
-        return self._gate.lets(entity) and bool(super().can_execute(entity))
-
-    def beginning_execution(self, entity: Any) -> bool:
-        """See the base class."""
-        return self._gate.lets(entity) and bool(super().beginning_execution(entity))
-
-
-class GatedReentrantGroup(ReentrantCallbackGroup):
+class GatedReentrantGroup(_GatedGroup, ReentrantCallbackGroup):
     """Any number of callbacks at a time, and none while the gate is closed."""
-
-    def __init__(self, gate: Gate) -> None:
-        super().__init__()
-        self._gate = gate
-
-    def can_execute(self, entity: Any) -> bool:
-        """See the base class."""
-        return self._gate.lets(entity) and bool(super().can_execute(entity))
-
-    def beginning_execution(self, entity: Any) -> bool:
-        """See the base class."""
-        return self._gate.lets(entity) and bool(super().beginning_execution(entity))

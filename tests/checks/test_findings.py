@@ -107,3 +107,16 @@ def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
     assert [(finding.rule, finding.span.line) for finding in findings] == [
         ('unknown-behaviour', 2)
     ]
+
+
+def test_an_argument_whose_expression_fails_is_not_missed_again(tmp_path):
+    (tmp_path / 'taking.py').write_text('def send(node, order): ...\n')
+    path = tmp_path / 'system.yaml'
+    path.write_text(
+        'version: 1\n'
+        'nodes:\n'
+        '  a:\n'
+        '    on_start: {behaviour: taking:send, with: {order: "{{ ordr }}"}}\n'
+    )
+    ((_, findings),) = check_files([path])
+    assert [finding.rule for finding in findings] == ['undefined-name']
