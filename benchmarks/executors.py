@@ -7,7 +7,7 @@ from typing import Any
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 
-from composer.runtime.flat_executor import ComposerExecutor
+from composer.runtime.executor import ComposerExecutor
 
 _FINITE_WAIT_SEC = 0.05
 

@@ -303,7 +303,7 @@ def context(domain_id):
 @pytest.fixture
 def executor(context):
     """Return an executor that does what rclpy's do."""
-    from composer.runtime.flat_executor import ComposerExecutor
+    from composer.runtime.executor import ComposerExecutor
 
     executor = ComposerExecutor(context=context)
     yield executor

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
-from composer.runtime.executor import NoResponseError
 from composer.runtime.payloads import converter_for
 from composer.runtime.qos import create_qos_profile
+from composer.runtime.system_executor import NoResponseError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

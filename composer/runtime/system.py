@@ -12,12 +12,12 @@ from rclpy.context import Context
 
 from composer.errors import ComposerError, ExitCode, StartError, UsageError
 from composer.runtime.entities import create_entities
-from composer.runtime.executor import SystemExecutor
 from composer.runtime.failures import ServiceFailures
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
 from composer.runtime.stopping import stop_nodes
 from composer.runtime.supervision import Supervisor
+from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.waiting import StopSignal
 
 if TYPE_CHECKING:

@@ -10,15 +10,15 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.runtime.flat_executor.alarms import Alarms, Delay
-from composer.runtime.flat_executor.crew import PATIENCE_SEC, Crew, Worker
-from composer.runtime.flat_executor.execution import Execution
-from composer.runtime.flat_executor.lane import Lane
-from composer.runtime.flat_executor.news import News
-from composer.runtime.flat_executor.registry import Registry
-from composer.runtime.flat_executor.schedule import Schedule
-from composer.runtime.flat_executor.signals import SignalBoard
-from composer.runtime.flat_executor.sources import Desk
+from composer.runtime.executor.alarms import Alarms, Delay
+from composer.runtime.executor.crew import PATIENCE_SEC, Crew, Worker
+from composer.runtime.executor.execution import Execution
+from composer.runtime.executor.lane import Lane
+from composer.runtime.executor.news import News
+from composer.runtime.executor.registry import Registry
+from composer.runtime.executor.schedule import Schedule
+from composer.runtime.executor.signals import SignalBoard
+from composer.runtime.executor.sources import Desk
 
 COURTESY_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""

@@ -11,8 +11,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
 from rclpy.task import Future, Task
 
-from composer.runtime.flat_executor.engine import COURTESY_SEC, Engine
-from composer.runtime.flat_executor.tasks import Resume, TaskRun
+from composer.runtime.executor.engine import COURTESY_SEC, Engine
+from composer.runtime.executor.tasks import Resume, TaskRun
 
 _MOST_THREADS = 256
 

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 
-from composer.runtime.flat_executor.signals import UNKNOWN
+from composer.runtime.executor.signals import UNKNOWN
 
 
 class Group:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.subscription import Subscription
 
-from composer.runtime.flat_executor import rcl
-from composer.runtime.flat_executor.schedule import Group, Schedule
-from composer.runtime.flat_executor.signals import UNKNOWN
+from composer.runtime.executor import rcl
+from composer.runtime.executor.schedule import Group, Schedule
+from composer.runtime.executor.signals import UNKNOWN
 
 if TYPE_CHECKING:
-    from composer.runtime.flat_executor.alarms import Alarms
-    from composer.runtime.flat_executor.signals import Signal, SignalBoard
+    from composer.runtime.executor.alarms import Alarms
+    from composer.runtime.executor.signals import Signal, SignalBoard
 
 NOTHING = object()
 """What `Source.run` returns when there was nothing to take."""

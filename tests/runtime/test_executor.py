@@ -34,7 +34,7 @@ from std_msgs.msg import Empty, Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from composer.runtime.flat_executor import ComposerExecutor
+from composer.runtime.executor import ComposerExecutor
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
@@ -307,7 +307,7 @@ def test_no_callback_begins_after_spin_has_returned(node: Any, executor: Any) ->
 def test_signals_end_spin(name: str, how: str) -> None:
     program = f"""
 import rclpy, threading, time
-from composer.runtime.flat_executor import ComposerExecutor
+from composer.runtime.executor import ComposerExecutor
 rclpy.init(domain_id={100 + os.getpid() % 100})
 node = rclpy.create_node('node')
 executor = ComposerExecutor()

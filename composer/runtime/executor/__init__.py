@@ -22,6 +22,6 @@ Locks are held for moments and nothing is called under them but the next in this
 `lane`, `crew`, `schedule`, `alarms`, `signals`. A callback, a take and a wait run under none.
 """
 
-from composer.runtime.flat_executor.executor import ComposerExecutor
+from composer.runtime.executor.composer_executor import ComposerExecutor
 
 __all__ = ['ComposerExecutor']

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.runtime.flat_executor import rcl
-from composer.runtime.flat_executor.signals import UNKNOWN
-from composer.runtime.flat_executor.sources import NOTHING, Source
+from composer.runtime.executor import rcl
+from composer.runtime.executor.signals import UNKNOWN
+from composer.runtime.executor.sources import NOTHING, Source
 
 if TYPE_CHECKING:
-    from composer.runtime.flat_executor.alarms import ClockWatch
-    from composer.runtime.flat_executor.signals import Signal
+    from composer.runtime.executor.alarms import ClockWatch
+    from composer.runtime.executor.signals import Signal
 
 
 class _WaitablePart:

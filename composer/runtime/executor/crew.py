@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from composer.runtime.flat_executor.rcl import TimerFd
+from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
 _SPARE_SEC = 2.0

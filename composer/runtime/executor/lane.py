@@ -19,8 +19,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.waitable import NumberOfEntities
 
-from composer.runtime.flat_executor.sources import Desk, Source
-from composer.runtime.flat_executor.waitables import (
+from composer.runtime.executor.sources import Desk, Source
+from composer.runtime.executor.waitables import (
     GuardConditionSource,
     PolledSource,
     WaitableSource,

@@ -12,7 +12,7 @@ import select
 import threading
 from typing import Protocol
 
-from composer.runtime.flat_executor.rcl import peek_epoll, read_eventfd, write_eventfd
+from composer.runtime.executor.rcl import peek_epoll, read_eventfd, write_eventfd
 
 _MOST_EVENTS = 512
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.runtime.flat_executor import rcl
-from composer.runtime.flat_executor.sources import NOTHING, Source
+from composer.runtime.executor import rcl
+from composer.runtime.executor.sources import NOTHING, Source
 
 if TYPE_CHECKING:
-    from composer.runtime.flat_executor.alarms import ClockWatch
-    from composer.runtime.flat_executor.signals import Signal
+    from composer.runtime.executor.alarms import ClockWatch
+    from composer.runtime.executor.signals import Signal
 
 
 class TimerSource(Source):

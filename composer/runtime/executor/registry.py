@@ -9,17 +9,17 @@ from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
 
-from composer.runtime.flat_executor.lane import Lane
-from composer.runtime.flat_executor.signals import Signal
-from composer.runtime.flat_executor.sources import (
+from composer.runtime.executor.lane import Lane
+from composer.runtime.executor.signals import Signal
+from composer.runtime.executor.sources import (
     ClientSource,
     Desk,
     ServiceSource,
     Source,
     SubscriptionSource,
 )
-from composer.runtime.flat_executor.timers import TimerSource
-from composer.runtime.flat_executor.waitables import (
+from composer.runtime.executor.timers import TimerSource
+from composer.runtime.executor.waitables import (
     ActionSource,
     GuardConditionSource,
     PolledSource,

@@ -3,10 +3,10 @@
 from contextlib import suppress
 from typing import Any
 
-from composer.runtime.flat_executor.alarms import Alarms, Delay
-from composer.runtime.flat_executor.schedule import Schedule
-from composer.runtime.flat_executor.sources import NOTHING, Source
-from composer.runtime.flat_executor.tasks import Resume, TaskRun, awaited_future, task_of
+from composer.runtime.executor.alarms import Alarms, Delay
+from composer.runtime.executor.schedule import Schedule
+from composer.runtime.executor.sources import NOTHING, Source
+from composer.runtime.executor.tasks import Resume, TaskRun, awaited_future, task_of
 
 _RETRY_SEC = 0.001
 
