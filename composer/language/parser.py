@@ -10,7 +10,6 @@ from composer.language.parameters import convert_parameter_value, infer_paramete
 from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
-    DEFAULT_THREADS,
     ActionClientSpec,
     ActionSpec,
     BehaviourSpec,
@@ -50,7 +49,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         description=data.get('description', ''),
         interfaces=MappingProxyType(data.get('interfaces', {})),
         qos=_parse_entries(data, (), 'qos', _parse_named_qos),
-        threads=int(executor.get('threads', DEFAULT_THREADS)),
+        threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
         nodes=_parse_entries(
             data,

@@ -18,7 +18,6 @@ OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
-DEFAULT_THREADS = 8
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 REENTRANT = 'reentrant'
 
@@ -249,7 +248,7 @@ class SystemSpec:
         name: The file's name without its ending.
         interfaces: The folders of interface packages to build if they are not installed.
         qos: The named profiles of the file.
-        threads: How many callbacks may run at the same time.
+        threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
     """
 
@@ -257,6 +256,6 @@ class SystemSpec:
     description: str
     interfaces: Mapping[str, str]
     qos: Mapping[str, QosSpec]
-    threads: int
+    threads: int | None
     shutdown_timeout_sec: float
     nodes: Mapping[str, NodeSpec]

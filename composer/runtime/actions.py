@@ -82,7 +82,7 @@ class _Server(ActionServer):
         """See the base class."""
         callback = execute_callback or self._execution.callback
         if self._execution.is_async:
-            self._live.services.create_task(self._execute_in_task, callback, goal_handle)
+            self._live.services.executor.create_task(self._execute_in_task, callback, goal_handle)
         else:
             threading.Thread(
                 target=self._execute_in_thread, args=(callback, goal_handle), daemon=True

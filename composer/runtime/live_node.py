@@ -23,11 +23,9 @@ from composer.runtime.waiting import CoroutineWaits, ThreadWaits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from contextlib import AbstractContextManager
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.context import Context
-    from rclpy.task import Task
     from rclpy.timer import Timer
 
     from composer.language.positions import DataPath, SourceMap
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
     from composer.runtime.service_clients import ServiceClient
+    from composer.runtime.system_executor import SystemExecutor
     from composer.runtime.waiting import StopSignal
 
 
@@ -47,8 +46,7 @@ class SystemServices:
         ros_arguments: The arguments after `--ros-args` of the command line.
         act_on_error: Takes a node's name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
-        create_task: Runs a function or coroutine function among the callbacks.
-        waiting: The context in which a callback may wait for other callbacks.
+        executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
         failures: Which services failed lately.
     """
@@ -60,8 +58,7 @@ class SystemServices:
     ros_arguments: Sequence[str]
     act_on_error: Callable[[str, OnError], None]
     shutdown: Callable[[int], None]
-    create_task: Callable[..., Task]
-    waiting: Callable[[], AbstractContextManager[None]]
+    executor: SystemExecutor
     stop: StopSignal
     failures: ServiceFailures
 
@@ -205,7 +202,7 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
     action_clients: dict[str, ActionClient] = {}
     background = ReentrantCallbackGroup()
     gate = Gate()
-    waits = ThreadWaits(services.waiting, services.stop)
+    waits = ThreadWaits(services.executor.waiting, services.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
     node = LiveNode(
@@ -218,7 +215,7 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
         service_clients=service_clients,
         action_clients=action_clients,
         waits=waits,
-        coroutine_waits=CoroutineWaits(ros, background, waits),
+        coroutine_waits=CoroutineWaits(services.executor, waits),
         background=background,
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),

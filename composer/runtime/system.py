@@ -54,7 +54,7 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = Context()
         _init_context(self._context, ros_arguments)
-        self._executor = SystemExecutor(self._context, spec.threads, report=system_logger.error)
+        self._executor = SystemExecutor(self._context, spec.threads, log=system_logger.error)
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(
             context=self._context,
@@ -64,8 +64,7 @@ class System:
             ros_arguments=ros_arguments,
             act_on_error=self._supervisor.act,
             shutdown=self.request_stop,
-            create_task=self._executor.create_task,
-            waiting=self._executor.waiting,
+            executor=self._executor,
             stop=self._stop_signal,
             failures=ServiceFailures(),
         )
@@ -85,8 +84,6 @@ class System:
             self._exit_code = code
         self._stop_signal.set()
         self._wake_ups.put(None)
-        # Coroutines that waited are resumed when the executor looks at them again.
-        self._executor.wake()
 
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
@@ -102,6 +99,7 @@ class System:
             self._executor.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None
+            self._executor.wake()
             for node in list(self._nodes.values()):
                 self._run_on_start(node)
         except BaseException:
@@ -113,8 +111,7 @@ class System:
         nodes = '1 node' if count == 1 else f'{count} nodes'
         elapsed = time.monotonic() - self._begun
         system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
-        for node in self._nodes.values():
-            self._open(node)
+        self._open(list(self._nodes.values()))
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -169,10 +166,11 @@ class System:
         node.gate.serves = not self.stop_requested
         self._executor.wake()
 
-    def _open(self, node: LiveNode) -> None:
-        node.gate.open()
-        for timer in node.timers:
-            timer.reset()
+    def _open(self, nodes: list[LiveNode]) -> None:
+        for node in nodes:
+            node.gate.open()
+            for timer in node.timers:
+                timer.reset()
         self._executor.wake()
 
     def _restart(self, name: str) -> None:
@@ -185,6 +183,7 @@ class System:
             if not old.ledger.wait_until_idle(self._spec.shutdown_timeout_sec):
                 system_logger.error(f"node '{name}' is not restarted: one of its behaviours hangs")
                 old.gate.open()
+                self._executor.wake()
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
@@ -196,7 +195,7 @@ class System:
                 system_logger.error(f'restart: {error}')
                 self._supervisor.act(name, 'restart')
                 return
-            self._open(node)
+            self._open([node])
         system_logger.warn(f"node '{name}' was restarted")
 
     def _tear_down(self) -> None:

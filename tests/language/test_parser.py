@@ -26,7 +26,7 @@ def test_a_system_has_the_name_of_its_file(tmp_path):
 def test_a_system_without_anything_has_the_defaults():
     spec = load('nodes: {}')
     assert (spec.description, dict(spec.qos), dict(spec.nodes)) == ('', {}, {})
-    assert (spec.threads, spec.shutdown_timeout_sec) == (8, 5.0)
+    assert (spec.threads, spec.shutdown_timeout_sec) == (None, 5.0)
 
 
 def test_the_executor_is_as_declared():
