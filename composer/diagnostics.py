@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,6 +29,11 @@ class SourceFile:
 
     name: str
     lines: tuple[str, ...]
+
+    @property
+    def folder(self) -> str:
+        """The absolute path of the folder that it lies in."""
+        return str(Path(self.name).resolve().parent)
 
     def line(self, number: int) -> str:
         """Return line `number`, counted from 1; an empty string past the end."""
@@ -97,6 +103,10 @@ class Diagnostic:
     severity: Severity = Severity.ERROR
     help: str | None = None
     related: tuple[Related, ...] = field(default=())
+
+    def with_related(self, related: Iterable[Related]) -> Diagnostic:
+        """Return the same finding with more places that take part in it."""
+        return replace(self, related=(*self.related, *related))
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:

@@ -99,7 +99,7 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if not argument.name.isidentifier() or argument.name in _RESERVED:
+    if not is_usable_name(argument.name):
         yield (), f"'{argument.name}' cannot stand in an expression as a name"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
@@ -109,6 +109,11 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
             yield keys, fault
     if default is not None and choices and default not in choices:
         yield ('default',), f'the default {default!r} is none of the choices'
+
+
+def is_usable_name(name: str) -> bool:
+    """Return whether an expression can use a name."""
+    return name.isidentifier() and name not in _RESERVED
 
 
 def _find_value_fault(value: Any, type_name: str) -> str | None:

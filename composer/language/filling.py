@@ -18,6 +18,7 @@ class FilledDocument:
         failed: The paths of the scalars that could not be evaluated.
         sampled: The paths of the scalars whose values hang on samples, and are not the real ones.
         sampled_spans: Where these and such keys are written.
+        left_out: The paths of entries whose `when` does not hold.
     """
 
     data: dict[str, Any]
@@ -25,3 +26,4 @@ class FilledDocument:
     failed: list[DataPath] = field(default_factory=list)
     sampled: list[DataPath] = field(default_factory=list)
     sampled_spans: list[Span] = field(default_factory=list)
+    left_out: set[DataPath] = field(default_factory=set)

@@ -87,11 +87,12 @@ class _NodeParser:
         self._path = path
         self._on_error: OnError = self._data.get('on_error', 'log')
 
-    def parse(self, name: str) -> NodeSpec:
+    def parse(self, key: str) -> NodeSpec:
         data, path = self._data, self._path
+        namespace, name = self._split(key)
         return NodeSpec(
             name=name,
-            namespace=expand_namespace(data.get('namespace', ''), self._defaults.namespace),
+            namespace=namespace,
             description=data.get('description', ''),
             log_level=data.get('log_level'),
             use_sim_time=data.get('use_sim_time', False),
@@ -113,6 +114,13 @@ class _NodeParser:
             on_parameters=self._parse_hook('on_parameters'),
             path=path,
         )
+
+    def _split(self, key: str) -> tuple[str, str]:
+        """Return the namespace and the name of a node; its key may be both in one."""
+        if key.startswith('/'):
+            namespace, _, name = key.rpartition('/')
+            return namespace or '/', name
+        return expand_namespace(self._data.get('namespace', ''), self._defaults.namespace), key
 
     def _parse_publisher(self, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
         if isinstance(data, str):

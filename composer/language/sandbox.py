@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from jinja2 import TemplateRuntimeError, TemplateSyntaxError
 from jinja2.sandbox import SandboxedEnvironment
+
+from composer.ament import find_share, list_packages
+from composer.names import suggest
 
 # No field or parameter needs more; a larger result is a mistake that would take all memory.
 _MAX_ITEMS = 10_000_000
@@ -15,13 +19,13 @@ _BEGIN = '{{'
 
 
 class Sandbox(SandboxedEnvironment):
-    """Evaluates expressions; their globals are `range` alone."""
+    """Evaluates expressions; their globals are `range`, `env` and `find`."""
 
     intercepted_binops = frozenset(('*', '**'))
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.globals = {'range': self.globals['range']}
+        self.globals = {'range': self.globals['range'], 'env': _env, 'find': _find}
 
     def call_binop(self, context: Any, operator: str, left: Any, right: Any) -> Any:
         """Multiply or raise to a power, unless the result would be enormous."""
@@ -45,6 +49,26 @@ class Sandbox(SandboxedEnvironment):
             length += len(value)
         message = "the expression has no end: '}}' is missing"
         raise TemplateSyntaxError(message, 1)
+
+
+def _env(name: str, default: str | None = None) -> str:
+    """Return a variable of the environment, or the default."""
+    value = os.environ.get(name, default)
+    if value is None:
+        message = f"the environment has no '{name}'; give a default, as in env('{name}', 'none')"
+        raise TemplateRuntimeError(message)
+    return value
+
+
+def _find(package: str) -> str:
+    """Return the share folder of a ROS package."""
+    share = find_share(package)
+    if share is None:
+        near = suggest(package, list_packages())
+        hint = f"; did you mean '{near}'?" if near else ''
+        message = f"no package '{package}' is installed{hint}"
+        raise TemplateRuntimeError(message)
+    return str(share)
 
 
 def _is_power_too_large(base: Any, exponent: Any) -> bool:

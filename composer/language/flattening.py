@@ -1,0 +1,251 @@
+"""What an included file declares becomes part of the including one, under names of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Related, diagnostic_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from composer.language.instances import Instance
+    from composer.language.positions import Branch, DataPath, Key
+
+# What defaults hold that is not simply a key of each node.
+_SPECIAL_DEFAULTS = ('namespace', 'qos')
+_WITH_QOS = ('publishers', 'subscriptions')
+
+
+def push_defaults(instance: Instance) -> None:
+    """Write the defaults of a file into its nodes, so that they hold nowhere else."""
+    defaults = instance.data.pop('defaults', {})
+    if not defaults:
+        return
+    shared = instance.positions.branches(('defaults',))
+    outer = defaults.get('namespace', '')
+    nodes = instance.data.get('nodes', {})
+    for name in nodes:
+        nodes[name] = _with_defaults(instance, name, nodes[name], defaults, shared)
+    processes = instance.data.get('processes', {})
+    for name, process in processes.items():
+        if namespace := _join(outer, process.get('namespace', '')):
+            processes[name] = process | {'namespace': namespace}
+
+
+def _with_defaults(
+    instance: Instance,
+    name: str,
+    node: dict[str, Any],
+    defaults: dict[str, Any],
+    shared: dict[Key, Branch],
+) -> dict[str, Any]:
+    at = ('nodes', name)
+    plain = {key: value for key, value in defaults.items() if key not in _SPECIAL_DEFAULTS}
+    for key in plain.keys() - node.keys():
+        instance.positions.graft((*at, key), shared[key])
+    full = plain | node
+    namespace = _join(defaults.get('namespace', ''), node.get('namespace', ''))
+    if namespace and not name.startswith('/'):
+        if 'namespace' not in node:
+            instance.positions.graft((*at, 'namespace'), shared['namespace'])
+        full['namespace'] = namespace
+    if 'qos' in defaults:
+        for section in _WITH_QOS:
+            if section in full:
+                entries = _with_qos(instance, (*at, section), full[section], defaults, shared)
+                full[section] = entries
+    return full
+
+
+def _with_qos(
+    instance: Instance,
+    at: DataPath,
+    entries: dict[str, Any],
+    defaults: dict[str, Any],
+    shared: dict[Key, Branch],
+) -> dict[str, Any]:
+    changed = {}
+    positions = instance.positions
+    for name, entry in entries.items():
+        path = (*at, name)
+        if isinstance(entry, str):
+            positions.values[*path, 'type'] = positions.value(path)
+            changed[name] = {'type': entry, 'qos': defaults['qos']}
+        else:
+            changed[name] = {'qos': defaults['qos']} | entry
+        if isinstance(entry, str) or 'qos' not in entry:
+            positions.graft((*path, 'qos'), shared['qos'])
+    return changed
+
+
+class Flattening:
+    """Adds what included files declare to the instance of the file that includes them."""
+
+    def __init__(self, instance: Instance) -> None:
+        self._whole = instance
+        nodes = instance.data.get('nodes', {})
+        self._full_names = {_full_name(name, node) for name, node in nodes.items()}
+
+    def add(self, part: Instance, at: DataPath, include: dict[str, Any]) -> None:
+        """Add what a file declares.
+
+        Args:
+            at: Where the include stands.
+            include: What it says beside the file.
+        """
+        push_defaults(part)
+        label = str(at[-1])
+        renaming = self._add_profiles(part, label)
+        remap = include.get('remap', {})
+        namespace = include.get('namespace', '')
+        for name, node in part.data.get('nodes', {}).items():
+            inner, simple = _split(name, node)
+            full = _join(namespace, inner)
+            key = self._node_key(simple, full)
+            if key is None:
+                self._report_duplicate(part, name, _join(full, simple), at)
+                continue
+            changed = _with_remap(renaming.in_node(node), remap)
+            self._add_entry(part, ('nodes', name), key, changed, full, at)
+        for name, process in part.data.get('processes', {}).items():
+            full = _join(namespace, process.get('namespace', ''))
+            taken = name in self._whole.data.get('processes', {})
+            key = f'{label}_{name}' if taken else name
+            self._add_entry(part, ('processes', name), key, _with_remap(process, remap), full, at)
+        self._add_interfaces(part)
+        self._whole.sampled_spans += part.sampled_spans
+
+    def _node_key(self, simple: str, namespace: str) -> str | None:
+        """Return a key that is free: the name, or the full name; `None` if that is taken too."""
+        nodes = self._whole.data.setdefault('nodes', {})
+        full = '/' + _join(namespace, simple).lstrip('/')
+        if full in self._full_names:
+            return None
+        self._full_names.add(full)
+        return full if simple in nodes else simple
+
+    def _report_duplicate(self, part: Instance, name: str, full: str, at: DataPath) -> None:
+        self._whole.diagnostics.append(
+            diagnostic_at(
+                part.positions.key(('nodes', name)),
+                'duplicate-node',
+                f"there is a node '{full}' already",
+                help="give the include a 'namespace'",
+                related=[Related('included here', self._whole.positions.value((*at, 'file')))],
+            )
+        )
+
+    def _add_entry(
+        self,
+        part: Instance,
+        old: DataPath,
+        key: str,
+        entry: dict[str, Any],
+        namespace: str,
+        at: DataPath,
+    ) -> None:
+        whole = self._whole
+        section, name = str(old[0]), old[1]
+        new = (section, key)
+        whole.positions.graft(new, part.branches(section)[name])
+        plain = {each: value for each, value in entry.items() if each != 'namespace'}
+        if namespace and not key.startswith('/'):
+            plain = {'namespace': namespace} | plain
+            written = whole.positions.value((*at, 'namespace'))
+            whole.positions.values.setdefault((*new, 'namespace'), written)
+        whole.data.setdefault(section, {})[key] = plain
+        whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
+        if old in part.left_out:
+            whole.left_out.add(new)
+
+    def _add_profiles(self, part: Instance, label: str) -> _ProfileRenaming:
+        """Add the QoS profiles of a file; return the new names of those that had to be renamed."""
+        own = self._whole.data.get('qos', {})
+        profiles = part.data.get('qos', {})
+        renaming = _ProfileRenaming(
+            {
+                name: _free_name(f'{label}_{name}', {*own, *profiles})
+                for name, profile in profiles.items()
+                if name in own and own[name] != profile
+            }
+        )
+        for name, profile in profiles.items():
+            key = str(renaming.in_qos(name))
+            self._whole.positions.graft(('qos', key), part.branches('qos')[name])
+            self._whole.data.setdefault('qos', {})[key] = renaming.in_qos(profile)
+        self._whole.dropped |= {path for path in part.dropped if path[:1] == ('qos',)}
+        return renaming
+
+    def _add_interfaces(self, part: Instance) -> None:
+        for package in part.data.get('interfaces', {}):
+            declared = self._whole.data.setdefault('interfaces', {})
+            if package not in declared:
+                declared[package] = part.data['interfaces'][package]
+                branch = part.branches('interfaces')[package]
+                self._whole.positions.graft(('interfaces', package), branch)
+
+
+class _ProfileRenaming:
+    """Writes new names of QoS profiles where the old ones are used."""
+
+    def __init__(self, names: dict[str, str]) -> None:
+        self._names = names
+
+    def in_node(self, node: dict[str, Any]) -> dict[str, Any]:
+        """Return a node whose entities use the new names."""
+        if not self._names:
+            return node
+        changed = dict(node)
+        for section, entries in node.items():
+            if isinstance(entries, dict) and section not in ('parameters', 'state', 'remap'):
+                changed[section] = {
+                    name: entry | {'qos': self.in_qos(entry['qos'])}
+                    if isinstance(entry, dict) and 'qos' in entry
+                    else entry
+                    for name, entry in entries.items()
+                }
+        return changed
+
+    def in_qos(self, qos: Any) -> Any:
+        """Return a QoS, or a profile, that uses the new names."""
+        if isinstance(qos, str):
+            return self._names.get(qos, qos)
+        if isinstance(qos, dict) and 'profile' in qos:
+            return qos | {'profile': self._names.get(qos['profile'], qos['profile'])}
+        return qos
+
+
+def _with_remap(entry: dict[str, Any], outer: dict[str, str]) -> dict[str, Any]:
+    """Return a node or process with more remapping rules; the outer ones win, as in ROS launch."""
+    if not outer:
+        return entry
+    own = {old: new for old, new in entry.get('remap', {}).items() if old not in outer}
+    return entry | {'remap': outer | own}
+
+
+def _split(name: str, node: dict[str, Any]) -> tuple[str, str]:
+    """Return the namespace and the simple name of a node."""
+    if name.startswith('/'):
+        namespace, _, simple = name.rpartition('/')
+        return namespace or '/', simple
+    return node.get('namespace', ''), name
+
+
+def _full_name(name: str, node: dict[str, Any]) -> str:
+    namespace, simple = _split(name, node)
+    return '/' + _join(namespace, simple).lstrip('/')
+
+
+def _join(outer: str, inner: str) -> str:
+    """Return the inner namespace in the outer one; each may be absolute, relative or empty."""
+    if not outer or inner.startswith('/'):
+        return inner
+    return f'{outer.rstrip("/")}/{inner}' if inner else outer
+
+
+def _free_name(name: str, taken: Iterable[str]) -> str:
+    taken = set(taken)
+    while name in taken:
+        name = f'{name}_'
+    return name

@@ -1,0 +1,223 @@
+"""Includes: other files as parts of this one, each with the arguments that it is given.
+
+A file sees its own arguments, defaults and QoS profiles, and nothing of who includes it. What the
+include says beside (`namespace`, `remap`) is applied to all that comes out of it.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from composer.ament import find_share, list_packages
+from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.language.flattening import Flattening, push_defaults
+from composer.language.instances import Instance, read_instance, sample_values
+from composer.language.parameters import convert_parameter_value, find_type_fault
+from composer.language.source import Document, read_document
+from composer.names import did_you_mean, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from composer.diagnostics import Span
+    from composer.language.arguments import ArgumentSpec
+    from composer.language.positions import DataPath
+
+_PACKAGE = 'package://'
+
+
+class Includer:
+    """Reads the files that a file includes, and what these include, each file once.
+
+    Args:
+        folder: Where relative paths of a text without a file begin.
+    """
+
+    def __init__(self) -> None:
+        self._documents: dict[Path, Document] = {}
+
+    def include(self, instance: Instance, path: Path, chain: tuple[Related, ...] = ()) -> Instance:
+        """Return an instance with all that it includes in it.
+
+        Args:
+            path: The file of the instance.
+            chain: Where it is included itself, innermost first.
+        """
+        entries = instance.data.pop('include', {})
+        if not entries:
+            return instance
+        push_defaults(instance)
+        flattening = Flattening(instance)
+        stack = (path.resolve(), *(Path(each.span.source.name).resolve() for each in chain))
+        for name, entry in entries.items():
+            at = ('include', name)
+            if at in instance.left_out:
+                continue
+            part = self._read(instance, at, entry, stack, chain)
+            if part is not None:
+                flattening.add(part, at, entry)
+        return instance
+
+    def _read(
+        self,
+        instance: Instance,
+        at: DataPath,
+        entry: dict[str, Any],
+        stack: tuple[Path, ...],
+        chain: tuple[Related, ...],
+    ) -> Instance | None:
+        place = instance.positions.value((*at, 'file'))
+        try:
+            path = _locate(entry['file'], place)
+        except _IncludeError as error:
+            instance.diagnostics.append(
+                diagnostic_at(place, 'missing-include', str(error), help=error.help)
+            )
+            return None
+        here = Related('included here', place)
+        if path.resolve() in stack:
+            message = f"'{entry['file']}' includes itself"
+            related = [Related('included here', each.span) for each in chain]
+            instance.diagnostics.append(
+                diagnostic_at(place, 'include-cycle', message, related=related)
+            )
+            return None
+        document = self._document(path)
+        faults: list[Diagnostic] = []
+        part = read_instance(
+            document, lambda declared: _give(declared, instance, at, entry, faults)
+        )
+        instance.diagnostics += faults
+        inner_chain = (here, *chain)
+        if part is None:
+            instance.diagnostics += _with_chain(document.diagnostics, inner_chain)
+            return None
+        own = part.diagnostics
+        part.diagnostics = []
+        part = self.include(part, path, inner_chain)
+        instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
+        instance.chains[part.positions.source] = inner_chain
+        instance.chains |= {
+            source: chain for source, chain in part.chains.items() if source not in instance.chains
+        }
+        return part
+
+    def _document(self, path: Path) -> Document:
+        resolved = path.resolve()
+        if resolved not in self._documents:
+            self._documents[resolved] = read_document(path, _shown(path))
+        return self._documents[resolved]
+
+
+class _IncludeError(Exception):
+    def __init__(self, message: str, help_text: str | None = None) -> None:
+        super().__init__(message)
+        self.help = help_text
+
+
+def _locate(text: str, place: Span) -> Path:
+    """Return the file that an include names.
+
+    Raises:
+        _IncludeError: There is no such file.
+    """
+    if text.startswith(_PACKAGE):
+        package, _, rest = text.removeprefix(_PACKAGE).partition('/')
+        share = find_share(package)
+        if share is None:
+            near = suggest(package, list_packages())
+            message = f"no package '{package}' is installed"
+            raise _IncludeError(message, f"did you mean '{near}'?" if near else None)
+        path = share / rest
+    else:
+        path = Path(place.source.folder, text)
+    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
+        message = f"there is no file '{_shown(path)}'"
+        raise _IncludeError(message, _help_for(path))
+    return path
+
+
+def _help_for(path: Path) -> str | None:
+    try:
+        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
+    except OSError:
+        return None
+    return did_you_mean(path.name, names, 'there are')
+
+
+def _shown(path: Path) -> str:
+    """Return a path as findings show it: from the working folder, where it lies below that."""
+    plain = Path(os.path.normpath(path))
+    try:
+        return str(plain.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(plain)
+
+
+def _give(
+    declared: Mapping[str, ArgumentSpec],
+    instance: Instance,
+    at: DataPath,
+    entry: dict[str, Any],
+    faults: list[Diagnostic],
+) -> tuple[dict[str, Any], Collection[str]]:
+    """Return the values that an include gives, and which of them are only samples."""
+    given = entry.get('args', {})
+    values, _ = sample_values(declared)
+    section = (*at, 'args')
+    positions = instance.positions
+    faults += [
+        diagnostic_at(
+            positions.key((*section, name)),
+            'unknown-argument',
+            f"'{entry['file']}' takes no argument '{name}'",
+            help=did_you_mean(name, declared, 'it takes'),
+        )
+        for name in given
+        if name not in declared
+    ]
+    unknown: list[str] = []
+    for name, argument in declared.items():
+        path = (*section, name)
+        if name in given:
+            value = convert_parameter_value(given[name], argument.type)
+            fault = _find_fault(argument, value)
+            if not fault:
+                values[name] = value
+            elif positions.value(path) not in instance.sampled_spans:
+                faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
+            if fault or positions.value(path) in instance.sampled_spans:
+                unknown.append(name)
+        elif path in instance.dropped or section in instance.dropped:
+            unknown.append(name)
+        elif argument.default is None:
+            unknown.append(name)
+            faults.append(
+                _missing_argument(argument, entry['file'], positions.value((*at, 'file')))
+            )
+    return values, unknown
+
+
+def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:
+    message = f"'{file}' wants the argument '{argument.name}'"
+    return diagnostic_at(
+        place, 'missing-argument', message, help=f"give it under 'args': {argument}"
+    )
+
+
+def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:
+    fault = find_type_fault(value, argument.type)
+    if fault:
+        return f"'{argument.name}': {fault}"
+    if argument.choices and value not in argument.choices:
+        choices = ', '.join(map(str, argument.choices))
+        return f"'{argument.name}': {value!r} is none of {choices}"
+    return None
+
+
+def _with_chain(
+    diagnostics: Collection[Diagnostic], chain: tuple[Related, ...]
+) -> list[Diagnostic]:
+    return [finding.with_related(chain) for finding in diagnostics]

@@ -1,0 +1,132 @@
+"""A file read with values for its arguments: expressions evaluated, structure checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.language.arguments import ArgumentSpec, find_argument_faults, read_arguments
+from composer.language.filling import FilledDocument
+from composer.language.schema import check_structure, is_sound
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Mapping
+
+    from composer.diagnostics import Related, SourceFile, Span
+    from composer.language.positions import Branch, DataPath, Key, SourceMap
+    from composer.language.source import Document
+
+
+@dataclass(slots=True)
+class Instance:
+    """What could be read of a file with certain arguments.
+
+    Attributes:
+        data: As the schema wants them, without what was wrong.
+        dropped: The paths of the data that were left out for that.
+        left_out: The paths of entries whose `when` does not hold; they are still in the data.
+        arguments: What the file declares.
+        values: What they are in this instance.
+        sampled_spans: Where values stand that hang on samples of arguments.
+        chains: Where the files are included that are part of it, innermost first.
+    """
+
+    data: dict[str, Any]
+    positions: SourceMap
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    dropped: set[DataPath] = field(default_factory=set)
+    left_out: set[DataPath] = field(default_factory=set)
+    arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    sampled_spans: list[Span] = field(default_factory=list)
+    chains: dict[SourceFile, tuple[Related, ...]] = field(default_factory=dict)
+    _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)
+
+    def branches(self, section: str) -> dict[Key, Branch]:
+        """Return the positions of the entries of a section; call it when they are settled."""
+        if section not in self._branches:
+            self._branches[section] = self.positions.branches((section,))
+        return self._branches[section]
+
+
+def read_instance(
+    document: Document,
+    give_values: Callable[[Mapping[str, ArgumentSpec]], tuple[dict[str, Any], Collection[str]]],
+) -> Instance | None:
+    """Return a document with values for its arguments; `None` if it could not be read at all.
+
+    Args:
+        give_values: Returns the value of each argument, and the names of those whose value is
+            only a sample. Where the declarations are wrong it is not asked: samples are taken.
+    """
+    if document.data is None:
+        return None
+    positions = document.positions.copy()
+    declared = read_arguments(document.data)
+    faults = list(_check_arguments(declared, positions))
+    sound = not faults and is_sound({'args': document.data.get('args', {})})
+    # Values are not held against declarations that are wrong: those have to be mended first.
+    values, samples = give_values(declared) if sound else (sample_values(declared)[0], declared)
+    filled = _fill(document.data, values, positions, samples)
+    data, dropped, structure_faults = check_structure(
+        filled.data, positions, filled.failed, filled.sampled
+    )
+    return Instance(
+        data,
+        positions,
+        [*document.diagnostics, *faults, *filled.faults, *structure_faults],
+        set(dropped),
+        filled.left_out,
+        declared,
+        values,
+        filled.sampled_spans,
+    )
+
+
+def sample_values(declared: Mapping[str, ArgumentSpec]) -> tuple[dict[str, Any], list[str]]:
+    """Return values to check a file with, and the names of those that are only samples."""
+    values = {name: argument.sample for name, argument in declared.items()}
+    return values, [name for name, argument in declared.items() if argument.is_open]
+
+
+def _fill(
+    data: dict[str, Any],
+    values: Mapping[str, Any],
+    positions: SourceMap,
+    samples: Collection[str],
+) -> FilledDocument:
+    if not (_has_expressions(positions) or _has_conditions(data)):
+        return FilledDocument(data)
+    # jinja2 takes a tenth of a check's time to import, and most files have no templates.
+    from composer.language.expansion import expand_document
+
+    declarations = {key: data[key] for key in ('args',) if key in data}
+    system = {key: value for key, value in data.items() if key not in declarations}
+    filled = expand_document(system, values, positions, samples)
+    filled.data |= declarations
+    return filled
+
+
+def _has_expressions(positions: SourceMap) -> bool:
+    return any('{{' in line for source in positions.sources() for line in source.lines)
+
+
+def _has_conditions(data: Mapping[str, Any]) -> bool:
+    sections = (data.get(section) for section in ('nodes', 'include', 'processes'))
+    return any(
+        isinstance(entry, dict) and ('foreach' in entry or 'when' in entry)
+        for section in sections
+        if isinstance(section, dict)
+        for entry in section.values()
+    )
+
+
+def _check_arguments(
+    declared: Mapping[str, ArgumentSpec], positions: SourceMap
+) -> Iterable[Diagnostic]:
+    for name, argument in declared.items():
+        for key, fault in find_argument_faults(argument):
+            path = ('args', name, *key)
+            span = positions.value(path) if key else positions.key(path)
+            yield diagnostic_at(span, 'bad-argument-declaration', fault)
