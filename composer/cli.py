@@ -9,12 +9,17 @@ import sys
 import traceback
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 _DISTRIBUTION = 'rclpy-composer'
+_SET_HELP = 'Change a value, as in nodes.talker.log_level=debug; null removes it.'
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
 
 
@@ -69,6 +74,17 @@ def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
         else:
             (ros if inside else own).append(argument)
     return own, ros
+
+
+def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """Divide what a command line says into files and the arguments that follow them.
+
+    The first word is a file, and so are those right after it that end in `.yaml` or `.yml`.
+    """
+    count = 1
+    while count < len(words) and words[count].endswith(('.yaml', '.yml')):
+        count += 1
+    return [Path(word) for word in words[:count]], list(words[count:])
 
 
 def _check_log_levels(
@@ -150,6 +166,38 @@ def check_command(files: tuple[Path, ...]) -> int:
     from composer.commands.check import check
 
     return check(files)
+
+
+@cli.command('show', options_metavar='[OPTIONS]')
+@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@click.option(
+    '--format',
+    'output_format',
+    type=click.Choice(['yaml', 'json']),
+    default='yaml',
+    help='How it is written.',
+)
+@click.option('--origin', is_flag=True, help='Say of each value where it comes from.')
+@click.option('--args', 'wants_arguments', is_flag=True, help='List the arguments of FILE.')
+def show_command(
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
+    output_format: str,
+    *,
+    origin: bool,
+    wants_arguments: bool,
+) -> int:
+    """Print the system that FILE declares: all included, and with nothing left to evaluate.
+
+    Several FILEs are layers, each over those before it. `composer up` accepts what is printed.
+    """
+    from composer.commands.show import show, show_arguments
+
+    paths, arguments = split_words(words)
+    if wants_arguments:
+        return show_arguments(paths)
+    return show(paths, arguments, settings, output_format=output_format, origins=origin)
 
 
 @cli.group('interfaces')

@@ -25,15 +25,17 @@ class SourceFile:
     Attributes:
         name: The path as the user wrote it, for display.
         lines: The lines without their ends.
+        home: Where relative paths in it begin, if that is not the file's folder.
     """
 
     name: str
     lines: tuple[str, ...]
+    home: str | None = None
 
     @property
-    def folder(self) -> str:
-        """The absolute path of the folder that it lies in."""
-        return str(Path(self.name).resolve().parent)
+    def folder(self) -> Path:
+        """The folder where relative paths in it begin, as the user would write it."""
+        return Path(self.name).parent if self.home is None else Path(self.home)
 
     def line(self, number: int) -> str:
         """Return line `number`, counted from 1; an empty string past the end."""

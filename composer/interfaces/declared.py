@@ -17,12 +17,16 @@ if TYPE_CHECKING:
 
 
 def declared_folders(system: LoadedSystem) -> dict[str, Path]:
-    """Return the folder of each interface package that a file declares.
+    """Return the folder of each interface package that a system declares.
 
-    Folders are relative to that of the file.
+    Folders are relative to that of the file that declares them.
     """
     declared = system.spec.interfaces if system.spec else {}
-    return {package: system.path.parent / folder for package, folder in declared.items()}
+    positions = system.positions
+    return {
+        package: positions.value(('interfaces', package)).source.folder / folder
+        for package, folder in declared.items()
+    }
 
 
 def describe_declared(

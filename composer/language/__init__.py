@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.language.arguments import ArgumentSpec, parse_arguments
 from composer.language.includes import Includer
-from composer.language.instances import read_instance, sample_values
+from composer.language.instances import ArgumentValues, read_instance, sample_values
 from composer.language.layers import merge_documents
 from composer.language.parser import parse_system
 from composer.language.settings import apply_settings
@@ -40,6 +40,7 @@ class LoadedSystem:
         data: The whole system as plain data, all included, with nothing left to evaluate.
         values: What the arguments are.
         chains: Where the files are included that are part of it, innermost first.
+        notes: Where the values that the expressions of a scalar use come from, by its path.
         unused: As `spec`, of the nodes whose `when` does not hold.
     """
 
@@ -53,6 +54,7 @@ class LoadedSystem:
     data: Mapping[str, Any] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     chains: Mapping[SourceFile, tuple[Related, ...]] = field(default_factory=dict)
+    notes: Mapping[DataPath, str] = field(default_factory=dict)
     unused: SystemSpec | None = None
 
 
@@ -89,8 +91,11 @@ def load_system_text(
 def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:
     def give_values(
         declared: Mapping[str, ArgumentSpec],
-    ) -> tuple[dict[str, Any], Collection[str]]:
-        return sample_values(declared) if words is None else (parse_arguments(declared, words), ())
+    ) -> ArgumentValues:
+        if words is None:
+            return sample_values(declared)
+        values, given = parse_arguments(declared, words)
+        return ArgumentValues(values, origins=dict.fromkeys(given, 'command line'))
 
     instance = read_instance(document, give_values)
     if instance is None:
@@ -108,6 +113,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
         used,
         whole.values,
         whole.chains,
+        whole.notes,
         parse_system(unused, path.stem) if unused else None,
     )
 

@@ -124,8 +124,10 @@ def _find_value_fault(value: Any, type_name: str) -> str | None:
     return find_type_fault(value, type_name)
 
 
-def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) -> dict[str, Any]:
-    """Return the values of a file's arguments.
+def parse_arguments(
+    declared: Mapping[str, ArgumentSpec], words: Sequence[str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the values of a file's arguments, and the names of those that the words give.
 
     Args:
         words: `name:=value`, or values alone in the order of the declarations.
@@ -153,7 +155,7 @@ def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) 
             faults.append(f"'{name}' is missing")
     if faults:
         raise UsageError('; '.join(faults), help=describe_arguments(declared))
-    return values
+    return values, list(given)
 
 
 def describe_arguments(declared: Mapping[str, ArgumentSpec]) -> str:

@@ -40,14 +40,16 @@ def expand_document(
     values: Mapping[str, Any],
     positions: SourceMap,
     samples: Collection[str] = (),
+    origins: Mapping[str, str] | None = None,
 ) -> FilledDocument:
     """Evaluate all expressions of a document, and repeat or leave out its entries.
 
     Args:
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
+        origins: Where the values come from, in words.
     """
-    filler = Filler(values, positions, samples)
+    filler = Filler(values, positions, samples, origins)
     plain = {key: value for key, value in data.items() if key not in SECTIONS}
     filled = filler.fill_mapping(plain, ())
     limit = filled.get('max_nodes', MAX_ENTRIES)
@@ -135,10 +137,11 @@ class _Expansion:
         if not isinstance(values, list):
             self._report(at, f"'{name}' takes a list of values, not {values!r}")
             return
-        samples = [name] if filler.is_sampled(at) else []
+        is_sample = filler.is_sampled(at)
         rest = {other: foreach[other] for other in others}
         for value in values:
-            yield from self._scopes(rest, path, filler.within({name: value}, samples))
+            inner = filler.within(name, value, _FOREACH, is_sample=is_sample)
+            yield from self._scopes(rest, path, inner)
 
     def _holds(self, filler: Filler, condition: Any, path: DataPath) -> bool:
         holds = filler.fill(condition, path)

@@ -19,6 +19,7 @@ class FilledDocument:
         sampled: The paths of the scalars whose values hang on samples, and are not the real ones.
         sampled_spans: Where these and such keys are written.
         left_out: The paths of entries whose `when` does not hold.
+        notes: Where the values that the expressions of a scalar use come from, by its path.
     """
 
     data: dict[str, Any]
@@ -27,3 +28,4 @@ class FilledDocument:
     sampled: list[DataPath] = field(default_factory=list)
     sampled_spans: list[Span] = field(default_factory=list)
     left_out: set[DataPath] = field(default_factory=set)
+    notes: dict[DataPath, str] = field(default_factory=dict)

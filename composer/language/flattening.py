@@ -156,6 +156,8 @@ class Flattening:
             whole.positions.values.setdefault((*new, 'namespace'), written)
         whole.data.setdefault(section, {})[key] = plain
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
+        for path, note in part.notes_by_entry().get(old, ()):
+            whole.notes[new + path] = note
         if old in part.left_out:
             whole.left_out.add(new)
 

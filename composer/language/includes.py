@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from composer.ament import find_share, list_packages
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.flattening import Flattening, push_defaults
-from composer.language.instances import Instance, read_instance, sample_values
+from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
 from composer.language.parameters import convert_parameter_value, find_type_fault
 from composer.language.source import Document, read_document
 from composer.names import did_you_mean, suggest
@@ -132,7 +132,7 @@ def _locate(text: str, place: Span) -> Path:
             raise _IncludeError(message, f"did you mean '{near}'?" if near else None)
         path = share / rest
     else:
-        path = Path(place.source.folder, text)
+        path = place.source.folder / text
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{_shown(path)}'"
         raise _IncludeError(message, _help_for(path))
@@ -162,10 +162,11 @@ def _give(
     at: DataPath,
     entry: dict[str, Any],
     faults: list[Diagnostic],
-) -> tuple[dict[str, Any], Collection[str]]:
-    """Return the values that an include gives, and which of them are only samples."""
+) -> ArgumentValues:
+    """Return the values that an include gives."""
     given = entry.get('args', {})
-    values, _ = sample_values(declared)
+    values = dict(sample_values(declared).values)
+    origins: dict[str, str] = {}
     section = (*at, 'args')
     positions = instance.positions
     faults += [
@@ -186,6 +187,7 @@ def _give(
             fault = _find_fault(argument, value)
             if not fault:
                 values[name] = value
+                origins[name] = _origin(instance, path)
             elif positions.value(path) not in instance.sampled_spans:
                 faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
             if fault or positions.value(path) in instance.sampled_spans:
@@ -197,7 +199,13 @@ def _give(
             faults.append(
                 _missing_argument(argument, entry['file'], positions.value((*at, 'file')))
             )
-    return values, unknown
+    return ArgumentValues(values, unknown, origins)
+
+
+def _origin(instance: Instance, path: DataPath) -> str:
+    place = instance.positions.value(path)
+    note = instance.notes.get(path)
+    return f'{place.source.name}:{place.line}' + (f', {note}' if note else '')
 
 
 def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:

@@ -18,6 +18,20 @@ if TYPE_CHECKING:
     from composer.language.source import Document
 
 
+@dataclass(frozen=True, slots=True)
+class ArgumentValues:
+    """What the arguments of a file are.
+
+    Attributes:
+        samples: The names of those whose value only stands for others of its type.
+        origins: Where they come from, in words; those that have their default are not in it.
+    """
+
+    values: Mapping[str, Any]
+    samples: Collection[str] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+
 @dataclass(slots=True)
 class Instance:
     """What could be read of a file with certain arguments.
@@ -29,6 +43,7 @@ class Instance:
         arguments: What the file declares.
         values: What they are in this instance.
         sampled_spans: Where values stand that hang on samples of arguments.
+        notes: Where the values that the expressions of a scalar use come from, by its path.
         chains: Where the files are included that are part of it, innermost first.
     """
 
@@ -40,8 +55,18 @@ class Instance:
     arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     sampled_spans: list[Span] = field(default_factory=list)
+    notes: dict[DataPath, str] = field(default_factory=dict)
     chains: dict[SourceFile, tuple[Related, ...]] = field(default_factory=dict)
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)
+    _notes: dict[DataPath, list[tuple[DataPath, str]]] | None = None
+
+    def notes_by_entry(self) -> dict[DataPath, list[tuple[DataPath, str]]]:
+        """Return the notes of each entry of a section, by their paths from there."""
+        if self._notes is None:
+            self._notes = {}
+            for path, note in self.notes.items():
+                self._notes.setdefault(path[:2], []).append((path[2:], note))
+        return self._notes
 
     def branches(self, section: str) -> dict[Key, Branch]:
         """Return the positions of the entries of a section; call it when they are settled."""
@@ -52,7 +77,7 @@ class Instance:
 
 def read_instance(
     document: Document,
-    give_values: Callable[[Mapping[str, ArgumentSpec]], tuple[dict[str, Any], Collection[str]]],
+    give_values: Callable[[Mapping[str, ArgumentSpec]], ArgumentValues],
 ) -> Instance | None:
     """Return a document with values for its arguments; `None` if it could not be read at all.
 
@@ -67,8 +92,8 @@ def read_instance(
     faults = list(_check_arguments(declared, positions))
     sound = not faults and is_sound({'args': document.data.get('args', {})})
     # Values are not held against declarations that are wrong: those have to be mended first.
-    values, samples = give_values(declared) if sound else (sample_values(declared)[0], declared)
-    filled = _fill(document.data, values, positions, samples)
+    given = give_values(declared) if sound else sample_values(declared, all_of_them=True)
+    filled = _fill(document.data, given, positions)
     data, dropped, structure_faults = check_structure(
         filled.data, positions, filled.failed, filled.sampled
     )
@@ -79,23 +104,27 @@ def read_instance(
         set(dropped),
         filled.left_out,
         declared,
-        values,
+        given.values,
         filled.sampled_spans,
+        filled.notes,
     )
 
 
-def sample_values(declared: Mapping[str, ArgumentSpec]) -> tuple[dict[str, Any], list[str]]:
-    """Return values to check a file with, and the names of those that are only samples."""
-    values = {name: argument.sample for name, argument in declared.items()}
-    return values, [name for name, argument in declared.items() if argument.is_open]
+def sample_values(
+    declared: Mapping[str, ArgumentSpec], *, all_of_them: bool = False
+) -> ArgumentValues:
+    """Return values to check a file with.
+
+    Args:
+        all_of_them: Whether defaults are only samples, too.
+    """
+    return ArgumentValues(
+        {name: argument.sample for name, argument in declared.items()},
+        {name for name, argument in declared.items() if all_of_them or argument.is_open},
+    )
 
 
-def _fill(
-    data: dict[str, Any],
-    values: Mapping[str, Any],
-    positions: SourceMap,
-    samples: Collection[str],
-) -> FilledDocument:
+def _fill(data: dict[str, Any], given: ArgumentValues, positions: SourceMap) -> FilledDocument:
     if not (_has_expressions(positions) or _has_conditions(data)):
         return FilledDocument(data)
     # jinja2 takes a tenth of a check's time to import, and most files have no templates.
@@ -103,9 +132,15 @@ def _fill(
 
     declarations = {key: data[key] for key in ('args',) if key in data}
     system = {key: value for key, value in data.items() if key not in declarations}
-    filled = expand_document(system, values, positions, samples)
+    origins = {name: _origin(name, given, positions) for name in given.values}
+    filled = expand_document(system, given.values, positions, given.samples, origins)
     filled.data |= declarations
     return filled
+
+
+def _origin(name: str, given: ArgumentValues, positions: SourceMap) -> str:
+    place = positions.value(('args', name, 'default'))
+    return given.origins.get(name) or f'default, {place.source.name}:{place.line}'
 
 
 def _has_expressions(positions: SourceMap) -> bool:

@@ -55,7 +55,7 @@ def apply_settings(document: Document, settings: Sequence[str]) -> Document:
         path = _resolve(path_text, data)
         value = _parse(setting, value_text)
         data = _changed(data, path, value)
-        source = SourceFile(f'--set {setting}', (setting,))
+        source = SourceFile(f'--set {setting}', (setting,), home='.')
         positions.remove(path)
         start = len(path_text) + 2
         positions.keys[path] = Span(source, 1, 1, len(path_text))
@@ -77,13 +77,19 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
             message = f"--set {text}: '{'.'.join(path)}' is a value, and has no '{rest}' in it"
             raise UsageError(message)
         key = _longest_key(rest, inside) or rest.partition('.')[0]
-        if key not in inside and path and path[-1] in _NAMED and inside:
+        if key not in inside and inside and _has_given_names(path):
             message = f"--set {text}: there is no '{key}' in {'.'.join(path)}"
             raise UsageError(message, help=did_you_mean(key, inside))
         path.append(key)
         rest = rest[len(key) + 1 :]
         inside = inside.get(key, {}) if rest else None
     return tuple(path)
+
+
+def _has_given_names(path: list[str]) -> bool:
+    """Return whether what is inside has names that the file itself gives."""
+    # An include may be given an argument that it was not given before.
+    return bool(path) and path[-1] in _NAMED and path[-1:] + path[:1] != ['args', 'include']
 
 
 def _longest_key(text: str, mapping: dict[str, Any]) -> str | None:

@@ -43,6 +43,7 @@ class Filler:
     Args:
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
+        origins: Where the values come from, in words.
     """
 
     def __init__(
@@ -50,18 +51,26 @@ class Filler:
         values: Mapping[str, Any],
         positions: SourceMap,
         samples: Collection[str] = (),
+        origins: Mapping[str, str] | None = None,
         filled: FilledDocument | None = None,
     ) -> None:
         self.filled = filled or FilledDocument({})
         self.positions = positions
+        self._origins = origins or {}
         self._values = values
         self._samples = frozenset(samples)
         self._sandbox = Sandbox(undefined=StrictUndefined)
 
-    def within(self, values: Mapping[str, Any], samples: Collection[str]) -> Filler:
-        """Return a filler with more in scope, for the same document."""
-        scope = {**self._values, **values}
-        inner = Filler(scope, self.positions, self._samples | set(samples), self.filled)
+    def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Filler:
+        """Return a filler with one more name in scope, for the same document."""
+        samples = self._samples | {name} if is_sample else self._samples - {name}
+        inner = Filler(
+            {**self._values, name: value},
+            self.positions,
+            samples,
+            {**self._origins, name: origin},
+            self.filled,
+        )
         inner._sandbox = self._sandbox
         return inner
 
@@ -104,7 +113,9 @@ class Filler:
         sampled = False
         try:
             expressions = list(_find_expressions(text, self._sandbox))
-            sampled = self._hangs_on_samples(text, expressions)
+            names = self._names_in(text, expressions)
+            self.filled.notes[path] = self._note(names)
+            sampled = not self._samples.isdisjoint(names)
             if sampled:
                 self.filled.sampled_spans.append(span)
                 self.filled.sampled += [] if is_key else [path]
@@ -132,13 +143,18 @@ class Filler:
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
         code = _code(text, expression)
         compiled = self._sandbox.compile_expression(code, undefined_to_none=False)
-        return _as_data(compiled({'here': span.source.folder, **self._values}))
+        return _as_data(compiled({'here': str(span.source.folder.resolve()), **self._values}))
 
-    def _hangs_on_samples(self, text: str, expressions: list[slice]) -> bool:
-        return bool(self._samples) and any(
-            self._samples & meta.find_undeclared_variables(self._sandbox.parse(text[expression]))
+    def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
+        return frozenset(
+            name
             for expression in expressions
+            for name in meta.find_undeclared_variables(self._sandbox.parse(text[expression]))
         )
+
+    def _note(self, names: frozenset[str]) -> str:
+        used = sorted(names & self._origins.keys())
+        return ', '.join(f'{name} = {self._values[name]} ({self._origins[name]})' for name in used)
 
     def _explain(self, error: Exception, span: Span) -> Diagnostic:
         if isinstance(error, UndefinedError) and (
