@@ -64,6 +64,12 @@ class Span:
         start = self.column - 1
         return self.source.line(self.line)[start : start + self.length]
 
+    @property
+    def place(self) -> str:
+        """`file:line`, or where else it was written."""
+        is_file = self.source.home is None
+        return f'{self.source.name}:{self.line}' if is_file else self.source.name
+
     def narrowed_to(self, part: str, *, first: bool = False) -> Span:
         """Return the span of the last (or `first`) `part` within this one; this one if none."""
         find = self.text.find if first else self.text.rfind

@@ -77,9 +77,7 @@ def describe_origin(system: LoadedSystem, path: DataPath) -> str:
     """Return where a value was written, and where what its expressions use comes from."""
     if not path:
         return ''
-    span = system.positions.value(path)
-    name = span.source.name
-    place = name if name.startswith('--set') else f'{name}:{span.line}'
+    place = system.positions.value(path).place
     note = system.notes.get(path)
     return f'{place}, {note}' if note else place
 

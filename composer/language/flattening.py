@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
@@ -79,81 +80,103 @@ def _with_qos(
     return changed
 
 
+@dataclass(frozen=True, slots=True)
+class Inclusion:
+    """A file that was read for an include.
+
+    Attributes:
+        at: Where the include stands.
+        entry: What it says.
+    """
+
+    part: Instance
+    at: DataPath
+    entry: dict[str, Any]
+
+    @property
+    def label(self) -> str:
+        """The name of the include."""
+        return str(self.at[-1])
+
+    @property
+    def namespace(self) -> str:
+        """The namespace of all that comes out of the file."""
+        return str(self.entry.get('namespace', ''))
+
+    @property
+    def remap(self) -> dict[str, str]:
+        """Rules for all that comes out of the file."""
+        rules: dict[str, str] = self.entry.get('remap', {})
+        return rules
+
+
 class Flattening:
     """Adds what included files declare to the instance of the file that includes them."""
 
     def __init__(self, instance: Instance) -> None:
         self._whole = instance
         nodes = instance.data.get('nodes', {})
-        self._full_names = {_full_name(name, node) for name, node in nodes.items()}
+        self._full_names = {_full_name(*_split(name, node)) for name, node in nodes.items()}
 
-    def add(self, part: Instance, at: DataPath, include: dict[str, Any]) -> None:
-        """Add what a file declares.
-
-        Args:
-            at: Where the include stands.
-            include: What it says beside the file.
-        """
+    def add(self, inclusion: Inclusion) -> None:
+        """Add what an included file declares."""
+        part = inclusion.part
         push_defaults(part)
-        label = str(at[-1])
-        renaming = self._add_profiles(part, label)
-        remap = include.get('remap', {})
-        namespace = include.get('namespace', '')
+        renaming = self._add_profiles(inclusion)
         for name, node in part.data.get('nodes', {}).items():
             inner, simple = _split(name, node)
-            full = _join(namespace, inner)
+            full = _join(inclusion.namespace, inner)
             key = self._node_key(simple, full)
-            if key is None:
-                self._report_duplicate(part, name, _join(full, simple), at)
-                continue
-            changed = _with_remap(renaming.in_node(node), remap)
-            self._add_entry(part, ('nodes', name), key, changed, full, at)
+            if key is not None:
+                self._add_entry(inclusion, ('nodes', name), key, renaming.in_node(node), full)
+            elif ('nodes', name) not in part.left_out:
+                self._report_duplicate(inclusion, name, _full_name(full, simple))
         for name, process in part.data.get('processes', {}).items():
-            full = _join(namespace, process.get('namespace', ''))
+            full = _join(inclusion.namespace, process.get('namespace', ''))
             taken = name in self._whole.data.get('processes', {})
-            key = f'{label}_{name}' if taken else name
-            self._add_entry(part, ('processes', name), key, _with_remap(process, remap), full, at)
+            key = f'{inclusion.label}_{name}' if taken else name
+            self._add_entry(inclusion, ('processes', name), key, process, full)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
 
     def _node_key(self, simple: str, namespace: str) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
         nodes = self._whole.data.setdefault('nodes', {})
-        full = '/' + _join(namespace, simple).lstrip('/')
+        full = _full_name(namespace, simple)
         if full in self._full_names:
             return None
         self._full_names.add(full)
         return full if simple in nodes else simple
 
-    def _report_duplicate(self, part: Instance, name: str, full: str, at: DataPath) -> None:
+    def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
+        place = self._whole.positions.value((*inclusion.at, 'file'))
         self._whole.diagnostics.append(
             diagnostic_at(
-                part.positions.key(('nodes', name)),
+                inclusion.part.positions.key(('nodes', name)),
                 'duplicate-node',
                 f"there is a node '{full}' already",
                 help="give the include a 'namespace'",
-                related=[Related('included here', self._whole.positions.value((*at, 'file')))],
+                related=[Related('included here', place)],
             )
         )
 
     def _add_entry(
-        self,
-        part: Instance,
-        old: DataPath,
-        key: str,
-        entry: dict[str, Any],
-        namespace: str,
-        at: DataPath,
+        self, inclusion: Inclusion, old: DataPath, key: str, entry: dict[str, Any], namespace: str
     ) -> None:
-        whole = self._whole
+        whole, part = self._whole, inclusion.part
         section, name = str(old[0]), old[1]
         new = (section, key)
         whole.positions.graft(new, part.branches(section)[name])
         plain = {each: value for each, value in entry.items() if each != 'namespace'}
         if namespace and not key.startswith('/'):
             plain = {'namespace': namespace} | plain
-            written = whole.positions.value((*at, 'namespace'))
-            whole.positions.values.setdefault((*new, 'namespace'), written)
+            self._note_namespace((*new, 'namespace'), (*inclusion.at, 'namespace'))
+        if inclusion.remap:
+            # The first rule that fits wins: those from outside do, as in ROS launch.
+            plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
+            for rule in inclusion.remap:
+                written = whole.positions.value((*inclusion.at, 'remap', rule))
+                whole.positions.values[*new, 'remap', rule] = written
         whole.data.setdefault(section, {})[key] = plain
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         for path, note in part.notes_by_entry().get(old, ()):
@@ -161,8 +184,18 @@ class Flattening:
         if old in part.left_out:
             whole.left_out.add(new)
 
-    def _add_profiles(self, part: Instance, label: str) -> _ProfileRenaming:
+    def _note_namespace(self, path: DataPath, outer: DataPath) -> None:
+        positions = self._whole.positions
+        if outer not in positions.values:
+            return
+        if path in positions.values:
+            self._whole.notes[path] = f'in that of {positions.value(outer).place}'
+        else:
+            positions.values[path] = positions.value(outer)
+
+    def _add_profiles(self, inclusion: Inclusion) -> _ProfileRenaming:
         """Add the QoS profiles of a file; return the new names of those that had to be renamed."""
+        part, label = inclusion.part, inclusion.label
         own = self._whole.data.get('qos', {})
         profiles = part.data.get('qos', {})
         renaming = _ProfileRenaming(
@@ -218,12 +251,8 @@ class _ProfileRenaming:
         return qos
 
 
-def _with_remap(entry: dict[str, Any], outer: dict[str, str]) -> dict[str, Any]:
-    """Return a node or process with more remapping rules; the outer ones win, as in ROS launch."""
-    if not outer:
-        return entry
-    own = {old: new for old, new in entry.get('remap', {}).items() if old not in outer}
-    return entry | {'remap': outer | own}
+def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:
+    return {old: new for old, new in (inner or {}).items() if old not in outer}
 
 
 def _split(name: str, node: dict[str, Any]) -> tuple[str, str]:
@@ -234,9 +263,8 @@ def _split(name: str, node: dict[str, Any]) -> tuple[str, str]:
     return node.get('namespace', ''), name
 
 
-def _full_name(name: str, node: dict[str, Any]) -> str:
-    namespace, simple = _split(name, node)
-    return '/' + _join(namespace, simple).lstrip('/')
+def _full_name(namespace: str, name: str) -> str:
+    return '/' + _join(namespace, name).lstrip('/')
 
 
 def _join(outer: str, inner: str) -> str:

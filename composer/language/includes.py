@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.ament import find_share, list_packages
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
-from composer.language.flattening import Flattening, push_defaults
+from composer.language.flattening import Flattening, Inclusion, push_defaults
 from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
 from composer.language.parameters import convert_parameter_value, find_type_fault
 from composer.language.source import Document, read_document
@@ -57,7 +57,7 @@ class Includer:
                 continue
             part = self._read(instance, at, entry, stack, chain)
             if part is not None:
-                flattening.add(part, at, entry)
+                flattening.add(Inclusion(part, at, entry))
         return instance
 
     def _read(
@@ -203,9 +203,8 @@ def _give(
 
 
 def _origin(instance: Instance, path: DataPath) -> str:
-    place = instance.positions.value(path)
     note = instance.notes.get(path)
-    return f'{place.source.name}:{place.line}' + (f', {note}' if note else '')
+    return instance.positions.value(path).place + (f', {note}' if note else '')
 
 
 def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:

@@ -140,7 +140,7 @@ def _fill(data: dict[str, Any], given: ArgumentValues, positions: SourceMap) -> 
 
 def _origin(name: str, given: ArgumentValues, positions: SourceMap) -> str:
     place = positions.value(('args', name, 'default'))
-    return given.origins.get(name) or f'default, {place.source.name}:{place.line}'
+    return given.origins.get(name) or f'default, {place.place}'
 
 
 def _has_expressions(positions: SourceMap) -> bool:
