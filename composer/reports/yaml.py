@@ -95,4 +95,5 @@ def _text(value: str) -> str:
     if is_text:
         return value
     # JSON's strings are those of YAML in double quotes; braces must not look like an expression.
-    return json.dumps(value.replace('{{', "{{ '{{' }}"))
+    quoted = json.dumps(value.replace('{{', "{{ '{{' }}"), ensure_ascii=False)
+    return ''.join(each if each.isprintable() else f'\\U{ord(each):08x}' for each in quoted)
