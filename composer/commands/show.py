@@ -65,12 +65,7 @@ def final_data(system: LoadedSystem) -> dict[str, Any]:
     """Return a system as data that `composer up` accepts, wherever they are written to."""
     data = {key: value for key, value in system.data.items() if key not in _SETTLED}
     data = {key: value for key, value in data.items() if value != {} or key == 'nodes'}
-    if 'interfaces' in data:
-        data['interfaces'] = {
-            package: _absolute(system, ('interfaces', package), folder)
-            for package, folder in data['interfaces'].items()
-        }
-    return data
+    return _with_absolute_paths(data)
 
 
 def describe_origin(system: LoadedSystem, path: DataPath) -> str:
@@ -82,6 +77,27 @@ def describe_origin(system: LoadedSystem, path: DataPath) -> str:
     return f'{place}, {note}' if note else place
 
 
-def _absolute(system: LoadedSystem, path: DataPath, relative: str) -> str:
-    folder = system.positions.value(path).source.folder
-    return os.path.abspath(folder / relative)  # noqa: PTH100 - without following links
+def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
+    absolute = dict(data)
+    if 'interfaces' in data:
+        folders = data['interfaces'].items()
+        absolute['interfaces'] = {package: _absolute(folder) for package, folder in folders}
+    for section in ('nodes', 'processes'):
+        if section in data:
+            entries = data[section].items()
+            absolute[section] = {name: _entry_with_absolute(entry) for name, entry in entries}
+    return absolute
+
+
+def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
+    changed: dict[str, Any] = {}
+    if 'cwd' in entry:
+        changed['cwd'] = _absolute(entry['cwd'])
+    if 'parameter_files' in entry:
+        changed['parameter_files'] = [_absolute(text) for text in entry['parameter_files']]
+    return entry | changed
+
+
+def _absolute(path: str) -> str:
+    # As written otherwise: links are not followed.
+    return path if path.startswith('package://') else os.path.abspath(path)  # noqa: PTH100

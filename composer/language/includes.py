@@ -10,13 +10,13 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.ament import find_share, list_packages
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.flattening import Flattening, Inclusion, push_defaults
 from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
 from composer.language.parameters import convert_parameter_value, find_type_fault
+from composer.language.paths import PathError, resolve_path
 from composer.language.source import Document, read_document
-from composer.names import did_you_mean, suggest
+from composer.names import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.language.arguments import ArgumentSpec
     from composer.language.positions import DataPath
-
-_PACKAGE = 'package://'
 
 
 class Includer:
@@ -71,7 +69,7 @@ class Includer:
         place = instance.positions.value((*at, 'file'))
         try:
             path = _locate(entry['file'], place)
-        except _IncludeError as error:
+        except PathError as error:
             instance.diagnostics.append(
                 diagnostic_at(place, 'missing-include', str(error), help=error.help)
             )
@@ -111,31 +109,16 @@ class Includer:
         return self._documents[resolved]
 
 
-class _IncludeError(Exception):
-    def __init__(self, message: str, help_text: str | None = None) -> None:
-        super().__init__(message)
-        self.help = help_text
-
-
 def _locate(text: str, place: Span) -> Path:
     """Return the file that an include names.
 
     Raises:
-        _IncludeError: There is no such file.
+        PathError: There is no such file.
     """
-    if text.startswith(_PACKAGE):
-        package, _, rest = text.removeprefix(_PACKAGE).partition('/')
-        share = find_share(package)
-        if share is None:
-            near = suggest(package, list_packages())
-            message = f"no package '{package}' is installed"
-            raise _IncludeError(message, f"did you mean '{near}'?" if near else None)
-        path = share / rest
-    else:
-        path = place.source.folder / text
+    path = resolve_path(text, place.source.folder)
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{_shown(path)}'"
-        raise _IncludeError(message, _help_for(path))
+        raise PathError(message, help=_help_for(path))
     return path
 
 

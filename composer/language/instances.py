@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.arguments import ArgumentSpec, find_argument_faults, read_arguments
 from composer.language.filling import FilledDocument
+from composer.language.paths import resolve_paths
 from composer.language.schema import check_structure, is_sound
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def read_instance(
         filled.data, positions, filled.failed, filled.sampled
     )
     return Instance(
-        data,
+        resolve_paths(data, positions),
         positions,
         [*document.diagnostics, *faults, *filled.faults, *structure_faults],
         set(dropped),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.language.parameters import convert_parameter_value, infer_parameter_type
+from composer.language.processes import parse_conditions, parse_process, write_scalar
 from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
@@ -57,11 +59,18 @@ def parse_system(data: Data, name: str) -> SystemSpec:
             'nodes',
             lambda name, node, path: _NodeParser(defaults, node, path).parse(name),
         ),
+        environment=MappingProxyType(
+            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+        ),
+        processes=_parse_entries(
+            data, (), 'processes', partial(parse_process, defaults.given_namespace)
+        ),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Defaults:
+    given_namespace: str | None
     namespace: str
     qos: QosSpec
     node: Data
@@ -70,6 +79,7 @@ class _Defaults:
 def _parse_defaults(data: Data) -> _Defaults:
     inherited = {'log_level', 'use_sim_time', 'on_error'}
     return _Defaults(
+        given_namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         namespace=expand_namespace(data.get('namespace', '')),
         qos=_parse_qos(data['qos'], ('defaults', 'qos'))
         if 'qos' in data
@@ -112,6 +122,8 @@ class _NodeParser:
             on_start=self._parse_hook('on_start'),
             on_stop=self._parse_hook('on_stop'),
             on_parameters=self._parse_hook('on_parameters'),
+            wait_for=parse_conditions(data, path),
+            parameter_files=tuple(data.get('parameter_files', ())),
             path=path,
         )
 

@@ -8,6 +8,7 @@ text. Names that are not in scope are errors. Source: https://jinja.palletsproje
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import (
@@ -23,7 +24,7 @@ from jinja2.exceptions import SecurityError
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
 from composer.language.filling import FilledDocument
 from composer.language.sandbox import Sandbox
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -146,11 +147,13 @@ class Filler:
         return _as_data(compiled({'here': str(span.source.folder.resolve()), **self._values}))
 
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
-        return frozenset(
-            name
-            for expression in expressions
-            for name in meta.find_undeclared_variables(self._sandbox.parse(text[expression]))
-        )
+        names: set[str] = set()
+        for expression in expressions:
+            # What is wrong with it is said when it is evaluated.
+            with suppress(TemplateSyntaxError):
+                parsed = self._sandbox.parse(text[expression])
+                names |= meta.find_undeclared_variables(parsed)
+        return frozenset(names)
 
     def _note(self, names: frozenset[str]) -> str:
         used = sorted(names & self._origins.keys())
@@ -162,7 +165,8 @@ class Filler:
         ):
             name = found.group(1)
             scope = {*self._values, 'here', *self._sandbox.globals}
-            help_text = did_you_mean(name, scope, 'in scope are')
+            declared = self._values or suggest(name, scope)
+            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
             return diagnostic_at(
                 _locate(name, span),
                 'undefined-name',

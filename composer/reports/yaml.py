@@ -94,6 +94,9 @@ def _text(value: str) -> str:
         is_text = False
     if is_text:
         return value
-    # JSON's strings are those of YAML in double quotes; braces must not look like an expression.
-    quoted = json.dumps(value.replace('{{', "{{ '{{' }}"), ensure_ascii=False)
+    if '{{' in value:
+        # Braces must not look like an expression, except for the one that gives them.
+        value = f'{{{{ {value!r} }}}}'
+    # JSON's strings are those of YAML in double quotes.
+    quoted = json.dumps(value, ensure_ascii=False)
     return ''.join(each if each.isprintable() else f'\\U{ord(each):08x}' for each in quoted)
