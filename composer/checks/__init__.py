@@ -9,6 +9,7 @@ from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
 from composer.checks.names import check_names
 from composer.checks.parameters import check_parameters
+from composer.checks.processes import check_environment, check_processes, check_waits
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
@@ -29,6 +30,9 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_processes,
+    check_waits,
+    check_environment,
 )
 
 

@@ -27,10 +27,10 @@ _RULE = 'bad-name'
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS will see."""
     yield from _check_namespaces(context)
-    for name, node in context.spec.nodes.items():
-        fault = find_node_name_fault(name)
+    for node in context.spec.nodes.values():
+        fault = find_node_name_fault(node.name)
         if fault:
-            yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
+            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {fault}")
         yield from _check_ros_names(context, node)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)
@@ -45,9 +45,12 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_namespace_fault(node.namespace)
         own = (*node.path, 'namespace')
         path = own if own in context.system.positions.values else ('defaults', 'namespace')
+        if str(node.path[-1]).startswith('/'):
+            path = node.path
         if fault and path not in reported:
             reported.add(path)
-            yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
+            say = context.at_key if path == node.path else context.at_value
+            yield say(path, _RULE, f"'{node.namespace}': {fault}")
 
 
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
