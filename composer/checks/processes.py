@@ -131,9 +131,9 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
         for waiter in _waiters(context)
     }
     done: set[tuple[str | int, ...]] = set()
-    for start in edges:
+    for start, first in edges.items():
         trail: list[tuple[str | int, ...]] = []
-        pending = [(start, iter(edges[start]))] if start not in done else []
+        pending = [(start, iter(first))] if start not in done else []
         while pending:
             path, others = pending[-1]
             if path not in trail:
