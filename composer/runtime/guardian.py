@@ -12,6 +12,7 @@ import select
 import signal
 import sys
 import time
+from pathlib import Path
 
 _PATIENCE_SEC = 5.0
 _POLL_SEC = 0.02
@@ -20,17 +21,16 @@ _POLL_SEC = 0.02
 def find_marked(mark: bytes) -> list[int]:
     """Return the processes that have a mark in their environment."""
     found = []
-    for entry in os.listdir('/proc'):
-        if not entry.isdecimal():
+    for entry in Path('/proc').iterdir():
+        if not entry.name.isdecimal():
             continue
         try:
-            with open(f'/proc/{entry}/environ', 'rb') as file:
-                variables = file.read().split(b'\0')
+            variables = (entry / 'environ').read_bytes().split(b'\0')
         except OSError:
             # It has ended, or belongs to somebody else.
             continue
         if mark in variables:
-            found.append(int(entry))
+            found.append(int(entry.name))
     return found
 
 

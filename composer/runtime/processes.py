@@ -234,7 +234,7 @@ class Processes:
         if spec.most_restarts is None or process.restarts < spec.most_restarts:
             return True
         system_logger.error(
-            f"process '{spec.name}' was started again {spec.most_restarts} times, and is left ended"
+            f"process '{spec.name}' was started again {spec.most_restarts} times: that is all"
         )
         return False
 
