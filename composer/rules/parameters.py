@@ -1,0 +1,18 @@
+"""Rules of parameters."""
+
+from __future__ import annotations
+
+from composer.rules.record import Family, Rule
+
+PARAMETERS = Family(
+    'parameters',
+    'declarations of parameters',
+    (
+        Rule(
+            'bad-parameter',
+            'A declaration contradicts itself: its type, value, range, step and choices.',
+            'ROS refuses the declaration when the node is created, or takes it as something else.',
+            'https://docs.ros.org/en/jazzy/Concepts/Basic/About-Parameters.html',
+        ),
+    ),
+)
