@@ -78,7 +78,7 @@ def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Pla
                     start = token.start_mark.line + 1, 0
                 found.append((start, (token.end_mark.line, token.end_mark.column)))
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
+        mark = error.context_mark or error.problem_mark
         return found, (mark.line, mark.column) if mark else (0, 0)
     except yaml.YAMLError:
         return found, (0, 0)

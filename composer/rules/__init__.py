@@ -1,7 +1,7 @@
 """All rules, by family: what they mean and why; `composer/examples/<rule>/` shows each.
 
-To add a rule: a row in its family's file, and such a folder with `bad.yaml`, `bad.txt` (what is said
-of it) and `good.yaml`.
+To add a rule: a row in its family's file, and such a folder with `bad.yaml`, `bad.txt` (what is
+said of it) and `good.yaml`.
 """
 
 from __future__ import annotations

@@ -14,13 +14,13 @@ NAMES = Family(
             'bad-name',
             'A node, namespace, topic, service, action, parameter or QoS profile has a name that '
             'ROS does not allow.',
-            'rcl refuses to create it.',
+            'ROS refuses to create it.',
             _NAMES,
         ),
         Rule(
             'bad-remap',
             'A remapping rule renames what is not remapped, or has an unknown scheme.',
-            'rcl refuses the rule, or it would be without effect.',
+            'ROS refuses the rule, or it would be without effect.',
             'https://docs.ros.org/en/jazzy/How-To-Guides/Node-arguments.html',
         ),
     ),
