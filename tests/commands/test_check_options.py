@@ -46,7 +46,7 @@ def test_all_faults_of_all_files_are_found_in_one_run(run):
     code, out, err = run('faulty.yaml', 'right.yaml', 'missing.yaml', '*.yml', 'nowhere*')
     assert code == 1
     assert 'faulty.yaml:2:9: error[bad-name]: ' in out
-    assert 'faulty.yaml:2:25: error[bad-value]: ' in out
+    assert 'faulty.yaml:2:26: error[bad-value]: ' in out
     assert 'missing.yaml: error[unreadable-file]: ' in out
     assert '*.yml: error[nothing-to-check]: no file matches this pattern' in out
     assert 'right.yaml: ok, 1 node\n' in out
