@@ -60,7 +60,11 @@ def select_files(words: Sequence[str], *, skip_foreign: bool = False) -> Selecti
         for path, is_named in _expand(word):
             if path is None:
                 fault = _explain_nothing(word)
-            elif not (is_named and skip_foreign) or not path.exists() or looks_like_system(path):
+            elif (
+                not (is_named and skip_foreign)
+                or not os.path.exists(path)
+                or looks_like_system(path)
+            ):
                 paths.setdefault(os.path.abspath(path) if word != '-' else '-', path)  # noqa: PTH100
         findings += [fault] if fault else []
     return Selection(tuple(paths.values()), tuple(findings))
@@ -93,7 +97,7 @@ def looks_like_system(path: Path) -> bool:
 
 def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
     """Yield each file and whether it was named; a `None` if there is nothing."""
-    if word == '-' or os.path.lexists(word) or not glob.has_magic(word):
+    if word == '-' or os.path.lexists(word) or (word and not glob.has_magic(word)):
         matches = [word]
     else:
         matches = sorted(glob.glob(word, recursive=True))  # noqa: PTH207 - pathlib's has no absolute ones
@@ -101,7 +105,7 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
             yield None, False
     for match in matches:
         path = Path(match)
-        if word == '-' or not path.is_dir():
+        if word == '-' or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
             yield path, True
             continue
         found = [inside for inside in _walk(path) if looks_like_system(inside)]
@@ -115,7 +119,9 @@ def _walk(folder: Path) -> Iterator[Path]:
         folders[:] = sorted(
             name for name in folders if not name.startswith('.') and name not in _FOREIGN_FOLDERS
         )
-        yield from (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
+        paths = (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
+        # A pipe would be waited for.
+        yield from (path for path in paths if not path.is_fifo())
 
 
 def _explain_nothing(word: str) -> Diagnostic:
@@ -126,4 +132,4 @@ def _explain_nothing(word: str) -> Diagnostic:
             word,
             help="a file in it is one if 'version:' and 'nodes:' stand at its top",
         )
-    return Diagnostic('nothing-to-check', 'no file matches this pattern', word)
+    return Diagnostic('nothing-to-check', 'no file matches this pattern', word or "''")

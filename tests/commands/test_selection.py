@@ -1,5 +1,7 @@
 """Which files a command line means; other people's YAML in a folder is left alone."""
 
+import os
+
 import pytest
 
 from composer.commands.selection import looks_like_system, select_files
@@ -137,3 +139,19 @@ def test_what_others_write_is_left_alone(tmp_path, text):
     path = tmp_path / 'a.yaml'
     path.write_text(text)
     assert not looks_like_system(path)
+
+
+def test_an_empty_word_is_not_the_working_folder(tree):
+    tree(one_yaml=SYSTEM)
+    assert select('') == ([], [('nothing-to-check', "''", 'no file matches this pattern')])
+
+
+def test_a_name_that_is_too_long_is_a_missing_file():
+    assert select('a' * 5000) == (['a' * 5000], [])
+    assert select('a' * 5000, skip_foreign=True) == (['a' * 5000], [])
+
+
+def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):
+    tree(one_yaml=SYSTEM)
+    os.mkfifo(tmp_path / 'pipe.yaml')
+    assert select('.') == (['one.yaml'], [])
