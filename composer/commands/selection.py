@@ -60,11 +60,7 @@ def select_files(words: Sequence[str], *, skip_foreign: bool = False) -> Selecti
         for path, is_named in _expand(word):
             if path is None:
                 fault = _explain_nothing(word)
-            elif (
-                not (is_named and skip_foreign)
-                or not os.path.exists(path)
-                or looks_like_system(path)
-            ):
+            elif not (is_named and skip_foreign) or looks_like_system(path):
                 paths.setdefault(os.path.abspath(path) if word != '-' else '-', path)  # noqa: PTH100
         findings += [fault] if fault else []
     return Selection(tuple(paths.values()), tuple(findings))
@@ -106,7 +102,7 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
     for match in matches:
         path = Path(match)
         if word == '-' or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
-            yield path, True
+            yield path, word != '-'
             continue
         found = [inside for inside in _walk(path) if looks_like_system(inside)]
         yield from ((inside, False) for inside in found)
