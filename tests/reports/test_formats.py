@@ -155,6 +155,11 @@ def test_a_github_report_is_a_command_for_each_finding():
     ]
 
 
+def test_what_separates_properties_is_escaped_in_them():
+    text = render_report(any_report('a,b:c%.yaml', 'x'), 'github')
+    assert text.startswith('::error file=a%2Cb%3Ac%25.yaml,line=1,')
+
+
 @given(texts, texts)
 def test_a_github_command_is_one_line_whatever_the_finding_says(name, message):
     report = any_report(f'a{name}', message)
