@@ -120,7 +120,7 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
             continue
         yield context.at_value(
             wait.path,
-            'deadlock',
+            'service-deadlock',
             f"{wait} waits for service '{wait.service}', which answers only {when}",
             help=_HOOK_HELP.get(hook) if is_own else 'put that node before this one',
             related=[_served_here(context, wait)],
@@ -193,7 +193,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         )
     return context.at_value(
         first.path,
-        'deadlock',
+        'service-deadlock',
         message,
         part=first.binding.behaviour.function,
         help=f"give {last.server.noun} '{last.server.entity.name}' a group of its own, "

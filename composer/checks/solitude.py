@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Severity
-from composer.names import suggest
+from composer.names import find_topic_name_fault, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,6 +67,9 @@ def _is_alone(graph: Graph, channel: Channel) -> bool:
     if channel.providers and channel.users:
         return False
     if channel.kind in graph.unsure or channel.name in _OF_ROS or _OF_ACTIONS in channel.name:
+        return False
+    if find_topic_name_fault(channel.name):
+        # That is a finding of its own.
         return False
     owner, _, last = channel.name.rpartition('/')
     if channel.kind != 'service' or last not in _OF_EVERY_NODE:

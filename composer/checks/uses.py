@@ -9,14 +9,13 @@ from composer.diagnostics import Related, Severity
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
 from composer.names import did_you_mean
-from composer.python_uses import ALL_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.checks.node_uses import BehaviourUses, FoundUse
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
     from composer.language.bindings import Binding
     from composer.language.positions import DataPath
     from composer.python_uses import UseKind
@@ -58,13 +57,15 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         name: [(binding, context.uses.uses_of(binding)) for binding in _bindings(context, node)]
         for name, node in context.spec.nodes.items()
     }
-    are_read = any(each.reads_others for found in uses.values() for _, each in found)
     for name, node in context.spec.nodes.items():
         for binding, found in uses[name]:
             yield from _check_names(context, node, binding, found, lost.get(name, []))
-        if not any(_may_hide_a_use(path) for path in lost.get(name, [])):
-            found_uses = [found for _, found in uses[name]]
-            yield from _check_unused(context, node, found_uses, are_read=are_read)
+    whole = [
+        (node, [found for _, found in uses[name]])
+        for name, node in context.spec.nodes.items()
+        if not any(_may_hide_a_use(path) for path in lost.get(name, []))
+    ]
+    yield from _check_unused(context, whole)
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
@@ -75,9 +76,9 @@ def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
 def _lost_by_node(context: CheckContext) -> dict[str, list[DataPath]]:
     """Return what was left out of each node for its own faults, by paths within the node."""
     lost: dict[str, list[DataPath]] = {}
-    for section, *path in context.system.dropped:
-        if section == 'nodes' and path:
-            lost.setdefault(str(path[0]), []).append(tuple(path[1:]))
+    for path in context.system.dropped:
+        if path[:1] == ('nodes',) and len(path) > 1:
+            lost.setdefault(str(path[1]), []).append(path[2:])
     return lost
 
 
@@ -136,31 +137,54 @@ def _explain_name(
 
 
 def _check_unused(
-    context: CheckContext, node: NodeSpec, uses: list[BehaviourUses], *, are_read: bool
+    context: CheckContext, nodes: list[tuple[NodeSpec, list[BehaviourUses]]]
 ) -> Iterator[Diagnostic]:
-    """Warn of what nobody uses.
+    """Warn of what nobody uses; what nodes share in the file is used if one of them uses it."""
+    are_read = any(each.reads_others for _, uses in nodes for each in uses)
+    unused: dict[Span, Diagnostic] = {}
+    used: set[Span] = set()
+    for node, uses in nodes:
+        open_kinds = _open_kinds(node, uses, are_read=are_read)
+        names = {(found.use.kind, found.use.name) for each in uses for found in each.found}
+        names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
+        for kind, section in _SECTIONS.items():
+            for name, entity in getattr(node, section).items():
+                span = context.system.positions.key(entity.path)
+                if kind in open_kinds or (kind, name) in names or _is_of_ros(kind, name):
+                    used.add(span)
+                elif span not in unused:
+                    unused[span] = _explain_unused(context, kind, name, entity.path)
+    yield from (finding for span, finding in unused.items() if span not in used)
+
+
+def _open_kinds(
+    node: NodeSpec, uses: list[BehaviourUses], *, are_read: bool
+) -> frozenset[UseKind]:
+    """Return the kinds of what may be used in ways that cannot be told.
 
     Args:
         are_read: Whether some behaviour reads parameters of other nodes.
     """
-    used = {(found.use.kind, found.use.name) for each in uses for found in each.found}
-    used |= {('publisher', trigger.publish or '') for trigger in node.triggers}
-    open_kinds: set[UseKind] = {kind for each in uses for kind in each.open_kinds}
-    if are_read or node.on_parameters or not uses:
-        # A behaviour may act on changes alone; and what a node without behaviours has, it has
-        # for others.
-        open_kinds.add('parameter')
-    for kind in sorted(ALL_KINDS - open_kinds):
-        rule, why = _UNUSED[kind]
-        for name, entity in getattr(node, _SECTIONS[kind]).items():
-            if (kind, name) not in used and not name.startswith(_OF_ROS):
-                yield context.at_key(
-                    entity.path,
-                    rule,
-                    f"{kind} '{name}' is declared, and {why}",
-                    help='remove it, or use it in a behaviour',
-                    severity=Severity.WARNING,
-                )
+    kinds = frozenset[UseKind]().union(*(each.open_kinds for each in uses))
+    # A behaviour may act on changes alone; and what a node without behaviours has, it has for
+    # others.
+    is_for_others = are_read or node.on_parameters is not None or not uses
+    return kinds | {'parameter'} if is_for_others else kinds
+
+
+def _explain_unused(context: CheckContext, kind: UseKind, name: str, path: DataPath) -> Diagnostic:
+    rule, why = _UNUSED[kind]
+    return context.at_key(
+        path,
+        rule,
+        f"{kind} '{name}' is declared, and {why}",
+        help='remove it, or use it in a behaviour',
+        severity=Severity.WARNING,
+    )
+
+
+def _is_of_ros(kind: UseKind, name: str) -> bool:
+    return kind == 'parameter' and (name in _OF_EVERY_NODE or name.startswith(_OF_ROS))
 
 
 def _may_hide_a_use(path: DataPath) -> bool:

@@ -25,7 +25,3 @@ def count_messages(node, message):
 
 def decide(node, changes):
     return None
-
-
-def pass_on(node):
-    return hear(node, node)

@@ -84,3 +84,7 @@ def send(node):
 
 def read(node):
     return [node.parameters.speed, node.parameters['sped'], node.parameters.get('sped_limit')]
+
+
+def pass_on(node):
+    threading.Thread(target=tell, args=[node]).start()
