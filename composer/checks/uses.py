@@ -165,7 +165,7 @@ def _open_kinds(
     Args:
         are_read: Whether some behaviour reads parameters of other nodes.
     """
-    kinds = frozenset[UseKind]().union(*(each.open_kinds for each in uses))
+    kinds = frozenset(kind for each in uses for kind in each.open_kinds)
     # A behaviour may act on changes alone; and what a node without behaviours has, it has for
     # others.
     is_for_others = are_read or node.on_parameters is not None or not uses

@@ -5,13 +5,12 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from std_srvs.srv import SetBool
-
 if TYPE_CHECKING:
     from collections.abc import Generator
 
     from geometry_msgs.msg import Twist
     from std_msgs.msg import Int32, String
+    from std_srvs.srv import SetBool
 
     from composer import Node
 
