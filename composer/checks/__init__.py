@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.checks.annotations import check_annotations
 from composer.checks.behaviours import check_behaviour_sources
 from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_names
+from composer.checks.node_uses import UseReader
 from composer.checks.parameters import check_parameters
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.uses import check_uses
+from composer.checks.wiring import check_wiring
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
@@ -31,6 +35,9 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_annotations,
+    check_uses,
+    check_wiring,
 )
 
 
@@ -45,7 +52,8 @@ def create_context(
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.path))
-    return CheckContext(system, system.spec, catalogue, modules, unreadable), findings
+    uses = UseReader(modules)
+    return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
 
 def check_system(
