@@ -81,12 +81,12 @@ def test_each_file_is_named(run):
 
 
 def test_a_faulty_file_fails_with_all_that_is_wrong(run):
-    path = INVALID / 'duplicate-key.yaml'
-    code, out, err = run('check', path)
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('check', folder / 'bad.yaml')
     assert code == 1
-    assert err == '3 faults in 1 file\n'
-    expected = (INVALID / 'duplicate-key.txt').read_text()
-    assert out.replace(f'{INVALID}/', '') == expected + '\n'
+    assert err == '2 faults in 1 file\n'
+    expected = (folder / 'bad.txt').read_text()
+    assert out.replace(f'{folder}/', '') == expected + '\n'
 
 
 def test_faults_of_one_file_do_not_hide_the_others(run):
@@ -127,8 +127,9 @@ def test_check_imports_no_behaviour(tmp_path):
 def test_without_interfaces_check_says_what_it_did_not_check(run, monkeypatch, tmp_path):
     monkeypatch.setenv('AMENT_PREFIX_PATH', '')
     monkeypatch.setattr(sys, 'prefix', str(tmp_path))
-    code, out, err = run('check', INVALID / 'unknown-type.yaml')
-    assert (code, out) == (0, f'{INVALID / "unknown-type.yaml"}: ok, 1 node\n')
+    path = EXAMPLES / 'unknown-type' / 'bad.yaml'
+    code, out, err = run('check', path)
+    assert (code, out) == (0, f'{path}: ok, 1 node\n')
     assert err == 'not checked without ROS 2: interface types and the fields of messages\n'
 
 
@@ -209,10 +210,11 @@ def test_the_version_is_told(run):
 
 
 def test_up_says_what_is_wrong_and_starts_nothing(run):
-    code, out, err = run('up', INVALID / 'duplicate-key.yaml')
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('up', folder / 'bad.yaml')
     assert (code, out) == (1, '')
-    expected = (INVALID / 'duplicate-key.txt').read_text()
-    assert err.replace(f'{INVALID}/', '') == expected + '\n'
+    expected = (folder / 'bad.txt').read_text()
+    assert err.replace(f'{folder}/', '') == expected + '\n'
 
 
 @pytest.mark.parametrize(

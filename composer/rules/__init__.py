@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from composer.rules.behaviours import BEHAVIOURS
 from composer.rules.comments import COMMENTS
+from composer.rules.deadlock import DEADLOCK
 from composer.rules.definitions import DEFINITIONS
 from composer.rules.expressions import EXPRESSIONS
 from composer.rules.fields import FIELDS
@@ -17,6 +18,7 @@ from composer.rules.names import NAMES
 from composer.rules.parameters import PARAMETERS
 from composer.rules.references import REFERENCES
 from composer.rules.structure import STRUCTURE
+from composer.rules.wiring import WIRING
 
 if TYPE_CHECKING:
     from composer.rules.record import Family, Rule
@@ -29,6 +31,8 @@ FAMILIES: tuple[Family, ...] = (
     BEHAVIOURS,
     FIELDS,
     PARAMETERS,
+    WIRING,
+    DEADLOCK,
     DEFINITIONS,
     COMMENTS,
 )

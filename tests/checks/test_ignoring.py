@@ -100,9 +100,11 @@ def test_what_only_interfaces_show_is_no_unused_comment_without_them(check):
 @pytest.mark.ros
 def test_a_comment_about_a_type_that_is_there_is_unused(check):
     text = (
-        '    publishers:\n'
-        '      scan: std_msgs/msg/String  # composer: ignore[unknown-type]\n'
-        '      status: std_msgs/msg/Sting  # composer: ignore[unknown-type]\n'
+        '    service_clients:\n'
+        '      switch: std_srvs/srv/SetBool  '
+        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
+        '      other: std_srvs/srv/SetBol  '
+        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
     )
     assert [finding[1:3] for finding in check(text)] == [('unused-ignore', 5)]
 
