@@ -140,9 +140,10 @@ def _starts_later(order: dict[str, int], wait: _Wait) -> bool:
 
 def _check_groups(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
     """No chain of calls comes back to the group that its first behaviour keeps."""
-    first_of = {wait.path: wait for wait in reversed(waits)}
+    first_of: dict[DataPath, _Wait] = {}
     calls: dict[DataPath, list[DataPath]] = {}
     for wait in waits:
+        first_of.setdefault(wait.path, wait)
         calls.setdefault(wait.path, []).append(wait.answering)
     served: dict[Group | None, set[DataPath]] = {}
     for wait in waits:
