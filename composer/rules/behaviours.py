@@ -15,6 +15,7 @@ BEHAVIOURS = Family(
             'unknown-behaviour',
             'There is no module of this name, or no such function in it.',
             'There is nothing to call.',
+            is_ignorable=True,
         ),
         Rule(
             'broken-module',

@@ -21,8 +21,9 @@ REFERENCES = Family(
         ),
         Rule(
             'unknown-publisher',
-            '`publish:` names a publisher that the node does not declare.',
-            'There is nothing that could publish what the behaviour returns.',
+            '`publish:` or a behaviour names a publisher that the node does not declare.',
+            'There is nothing that could publish it.',
+            is_ignorable=True,
         ),
         Rule(
             'type-mismatch',

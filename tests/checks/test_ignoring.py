@@ -93,7 +93,11 @@ def test_what_only_an_import_may_show_is_no_unused_comment_without_it(check):
 
 
 def test_what_only_interfaces_show_is_no_unused_comment_without_them(check):
-    text = '    publishers:\n      scan: std_msgs/msg/String  # composer: ignore[unknown-type]\n'
+    text = (
+        '    service_clients:\n'
+        '      switch: std_srvs/srv/SetBool  '
+        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
+    )
     assert check(text, catalogue=InterfaceCatalogue(prefixes=[])) == []
 
 
