@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import glob
 import os
 import re
@@ -10,16 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic
-from composer.names import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
 _SUFFIXES = ('.yaml', '.yml')
 _SCHEMA = 'composer.schema.json'
 # Neither is read: the folders of tools begin with a dot, these are full of other people's files.
 _FOREIGN_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
 _LARGEST_LOOK = 1_000_000
+
+# How alike two words are of which one has a letter more, less or changed.
+_SLIP = 0.8
 
 _TOP_KEY = re.compile(r'^(["\']?)([A-Za-z]\w*)\1\s*:(?=\s|$)', re.MULTILINE)
 _FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes)["\']?\s*:')
@@ -70,8 +73,9 @@ def looks_like_system(path: Path) -> bool:
     """Return whether a file is meant for Composer, even if much is wrong with it.
 
     That is so if it names the schema of Composer, or has the keys `version` and `nodes` at its
-    top (or keys close to them), `nodes` not being a list. Files of docker compose, of GitHub and
-    of ROS 2 parameters are no systems by that.
+    top, `nodes` not being a list; if one is missing or misspelt, publishers, timers and so on
+    have to stand below. Files of docker compose, of GitHub and of ROS 2 parameters are no systems
+    by that.
     """
     try:
         with path.open('rb') as file:
@@ -83,12 +87,20 @@ def looks_like_system(path: Path) -> bool:
     if text.lstrip().startswith('{'):
         return {match[1] for match in _FLOW_KEY.finditer(text)} == {'version', 'nodes'}
     keys = {match[2]: match.end() for match in _TOP_KEY.finditer(text)}
-    nodes = next((key for key in keys if suggest(key, ['nodes']) or key == 'nodes'), None)
+    nodes = _find_near('nodes', keys)
     if nodes is None or _LIST.match(text, keys[nodes]):
         return False
-    return any(suggest(key, ['version']) or key == 'version' for key in keys) or bool(
-        nodes == 'nodes' and _ENTITIES.search(text, keys[nodes])
-    )
+    if nodes == 'nodes' and _find_near('version', keys):
+        return True
+    return bool(_ENTITIES.search(text, keys[nodes]))
+
+
+def _find_near(wanted: str, keys: Mapping[str, int]) -> str | None:
+    """Return a key, or else one that is a slip of the pen away from it."""
+    if wanted in keys:
+        return wanted
+    near = difflib.get_close_matches(wanted, keys, n=1, cutoff=_SLIP)
+    return near[0] if near else None
 
 
 def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:

@@ -101,7 +101,8 @@ def test_standard_input_is_a_dash():
         SYSTEM,
         '# yaml-language-server: $schema=../schemas/composer.schema.json\n',
         'nodes: {}\nversion: 7\n',
-        'version: 1\nnodess:\n  a: {}\n',
+        'version: 1\nnodess:\n  a:\n    on_start: b:c\n',
+        'nodse:\n  a:\n    timers: {}\n',
         'verson: 1\nnodes:\n  a: {}\n',
         '"version": 1\n"nodes": {}\n',
         '{version: 1, nodes: {}}',
@@ -133,6 +134,9 @@ def test_what_is_meant_for_composer_is_known(tmp_path, text):
         '{"version": 1}',
         '',
         'just text',
+        'version: 1\nnode: {}\n',
+        'model:\n  name: x\noperation:\n  name: y\n',
+        'node:\n  name: x\nversions: {}\n',
     ],
 )
 def test_what_others_write_is_left_alone(tmp_path, text):
