@@ -100,14 +100,13 @@ def _load(path: Path, options: CheckOptions) -> LoadedSystem:
 
 
 def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:
+    """Return what this machine has not shown, in one line, if there is anything."""
     unchecked = []
     if not catalogue.available:
         unchecked.append('interface types and the fields of messages')
     if imports and imports.missing_ros:
-        unchecked.append(
-            f'what needs ROS to be imported: {", ".join(sorted(imports.missing_ros))}'
-        )
-    return tuple(f'not checked without ROS 2: {what}' for what in unchecked)
+        unchecked.append(f'what imports ROS itself ({", ".join(sorted(imports.missing_ros))})')
+    return (f'not checked without ROS 2: {"; ".join(unchecked)}',) if unchecked else ()
 
 
 def _show(report: Report, options: CheckOptions) -> None:

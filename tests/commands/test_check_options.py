@@ -321,4 +321,4 @@ def test_without_ros_an_import_says_what_it_could_not_check(imports, monkeypatch
         '{on_start: driving:start}', 'import no_such_msgs.msg\n\ndef start(node): ...\n'
     )
     assert (code, out) == (0, 'rover.yaml: ok, 1 node\n')
-    assert err == 'not checked without ROS 2: what needs ROS to be imported: driving\n'
+    assert err == 'not checked without ROS 2: what imports ROS itself (driving)\n'
