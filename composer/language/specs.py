@@ -194,6 +194,10 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        parameter_services: Whether others can list, read and set its parameters.
+        rosout: Whether what it logs goes to `/rosout`, too.
+        type_description_service: Whether it answers which types it uses.
+        logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
     """
@@ -203,6 +207,10 @@ class NodeSpec:
     description: str
     log_level: LogLevel | None
     use_sim_time: bool
+    parameter_services: bool
+    rosout: bool
+    type_description_service: bool
+    logger_services: bool
     on_error: OnError
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
