@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.context import Context
-    from rclpy.node import Node as RosNode
     from rclpy.timer import Timer
 
     from composer.language.positions import DataPath, SourceMap
@@ -79,7 +78,7 @@ class LiveNode:
 
     spec: NodeSpec
     services: SystemServices
-    ros: RosNode
+    ros: ComposedRosNode
     face: Node
     errors: ErrorReporter
     publishers: dict[str, Publish]

@@ -30,9 +30,12 @@ The file turns each of them on or off.
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
+
+from composer.runtime.logs import has_rosout_publisher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -44,6 +47,7 @@ if TYPE_CHECKING:
     from composer.language.specs import NodeSpec
 
 _PARAMETER_EVENTS = '/parameter_events'
+_POLL_SEC = 0.001
 
 
 class ComposedRosNode(Node):
@@ -80,6 +84,21 @@ class ComposedRosNode(Node):
             lambda: self.create_publisher(msg_type, topic, *arguments, **options)
         )
         return self._late_events
+
+    def wait_until_gone(self, timeout_sec: float) -> bool:
+        """Wait until the destroyed node is gone; return whether it went in time.
+
+        An executor that waits for an entity of the node keeps the entity, and that one the node,
+        until it wakes up. A new node of that name would meanwhile get no publisher of `/rosout`,
+        and lose the next one with the end of the old node.
+        """
+        deadline = time.monotonic() + timeout_sec
+        name = self.get_logger().name
+        while has_rosout_publisher(name):
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(_POLL_SEC)
+        return True
 
 
 class _LatePublisher:
