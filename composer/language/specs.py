@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.names import join_names
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -226,6 +228,11 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/arm`."""
+        return join_names(self.namespace, self.name)
 
     @property
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:

@@ -48,6 +48,7 @@ class SystemServices:
         executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
         failures: Which services failed lately.
+        without_parameter_services: The full names of the nodes that have none.
     """
 
     context: Context
@@ -60,6 +61,7 @@ class SystemServices:
     executor: SystemExecutor
     stop: StopSignal
     failures: ServiceFailures
+    without_parameter_services: frozenset[str]
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""The ROS loggers: their levels, from the file and the command line, and their way to `/rosout`."""
+"""The ROS loggers: their levels, from the file and the command line, and their publishers."""
 
 from __future__ import annotations
 

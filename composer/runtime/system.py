@@ -68,6 +68,9 @@ class System:
             executor=self._executor,
             stop=self._stop_signal,
             failures=ServiceFailures(),
+            without_parameter_services=frozenset(
+                node.full_name for node in spec.nodes.values() if not node.parameter_services
+            ),
         )
 
     @property
