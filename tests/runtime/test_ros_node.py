@@ -36,7 +36,10 @@ nodes:
     parameter_services: true
     type_description_service: true
     logger_services: true
-  described: {namespace: deep, type_description_service: true}
+  described:
+    namespace: deep
+    type_description_service: true
+    publishers: {word: std_msgs/msg/String}
   levelled: {logger_services: true}
   silent: {rosout: false}
   last: {parameters: {speed: 1.5}}
@@ -154,7 +157,7 @@ def test_services_that_were_asked_for_answer(graph, shared_peer):
     request = {'names': ['levelled']}
     (level,) = shared_peer.call(GetLoggerLevels, '/levelled/get_logger_levels', **request).levels
     assert level.name == 'levelled'
-    name = 'rcl_interfaces/msg/ParameterEvent'
+    name = 'std_msgs/msg/String'
     wanted = {'type_name': name, 'type_hash': InterfaceCatalogue().type_hash(name)}
     service = '/deep/described/get_type_description'
     described = shared_peer.call(GetTypeDescription, service, **wanted)
