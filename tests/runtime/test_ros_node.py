@@ -181,9 +181,6 @@ def test_a_node_without_events_of_its_own_tells_of_changes_that_a_behaviour_make
     event = wait_for(changes, 'a change')[0]
     assert event.node == '/plain'
     assert [parameter.name for parameter in event.changed_parameters] == ['mode']
-    assert [
-        name for event in heard for name in event.new_parameters if name == 'use_sim_time'
-    ] == []
 
 
 def test_a_peer_hears_on_rosout_what_behaviours_log_unless_the_file_turns_it_off(
