@@ -60,6 +60,19 @@ def parse_system(data: Data, name: str) -> SystemSpec:
     )
 
 
+_INHERITED = frozenset(
+    {
+        'log_level',
+        'use_sim_time',
+        'on_error',
+        'parameter_services',
+        'rosout',
+        'type_description_service',
+        'logger_services',
+    }
+)
+
+
 @dataclass(frozen=True, slots=True)
 class _Defaults:
     namespace: str
@@ -68,13 +81,12 @@ class _Defaults:
 
 
 def _parse_defaults(data: Data) -> _Defaults:
-    inherited = {'log_level', 'use_sim_time', 'on_error'}
     return _Defaults(
         namespace=expand_namespace(data.get('namespace', '')),
         qos=_parse_qos(data['qos'], ('defaults', 'qos'))
         if 'qos' in data
         else QosSpec(DEFAULT_PROFILE, {}, ()),
-        node={key: value for key, value in data.items() if key in inherited},
+        node={key: value for key, value in data.items() if key in _INHERITED},
     )
 
 
@@ -95,6 +107,10 @@ class _NodeParser:
             description=data.get('description', ''),
             log_level=data.get('log_level'),
             use_sim_time=data.get('use_sim_time', False),
+            parameter_services=data.get('parameter_services', _has_parameters(data)),
+            rosout=data.get('rosout', True),
+            type_description_service=data.get('type_description_service', False),
+            logger_services=data.get('logger_services', False),
             on_error=self._on_error,
             parameters=_parse_entries(data, path, 'parameters', _parse_parameter),
             state=MappingProxyType(data.get('state', {})),
@@ -189,6 +205,10 @@ class _NodeParser:
             data = {'behaviour': data}
             return _parse_behaviour(data, self._path, (*self._path, key))
         return _parse_behaviour(data, (*self._path, key)) if data else None
+
+
+def _has_parameters(node: Data) -> bool:
+    return bool(node.get('parameters')) or 'on_parameters' in node
 
 
 def _parse_entries(

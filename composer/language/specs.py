@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.names import join_names
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -194,6 +196,10 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        parameter_services: Whether others can list, read and set its parameters.
+        rosout: Whether what it logs goes to `/rosout`, too.
+        type_description_service: Whether it answers which types it uses.
+        logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
     """
@@ -203,6 +209,10 @@ class NodeSpec:
     description: str
     log_level: LogLevel | None
     use_sim_time: bool
+    parameter_services: bool
+    rosout: bool
+    type_description_service: bool
+    logger_services: bool
     on_error: OnError
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
@@ -218,6 +228,11 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/arm`."""
+        return join_names(self.namespace, self.name)
 
     @property
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:

@@ -9,8 +9,6 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node as RosNode
-from rclpy.parameter import Parameter
 
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
@@ -18,6 +16,7 @@ from composer.runtime.calls import BehaviourCall, CallLedger
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.node import Node, Publish
 from composer.runtime.remote_parameters import RemoteParameters
+from composer.runtime.ros_node import ComposedRosNode
 from composer.runtime.supervision import ErrorReporter
 from composer.runtime.waiting import CoroutineWaits, ThreadWaits
 
@@ -49,6 +48,7 @@ class SystemServices:
         executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
         failures: Which services failed lately.
+        without_parameter_services: The full names of the nodes that have none.
     """
 
     context: Context
@@ -61,6 +61,7 @@ class SystemServices:
     executor: SystemExecutor
     stop: StopSignal
     failures: ServiceFailures
+    without_parameter_services: frozenset[str]
 
 
 @dataclass(slots=True)
@@ -79,7 +80,7 @@ class LiveNode:
 
     spec: NodeSpec
     services: SystemServices
-    ros: RosNode
+    ros: ComposedRosNode
     face: Node
     errors: ErrorReporter
     publishers: dict[str, Publish]
@@ -185,18 +186,7 @@ class LiveNode:
 
 def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
     """Create a node without entities."""
-    remapping = [part for old, new in spec.remap for part in ('-r', f'{old}:={new}')]
-    overrides = [Parameter('use_sim_time', value=True)] if spec.use_sim_time else None
-    # Global arguments hold for every node of the process, where a __node rule would give all of
-    # them one name. The command line's rules come first: the first that matches wins.
-    ros = RosNode(
-        spec.name,
-        context=services.context,
-        namespace=spec.namespace,
-        cli_args=['--ros-args', *services.ros_arguments, *remapping],
-        use_global_arguments=False,
-        parameter_overrides=overrides,
-    )
+    ros = ComposedRosNode(spec, services.context, services.ros_arguments)
     publishers: dict[str, Publish] = {}
     service_clients: dict[str, ServiceClient] = {}
     action_clients: dict[str, ActionClient] = {}

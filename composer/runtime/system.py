@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from composer.language.specs import NodeSpec, SystemSpec
 
 _EXECUTOR_STOP_SEC = 1.0
+_GONE_SEC = 2.0
 
 
 class System:
@@ -67,6 +68,9 @@ class System:
             executor=self._executor,
             stop=self._stop_signal,
             failures=ServiceFailures(),
+            without_parameter_services=frozenset(
+                node.full_name for node in spec.nodes.values() if not node.parameter_services
+            ),
         )
 
     @property
@@ -187,6 +191,11 @@ class System:
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
+            if not old.ros.wait_until_gone(_GONE_SEC):
+                system_logger.warn(
+                    f"node '{name}': something still holds an entity of the node before its "
+                    'restart, so its log may be missing on /rosout'
+                )
             try:
                 node = self._create(old.spec)
                 self._executor.add_node(node.ros)
