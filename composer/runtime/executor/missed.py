@@ -1,0 +1,27 @@
+"""What entities missed because their callbacks did not begin in time."""
+
+from dataclasses import dataclass
+
+LATE_SHARE = 0.1
+LATE_LEAST_NS = 1_000_000
+"""A tick is late if it begins more than a tenth of its period, and at least 1 ms, after it was due.
+
+An interpreter that computes in another thread lets go of its lock every 5 ms: timers with periods
+below 50 ms are late beside one, as they are indeed.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """Counts since the entity came to the executor.
+
+    Attributes:
+        overruns: Messages that the middleware dropped from the queue of a subscription, because
+            newer ones came before they were taken. Not those lost on the way to the queue.
+        late_ticks: Ticks of a timer that began late.
+        skipped_ticks: Ticks that never were: rcl skips those whose time has passed.
+    """
+
+    overruns: int = 0
+    late_ticks: int = 0
+    skipped_ticks: int = 0
