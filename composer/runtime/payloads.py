@@ -80,6 +80,9 @@ class PayloadConverter:
                 that it has and what it was given.
         """
         try:
+            # What behaviours give most often, without a detour.
+            if type(payload) is self.message_class:
+                return self._check(payload)
             return self.read(payload)
         except FieldError as error:
             raise PayloadError(self.type_name, error) from None

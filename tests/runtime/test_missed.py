@@ -138,7 +138,9 @@ def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
     clock._set_ros_time_is_active(True)
     clock.set_ros_time_override(Time(seconds=100))
     ticks = []
-    timer = node.create_timer(1.0, lambda: ticks.append(clock.now().nanoseconds / 1e9), clock=clock)
+    timer = node.create_timer(
+        1.0, lambda: ticks.append(clock.now().nanoseconds / 1e9), clock=clock
+    )
 
     def leap_to(seconds, tick_count):
         clock.set_ros_time_override(Time(nanoseconds=int(seconds * 1e9)))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 LATE_SHARE = 0.1
 LATE_LEAST_NS = 1_000_000
-"""A tick is late if it begins more than a tenth of its period, and at least 1 ms, after it was due.
+"""A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its time.
 
 An interpreter that computes in another thread lets go of its lock every 5 ms: timers with periods
 below 50 ms are late beside one, as they are indeed.
@@ -25,3 +25,20 @@ class Missed:
     overruns: int = 0
     late_ticks: int = 0
     skipped_ticks: int = 0
+
+    def __add__(self, other: 'Missed') -> 'Missed':
+        return Missed(
+            self.overruns + other.overruns,
+            self.late_ticks + other.late_ticks,
+            self.skipped_ticks + other.skipped_ticks,
+        )
+
+    def __sub__(self, other: 'Missed') -> 'Missed':
+        return Missed(
+            self.overruns - other.overruns,
+            self.late_ticks - other.late_ticks,
+            self.skipped_ticks - other.skipped_ticks,
+        )
+
+    def __bool__(self) -> bool:
+        return self != Missed()
