@@ -9,7 +9,7 @@ import statistics
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,18 @@ from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
 import composer
+from composer.runtime.calls import BehaviourCall, CallLedger
+from composer.runtime.health import CallTimes
 from composer.runtime.system import System
 
 _MESSAGES = 2000
 _ROUNDS = 15
-_ROUND_TIMEOUT_SEC = 60.0
-_MEETING_TIMEOUT_SEC = 20.0
+_CALLS = 1_000_000
+_CALL_ROUNDS = 5
+_TIMEOUT_SEC = 60.0
 
-KINDS: dict[str, tuple[type, Callable[[Any], Any]]] = {
+# By message type, what the behaviour does: two make a new message, one passes it on.
+ANSWERS: dict[str, tuple[type, Callable[[Any], Any]]] = {
     'std_msgs/msg/Int32': (Int32, lambda message: Int32(data=message.data + 1)),
     'std_msgs/msg/String': (String, lambda message: String(data=message.data)),
     'geometry_msgs/msg/Twist': (Twist, lambda message: message),
@@ -50,21 +54,20 @@ class _Driver:
         self._message = message_class()
         self._left = 0
         self._done = threading.Event()
-        self._publishers = {
-            side: node.create_publisher(message_class, f'{side}_in', 10)
-            for side in ('composed', 'plain')
-        }
-        for side, publisher in self._publishers.items():
+        self._publishers = {}
+        for side in ('composed', 'plain'):
+            publisher = node.create_publisher(message_class, f'{side}_in', 10)
             node.create_subscription(
                 message_class,
                 f'{side}_out',
-                lambda _, send=publisher.publish: self._next(send),
+                lambda _, send=publisher.publish: self._send_next(send),
                 10,
             )
+            self._publishers[side] = publisher
 
     def wait_for_peers(self) -> None:
         """Wait until both sides can be reached."""
-        end = time.monotonic() + _MEETING_TIMEOUT_SEC
+        end = time.monotonic() + _TIMEOUT_SEC
         while not all(one.get_subscription_count() for one in self._publishers.values()):
             if time.monotonic() > end:
                 message = 'the two sides did not meet'
@@ -72,18 +75,18 @@ class _Driver:
             time.sleep(0.01)
 
     def run(self, side: str) -> tuple[float, float]:
-        """Return µs of wall time and of processor time of a message there and back."""
+        """Return the µs of wall time and of processor time that a message and its answer take."""
         self._left = _MESSAGES
         self._done.clear()
         begin, used = time.perf_counter(), time.process_time()
         self._publishers[side].publish(self._message)
-        if not self._done.wait(_ROUND_TIMEOUT_SEC):
-            message = f'{self._left} messages of {side} did not come back'
+        if not self._done.wait(_TIMEOUT_SEC):
+            message = f'{self._left} messages of the {side} side did not come back'
             raise TimeoutError(message)
         elapsed, spent = time.perf_counter() - begin, time.process_time() - used
         return elapsed / _MESSAGES * 1e6, spent / _MESSAGES * 1e6
 
-    def _next(self, send: Callable[[Any], None]) -> None:
+    def _send_next(self, send: Callable[[Any], None]) -> None:
         self._left -= 1
         if self._left > 0:
             send(self._message)
@@ -91,7 +94,65 @@ class _Driver:
             self._done.set()
 
 
-def _start_composed(type_name: str, answer: Callable[[Any], Any]) -> Any:
+def message_overhead(type_name: str = 'std_msgs/msg/Int32') -> dict[str, float]:
+    """Measure what Composer adds to: subscription, behaviour, publish.
+
+    Returns:
+        Medians over rounds of both sides in turn, in µs: what a message and its answer take on
+        each side, and what Composer adds; of wall time, and of processor time (`_cpu`).
+    """
+    message_class, answer = ANSWERS[type_name]
+    system = _start_composed(type_name, answer)
+    context, executor = system._services.context, system._executor  # noqa: SLF001
+    plain = _create_plain(context, message_class, answer)
+    driving = rclpy.create_node('driver', context=context)
+    driver = _Driver(driving, message_class)
+    for node in (plain, driving):
+        executor.add_node(node)
+    driver.wait_for_peers()
+    # The first round warms up.
+    rounds = [(driver.run('composed'), driver.run('plain')) for _ in range(_ROUNDS + 1)][1:]
+    for node in (plain, driving):
+        executor.remove_node(node)
+        node.destroy_node()
+    system.stop()
+    return {
+        **_medians('', [(ours[0], theirs[0]) for ours, theirs in rounds]),
+        **_medians('_cpu', [(ours[1], theirs[1]) for ours, theirs in rounds]),
+    }
+
+
+def measuring_overhead() -> dict[str, float]:
+    """Measure what measuring adds to a call of a behaviour, in ns; medians of rounds in turn."""
+
+    def create(times: CallTimes | None) -> Callable[[], float]:
+        call = BehaviourCall(
+            'it',
+            lambda message: message,
+            CallLedger(),
+            deliver=lambda _: None,
+            failed=lambda _owner, _error: None,
+            times=times,
+        ).as_callback()
+
+        def run() -> float:
+            begin = time.perf_counter_ns()
+            for _ in range(_CALLS):
+                call(None)
+            return (time.perf_counter_ns() - begin) / _CALLS
+
+        return run
+
+    measured, bare = create(CallTimes()), create(None)
+    rounds = [(measured(), bare()) for _ in range(_CALL_ROUNDS)]
+    return {
+        'measured_ns': statistics.median(one[0] for one in rounds),
+        'bare_ns': statistics.median(one[1] for one in rounds),
+        'added_ns': statistics.median(one[0] - one[1] for one in rounds),
+    }
+
+
+def _start_composed(type_name: str, answer: Callable[[Any], Any]) -> System:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'overhead.yaml'
         path.write_text(_SYSTEM.format(type=type_name))
@@ -116,48 +177,15 @@ def _create_plain(context: Any, message_class: type, answer: Callable[[Any], Any
     return node
 
 
-def message_overhead(type_name: str = 'std_msgs/msg/Int32') -> dict[str, float]:
-    """µs that Composer adds to: subscription, behaviour, publish.
-
-    Returns:
-        The medians over rounds in turn: wall and processor time of both sides, each for a
-        message there and back, and the medians of their differences.
-    """
-    message_class, answer = KINDS[type_name]
-    system = _start_composed(type_name, answer)
-    context, executor = system._services.context, system._executor  # noqa: SLF001
-    plain = _create_plain(context, message_class, answer)
-    driving = rclpy.create_node('driver', context=context)
-    driver = _Driver(driving, message_class)
-    for node in (plain, driving):
-        executor.add_node(node)
-    driver.wait_for_peers()
-    figures = []
-    for _ in range(_ROUNDS + 1):
-        composed, by_hand = driver.run('composed'), driver.run('plain')
-        figures.append(
-            (*composed, *by_hand, *(a - b for a, b in zip(composed, by_hand, strict=True)))
-        )
-    for node in (plain, driving):
-        executor.remove_node(node)
-        node.destroy_node()
-    system.stop()
-    keys = (
-        'composed_us',
-        'composed_cpu_us',
-        'plain_us',
-        'plain_cpu_us',
-        'added_us',
-        'added_cpu_us',
-    )
-    # The first round warms up.
+def _medians(suffix: str, rounds: Sequence[tuple[float, float]]) -> dict[str, float]:
     return {
-        key: statistics.median(column)
-        for key, column in zip(keys, zip(*figures[1:], strict=True), strict=True)
+        f'composed{suffix}_us': statistics.median(ours for ours, _ in rounds),
+        f'plain{suffix}_us': statistics.median(theirs for _, theirs in rounds),
+        f'added{suffix}_us': statistics.median(ours - theirs for ours, theirs in rounds),
     }
 
 
 if __name__ == '__main__':
-    results = {name: message_overhead(name) for name in KINDS}
-    print(json.dumps(results, indent=2), flush=True)
+    results = {'messages': {name: message_overhead(name) for name in ANSWERS}}
+    print(json.dumps({**results, 'measuring': measuring_overhead()}, indent=2), flush=True)
     os._exit(0)

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
 # To write a message holds the interpreter: for a large system, one goes out for so many entities.
 _MOST_STATUSES = 50
 _DEPTH = 10
+# ROS allows 255 (rmw/validate_node_name.h).
+_LONGEST_NAME = 255
+
+
+def node_name(system: str) -> str:
+    """Return the name of the node that publishes the health of a system."""
+    return f'_composer_{re.sub("[^A-Za-z0-9_]+", "_", system)}'[:_LONGEST_NAME]
 
 
 class HealthPublisher:
@@ -60,13 +67,17 @@ class HealthPublisher:
         from diagnostic_msgs.msg import DiagnosticArray
 
         self._node = RosNode(
-            f'_composer_{re.sub("[^A-Za-z0-9_]+", "_", self._system)}',
+            node_name(self._system),
             context=context,
             cli_args=['--ros-args', *ros_arguments],
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
-            parameter_overrides=[Parameter('start_type_description_service', value=False)],
+            parameter_overrides=[
+                Parameter('start_type_description_service', value=False),
+                # Nobody spins the node, so it would never hear what time a simulation has.
+                Parameter('use_sim_time', value=False),
+            ],
         )
         self._publisher = self._node.create_publisher(DiagnosticArray, '/diagnostics', _DEPTH)
         self._thread.start()

@@ -8,10 +8,12 @@ import pytest
 pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.validate_node_name import validate_node_name
 
 from composer.runtime.calls import BehaviourCall, CallLedger, RunningCall
 from composer.runtime.executor import Missed
 from composer.runtime.health import CallTimes, EntityHealth, HealthBoard
+from composer.runtime.health_publisher import node_name
 from composer.runtime.health_status import StatusWriter
 
 
@@ -154,6 +156,12 @@ def test_coroutines_are_measured_to_their_end():
     with pytest.raises(StopIteration):
         coroutine.send(None)
     assert times.calls() == 1
+
+
+@pytest.mark.parametrize('system', ['robot', 'fleet.of-two rovers', 'größe', '2', 'x' * 300])
+def test_every_system_has_a_node_with_a_valid_name(system):
+    assert validate_node_name(node_name(system))
+    assert node_name('fleet.of-two rovers') == '_composer_fleet_of_two_rovers'
 
 
 def status_of(owner, durations=(), errors=(), missed=None, running_sec=0.0):
