@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _UNIT_BITS = 8
 _SUB_BITS = 3
 
+_NOTHING = Missed()
+
 
 class CallTimes:
     """How long calls took, each to within an eighth.
@@ -120,7 +122,17 @@ class EntityHealth:
         times: Of the present period.
     """
 
-    __slots__ = ('_calls', '_errors', '_last_error', '_look', '_missed', '_past', '_said', 'times')
+    __slots__ = (
+        '_all_missed',
+        '_calls',
+        '_errors',
+        '_last_error',
+        '_look',
+        '_missed',
+        '_past',
+        '_said',
+        'times',
+    )
 
     def __init__(self) -> None:
         self.times = CallTimes()
@@ -128,8 +140,8 @@ class EntityHealth:
         self._errors = 0
         self._last_error = ''
         self._look: Callable[[], Missed] = Missed
-        self._past = self._missed = Missed()
-        self._said = 0, Missed()
+        self._past = self._missed = self._all_missed = _NOTHING
+        self._said = 0, _NOTHING
 
     def note_error(self, error: BaseException) -> None:
         """Note that a call raised."""
@@ -138,7 +150,8 @@ class EntityHealth:
 
     def follow(self, look: Callable[[], Missed]) -> None:
         """From now on, ask here for what it has missed: its node was built, or built anew."""
-        self._past, self._missed = self._all_missed(), Missed()
+        self._look_anew()
+        self._past, self._missed = self._all_missed, _NOTHING
         self._look = look
 
     def report(self, period_sec: float, running_sec: float) -> EntityReport:
@@ -150,7 +163,8 @@ class EntityHealth:
         """
         times = self.times.take()
         self._calls += times.calls()
-        errors, missed = self._errors, self._all_missed()
+        self._look_anew()
+        errors, missed = self._errors, self._all_missed
         said_errors, said_missed = self._said
         self._said = errors, missed
         return EntityReport(
@@ -158,17 +172,19 @@ class EntityHealth:
             times=times,
             errors=errors - said_errors,
             last_error=self._last_error if errors > said_errors else '',
-            missed=missed - said_missed,
+            missed=_NOTHING if missed is said_missed else missed - said_missed,
             running_sec=running_sec,
             all_calls=self._calls,
             all_errors=errors,
             all_missed=missed,
         )
 
-    def _all_missed(self) -> Missed:
+    def _look_anew(self) -> None:
+        missed = self._look()
         # What has been destroyed knows nothing any more.
-        self._missed = self._look() or self._missed
-        return self._past + self._missed
+        if missed and missed != self._missed:
+            self._missed = missed
+            self._all_missed = self._past + missed
 
 
 class HealthBoard:

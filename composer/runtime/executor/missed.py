@@ -6,8 +6,8 @@ LATE_SHARE = 0.1
 LATE_LEAST_NS = 1_000_000
 """A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its time.
 
-An interpreter that computes in another thread lets go of its lock every 5 ms: timers with periods
-below 50 ms are late beside one, as they are indeed.
+A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms unless
+that was set: beside it, timers with short periods are late indeed.
 """
 
 
