@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from composer.language.parameters import convert_parameter_value, infer_parameter_type
 from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
+    DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
     ActionClientSpec,
     ActionSpec,
@@ -51,6 +52,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         qos=_parse_entries(data, (), 'qos', _parse_named_qos),
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
+        diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
         nodes=_parse_entries(
             data,
             (),
@@ -71,6 +73,13 @@ _INHERITED = frozenset(
         'logger_services',
     }
 )
+
+
+def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as it is written
+    if data is False:
+        return None
+    period = data.get('period') if isinstance(data, dict) else None
+    return DEFAULT_DIAGNOSTICS_PERIOD_SEC if period is None else float(period)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
+DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 REENTRANT = 'reentrant'
 
 
@@ -265,6 +266,7 @@ class SystemSpec:
         qos: The named profiles of the file.
         threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
+        diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
     """
 
     name: str
@@ -273,4 +275,5 @@ class SystemSpec:
     qos: Mapping[str, QosSpec]
     threads: int | None
     shutdown_timeout_sec: float
+    diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError, QosSpec
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
+    from composer.runtime.health import EntityHealth, HealthBoard
     from composer.runtime.service_clients import ServiceClient
     from composer.runtime.system_executor import SystemExecutor
     from composer.runtime.waiting import StopSignal
@@ -49,6 +50,7 @@ class SystemServices:
         stop: Whether the system is to stop.
         failures: Which services failed lately.
         without_parameter_services: The full names of the nodes that have none.
+        health: How the entities of the system fare; `None` measures nothing.
     """
 
     context: Context
@@ -62,6 +64,7 @@ class SystemServices:
     stop: StopSignal
     failures: ServiceFailures
     without_parameter_services: frozenset[str]
+    health: HealthBoard | None
 
 
 @dataclass(slots=True)
@@ -109,6 +112,22 @@ class LiveNode:
         """Return a behaviour as a function of its positional arguments."""
         return self.services.functions[behaviour.name]
 
+    def health(self, owner: str) -> EntityHealth | None:
+        """Return the health of an entity in words, `None` if it is not measured."""
+        board = self.services.health
+        return None if board is None else board.entity(self.full_name, owner)
+
+    def follow(self, owner: str, entity: Any) -> None:
+        """Let the health of an entity in words tell what its ROS entity has missed."""
+        health = self.health(owner)
+        if health is not None:
+            health.follow(partial(self.services.executor.missed, self.ros, entity))
+
+    @property
+    def full_name(self) -> str:
+        """The node's name with its namespace."""
+        return str(self.ros.get_fully_qualified_name())
+
     def call(
         self,
         owner: str,
@@ -126,15 +145,23 @@ class LiveNode:
             publish: The publisher that takes what the function returns.
         """
         place = self.place(path)
+        health = self.health(owner)
 
         def failed(owner: str, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
+            if health is not None:
+                health.note_error(error)
             self.errors.report(owner, place, error)
             self.services.act_on_error(self.spec.name, on_error or self.spec.on_error)
 
         return BehaviourCall(
-            owner, function, self.ledger, deliver=self._delivery(publish), failed=failed
+            owner,
+            function,
+            self.ledger,
+            deliver=self._delivery(publish),
+            failed=failed,
+            times=None if health is None else health.times,
         )
 
     def hook(

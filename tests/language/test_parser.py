@@ -35,6 +35,20 @@ def test_the_executor_is_as_declared():
     assert isinstance(spec.shutdown_timeout_sec, float)
 
 
+@pytest.mark.parametrize(
+    ('written', 'period_sec'),
+    [
+        ('', 1.0),
+        ('diagnostics: true', 1.0),
+        ('diagnostics: {}', 1.0),
+        ('diagnostics: {period: 5}', 5.0),
+        ('diagnostics: false', None),
+    ],
+)
+def test_diagnostics_have_a_period_or_are_off(written, period_sec):
+    assert load(f'nodes: {{}}\n{written}').diagnostics_period_sec == period_sec
+
+
 def test_an_empty_node_has_the_defaults():
     node = load_node('{}')
     assert node.namespace == '/'
