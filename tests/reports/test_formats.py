@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
@@ -165,6 +165,7 @@ def test_what_separates_properties_is_escaped_in_them():
     assert text.startswith('::error file=a%2Cb%3Ac%25.yaml,line=1,')
 
 
+@settings(deadline=None)
 @given(names, texts)
 def test_a_github_command_is_one_line_whatever_the_finding_says(name, message):
     report = any_report(f'a{name}', message)
@@ -362,6 +363,7 @@ def test_a_sarif_report_says_it_all():
     assert '```' not in described['help']['text']
 
 
+@settings(deadline=None)
 @given(names, texts)
 def test_a_sarif_report_is_valid_whatever_the_finding_says(name, message):
     text = render_report(any_report(f'a{name}', message), 'sarif')
@@ -404,6 +406,7 @@ def test_warnings_are_failures_in_a_strict_junit_report_alone():
     assert [child.tag for child in case] == ['failure']
 
 
+@settings(deadline=None)
 @given(names, texts)
 def test_a_junit_report_is_xml_whatever_the_finding_says(name, message):
     text = render_report(any_report(f'a{name}', message), 'junit')
