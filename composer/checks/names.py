@@ -86,7 +86,7 @@ def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnost
 def _check_ros_name(
     context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name)
+    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name, kind)
     if not fault:
         return
     message = f"'{name}' cannot name {with_article(kind)}: {fault}"
@@ -98,13 +98,15 @@ def _check_ros_name(
         yield context.at_key(entity, _RULE, message, help=help_text)
 
 
-def _find_full_name_fault(node: NodeSpec, topic: str) -> str | None:
+def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
     """Return what becomes wrong with a name in its namespace: its length, say."""
     if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
         return None
     full = expand_name(topic, node.name, node.namespace)
-    fault = find_topic_name_fault(full)
-    return fault and f"in full it is '{full}', and {fault}"
+    # An action's name is the beginning of those of its topics and services.
+    longest = f'{full}/_action/cancel_goal' if kind == 'action' else full
+    fault = find_topic_name_fault(longest)
+    return fault and f"in full it is '{longest}', and {fault}"
 
 
 def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
@@ -122,7 +124,7 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = _find_rule_name_fault(name)
+            fault = _find_rule_name_fault(name) or _find_full_name_fault(node, name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
 

@@ -141,9 +141,14 @@ class _NodeParser:
 
     def _parse_publisher(self, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
         if isinstance(data, str):
-            return PublisherSpec(name, data, name, self._defaults.qos, path)
+            data = {'type': data}
         return PublisherSpec(
-            name, data['type'], data.get('topic', name), self._parse_entity_qos(data, path), path
+            name=name,
+            type=data['type'],
+            topic=data.get('topic', name),
+            qos=self._parse_entity_qos(data, path),
+            external=data.get('external', False),
+            path=path,
         )
 
     def _parse_subscription(self, name: str, data: Data, path: DataPath) -> SubscriptionSpec:
@@ -156,6 +161,7 @@ class _NodeParser:
             publish=data.get('publish'),
             group=data.get('group'),
             on_error=data.get('on_error', self._on_error),
+            external=data.get('external', False),
             path=path,
         )
 
@@ -190,7 +196,12 @@ class _NodeParser:
         if isinstance(data, str):
             data = {'type': data}
         return ServiceClientSpec(
-            name, data['type'], data.get('service', name), _parse_service_qos(data, path), path
+            name=name,
+            type=data['type'],
+            service=data.get('service', name),
+            qos=_parse_service_qos(data, path),
+            external=data.get('external', False),
+            path=path,
         )
 
     def _parse_action(self, name: str, data: Data, path: DataPath) -> ActionSpec:
@@ -254,6 +265,7 @@ def _parse_action_client(name: str, data: str | Data, path: DataPath) -> ActionC
         action=data.get('action', name),
         feedback=_behaviour_at(data, path, 'feedback') if 'feedback' in data else None,
         result=_behaviour_at(data, path, 'result') if 'result' in data else None,
+        external=data.get('external', False),
         path=path,
     )
 

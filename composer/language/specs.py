@@ -77,12 +77,17 @@ class ParameterSpec:
 
 @dataclass(frozen=True, slots=True)
 class PublisherSpec:
-    """A publisher."""
+    """A publisher.
+
+    Attributes:
+        external: Whether its subscriptions are in no file.
+    """
 
     name: str
     type: str
     topic: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -94,6 +99,7 @@ class SubscriptionSpec:
         behaviour: `None` if messages are passed on as they are.
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
+        external: Whether its publishers are in no file.
     """
 
     name: str
@@ -104,6 +110,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     on_error: OnError
+    external: bool
     path: DataPath
 
 
@@ -147,12 +154,17 @@ class ServiceSpec:
 
 @dataclass(frozen=True, slots=True)
 class ServiceClientSpec:
-    """A service that behaviours call."""
+    """A service that behaviours call.
+
+    Attributes:
+        external: Whether its server is in no file.
+    """
 
     name: str
     type: str
     service: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -181,6 +193,7 @@ class ActionClientSpec:
     Attributes:
         feedback: Hears the feedback to each goal.
         result: Hears the result of each goal.
+        external: Whether its server is in no file.
     """
 
     name: str
@@ -188,6 +201,7 @@ class ActionClientSpec:
     action: str
     feedback: BehaviourSpec | None
     result: BehaviourSpec | None
+    external: bool
     path: DataPath
 
 
