@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.checks.annotations import check_annotations
 from composer.checks.behaviours import check_behaviour_sources
 from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
+from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_names
+from composer.checks.node_uses import UseReader
 from composer.checks.parameters import check_parameters
 from composer.checks.processes import check_environment, check_processes, check_waits
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.uses import check_uses
+from composer.checks.wiring import check_wiring
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
@@ -21,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic
+    from composer.rules.record import Need
 
 RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_names,
@@ -33,6 +39,9 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_processes,
     check_waits,
     check_environment,
+    check_annotations,
+    check_uses,
+    check_wiring,
 )
 
 
@@ -47,17 +56,33 @@ def create_context(
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.path))
-    return CheckContext(system, system.spec, catalogue, modules, unreadable), findings
+    uses = UseReader(modules)
+    return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
 
-def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
-    """Return all that is wrong with a system, by its place in the file."""
+def check_system(
+    system: LoadedSystem,
+    catalogue: InterfaceCatalogue,
+    further: Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]] | None = None,
+) -> list[Diagnostic]:
+    """Return all that is wrong with a system, by its place in the file.
+
+    Args:
+        further: What else is to be checked; it is given what was found so far.
+    """
     context, declared = create_context(system, catalogue)
     found = [finding for rule in RULES for finding in rule(context)] if context else []
+    if context and further:
+        found += further(context, found)
     found = [finding for finding in found if not _hangs_on_samples(finding, system)]
     # What several entries share through an alias is wrong once.
     once = dict.fromkeys([*system.diagnostics, *declared, *found])
-    return sorted(once, key=lambda finding: finding.sort_key)
+    unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
+    unchecked |= set() if further else {'import'}
+    heard = apply_ignore_comments(
+        once, system.positions.source, None if system.diagnostics else unchecked
+    )
+    return sorted(heard, key=lambda finding: finding.sort_key)
 
 
 def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
-from importlib import resources
 from itertools import takewhile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jsonschema import Draft202012Validator
@@ -17,6 +15,7 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from composer.language.schema_faults import StructureFault, explain
+from composer.language.schema_file import schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,19 +23,11 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, SourceMap
 
-SCHEMA_NAME = 'composer.schema.json'
-
 # What editors accept in place of a number, a word and the like. Here, the values are in place.
 _TEMPLATE = {'$ref': '#/$defs/template'}
 
 # What a file without these keys is read on with, once their absence has been reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
-
-
-def schema_path() -> Path:
-    """Return where the schema lies: beside the package in a checkout, inside it in a wheel."""
-    packaged = Path(str(resources.files('composer'))) / 'schemas' / SCHEMA_NAME
-    return packaged if packaged.exists() else packaged.parents[2] / 'schemas' / SCHEMA_NAME
 
 
 def check_structure(
@@ -63,21 +54,23 @@ def check_structure(
     dropped: set[DataPath] = set(failed)
     for path in failed:
         data = _without(data, path)
-    while misspelt := [fault for fault in _find_faults(data) if _can_be_mended(fault, data)]:
+    faults = _find_faults(data)
+    while misspelt := [fault for fault in faults if _can_be_mended(fault, data)]:
         for fault in misspelt:
             if _can_be_mended(fault, data):
                 findings.append(fault.diagnostic(positions))
                 data = _with_key_renamed(data, fault.path, str(fault.meant))
                 positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
+        faults = _find_faults(data)
     incomplete = {path[:-1] for path in failed}
     findings += [
         fault.diagnostic(positions)
-        for fault in _find_faults(data)
+        for fault in faults
         if not (
             fault.path in sampled or (fault.rule == 'missing-key' and fault.path in incomplete)
         )
     ]
-    while faults := _find_faults(data):
+    while faults:
         for fault in faults:
             if fault.stand_in:
                 path = (*fault.path, fault.stand_in[0])
@@ -87,6 +80,7 @@ def check_structure(
                 data = _without(data, path) if path else data
             dropped.add(path)
         data = _REQUIRED | data
+        faults = _find_faults(data)
     return data, frozenset(dropped), findings
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.names import join_names
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -24,6 +26,7 @@ RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_WAIT_SEC = 30.0
 DEFAULT_RESTART_DELAY_SEC = 1.0
+DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 REENTRANT = 'reentrant'
 
 
@@ -79,12 +82,17 @@ class ParameterSpec:
 
 @dataclass(frozen=True, slots=True)
 class PublisherSpec:
-    """A publisher."""
+    """A publisher.
+
+    Attributes:
+        external: Whether its subscriptions are in no file.
+    """
 
     name: str
     type: str
     topic: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -96,6 +104,7 @@ class SubscriptionSpec:
         behaviour: `None` if messages are passed on as they are.
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
+        external: Whether its publishers are in no file.
     """
 
     name: str
@@ -106,6 +115,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     on_error: OnError
+    external: bool
     path: DataPath
 
 
@@ -149,12 +159,17 @@ class ServiceSpec:
 
 @dataclass(frozen=True, slots=True)
 class ServiceClientSpec:
-    """A service that behaviours call."""
+    """A service that behaviours call.
+
+    Attributes:
+        external: Whether its server is in no file.
+    """
 
     name: str
     type: str
     service: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -183,6 +198,7 @@ class ActionClientSpec:
     Attributes:
         feedback: Hears the feedback to each goal.
         result: Hears the result of each goal.
+        external: Whether its server is in no file.
     """
 
     name: str
@@ -190,6 +206,7 @@ class ActionClientSpec:
     action: str
     feedback: BehaviourSpec | None
     result: BehaviourSpec | None
+    external: bool
     path: DataPath
 
 
@@ -262,6 +279,10 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        parameter_services: Whether others can list, read and set its parameters.
+        rosout: Whether what it logs goes to `/rosout`, too.
+        type_description_service: Whether it answers which types it uses.
+        logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
         wait_for: What must be there before it starts.
@@ -273,6 +294,10 @@ class NodeSpec:
     description: str
     log_level: LogLevel | None
     use_sim_time: bool
+    parameter_services: bool
+    rosout: bool
+    type_description_service: bool
+    logger_services: bool
     on_error: OnError
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
@@ -293,8 +318,8 @@ class NodeSpec:
 
     @property
     def full_name(self) -> str:
-        """Return namespace and name."""
-        return f'{self.namespace.rstrip("/")}/{self.name}'
+        """Its name in its namespace, as in `/robot/arm`."""
+        return join_names(self.namespace, self.name)
 
     @property
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
@@ -329,6 +354,7 @@ class SystemSpec:
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
         environment: Environment variables that are set before ROS starts.
         nodes: By their keys in the file: the name, or the full name.
+        diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
     """
 
     name: str
@@ -338,5 +364,6 @@ class SystemSpec:
     threads: int | None
     shutdown_timeout_sec: float
     environment: Mapping[str, str]
+    diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]
     processes: Mapping[str, ProcessSpec]

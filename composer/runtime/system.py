@@ -13,6 +13,8 @@ from rclpy.context import Context
 from composer.errors import ComposerError, ExitCode, StartError, UsageError
 from composer.runtime.entities import create_entities
 from composer.runtime.failures import ServiceFailures
+from composer.runtime.health import HealthBoard
+from composer.runtime.health_publisher import HealthPublisher
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
 from composer.runtime.stopping import stop_nodes
@@ -25,8 +27,10 @@ if TYPE_CHECKING:
 
     from composer.language.positions import SourceMap
     from composer.language.specs import NodeSpec, SystemSpec
+    from composer.runtime.calls import RunningCall
 
 _EXECUTOR_STOP_SEC = 1.0
+_GONE_SEC = 2.0
 
 
 class System:
@@ -67,7 +71,12 @@ class System:
             executor=self._executor,
             stop=self._stop_signal,
             failures=ServiceFailures(),
+            without_parameter_services=frozenset(
+                node.full_name for node in spec.nodes.values() if not node.parameter_services
+            ),
+            health=None if spec.diagnostics_period_sec is None else HealthBoard(),
         )
+        self._health_publisher: HealthPublisher | None = None
 
     @property
     def stop_requested(self) -> bool:
@@ -96,6 +105,7 @@ class System:
                 self._create(spec)
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
+            self._publish_health()
             self._executor.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None
@@ -187,6 +197,11 @@ class System:
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
+            if not old.ros.wait_until_gone(_GONE_SEC):
+                system_logger.warn(
+                    f"node '{name}': something still holds an entity of the node before its "
+                    'restart, so its log may be missing on /rosout'
+                )
             try:
                 node = self._create(old.spec)
                 self._executor.add_node(node.ros)
@@ -198,7 +213,28 @@ class System:
             self._open([node])
         system_logger.warn(f"node '{name}' was restarted")
 
+    def _publish_health(self) -> None:
+        board, period_sec = self._services.health, self._spec.diagnostics_period_sec
+        if board is None or period_sec is None:
+            return
+        publisher = HealthPublisher(self._spec.name, period_sec, board, self._running_calls)
+        try:
+            publisher.start(self._context, self._services.ros_arguments)
+        except ImportError as error:
+            system_logger.warn(f'there will be no /diagnostics: {error}')
+        else:
+            self._health_publisher = publisher
+
+    def _running_calls(self) -> list[tuple[str, RunningCall]]:
+        return [
+            (node.full_name, call)
+            for node in list(self._nodes.values())
+            for call in node.ledger.running()
+        ]
+
     def _tear_down(self) -> None:
+        if self._health_publisher is not None:
+            self._health_publisher.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)

@@ -13,6 +13,7 @@ from rclpy.task import Future, Task
 
 from composer.runtime.executor.alarms import Delay
 from composer.runtime.executor.engine import COURTESY_SEC, Engine
+from composer.runtime.executor.missed import Missed
 from composer.runtime.executor.tasks import Resume, TaskRun
 
 _MOST_THREADS = 256
@@ -86,6 +87,14 @@ class ComposerExecutor(MultiThreadedExecutor):
             self._engine.schedule.set_nodes(self._nodes)
         self._engine.registry.drop(node)
         self.wake()
+
+    def missed(self, node: Any, entity: Any) -> Missed:
+        """Return what a subscription or timer of `node` missed because callbacks took too long.
+
+        Counting begins when the executor sees the entity; an unknown entity has missed nothing.
+        """
+        source = self._engine.registry.source_of(node, entity)
+        return Missed() if source is None else source.missed()
 
     def wake(self) -> None:
         """Look anew at the entities, their groups, the context and what is waited for."""
