@@ -1,7 +1,8 @@
-"""`LoadedSystem` → findings. The rules, a function each, in one table."""
+"""`LoadedSystem` → findings. The rules, a function each, in two tables."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.checks.annotations import check_annotations
@@ -9,7 +10,7 @@ from composer.checks.behaviours import check_behaviour_sources
 from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
-from composer.checks.names import check_names
+from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
 from composer.checks.parameters import check_parameters
 from composer.checks.processes import check_environment, check_processes, check_waits
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.rules.record import Need
 
-RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_names,
     check_qos,
     check_publish,
@@ -37,10 +38,13 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_parameters,
     check_behaviour_sources,
     check_processes,
-    check_waits,
-    check_environment,
     check_annotations,
     check_uses,
+)
+SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+    check_full_names,
+    check_waits,
+    check_environment,
     check_wiring,
 )
 
@@ -71,18 +75,38 @@ def check_system(
         further: What else is to be checked; it is given what was found so far.
     """
     context, declared = create_context(system, catalogue)
-    found = [finding for rule in RULES for finding in rule(context)] if context else []
+    found = _apply_rules(context) if context else []
     if context and further:
         found += further(context, found)
-    found = [finding for finding in found if not _hangs_on_samples(finding, system)]
-    # What several entries share through an alias is wrong once.
-    once = dict.fromkeys([*system.diagnostics, *declared, *found])
+    found = [
+        _with_includes(finding, system)
+        for finding in found
+        if not _hangs_on_samples(finding, system)
+    ]
+    # What several entries share through an alias, or a file included twice, is wrong once.
+    every = [*system.diagnostics, *declared, *found]
+    once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
     unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
     unchecked |= set() if further else {'import'}
     heard = apply_ignore_comments(
-        once, system.positions.source, None if system.diagnostics else unchecked
+        once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
     return sorted(heard, key=lambda finding: finding.sort_key)
+
+
+def _apply_rules(context: CheckContext) -> list[Diagnostic]:
+    found = [finding for rule in (*NODE_RULES, *SYSTEM_RULES) for finding in rule(context)]
+    if context.system.unused is not None:
+        # What is left out this time may be there the next.
+        other = replace(context, spec=context.system.unused)
+        found += [finding for rule in NODE_RULES for finding in rule(other)]
+    return found
+
+
+def _with_includes(finding: Diagnostic, system: LoadedSystem) -> Diagnostic:
+    """Return a finding in an included file with the places where that is included."""
+    chain = system.chains.get(finding.span.source, ()) if finding.span else ()
+    return finding.with_related(chain) if chain else finding
 
 
 def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:

@@ -106,11 +106,13 @@ class Graph:
         nodes: The full names of the nodes.
         unsure: The kinds of channels that may have further ends: a name hangs on an argument
             that is not given yet, or is missing for a fault of its own.
+        left_out: What nodes have that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
     nodes: frozenset[str]
     unsure: frozenset[ChannelKind]
+    left_out: frozenset[tuple[ChannelKind, str]]
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
@@ -133,7 +135,17 @@ def build_graph(context: CheckContext) -> Graph:
                 ends = channel.providers if section in _PROVIDING else channel.users
                 ends.append(Endpoint(node, entity, noun))
     nodes = (join_names(node.namespace, node.name) for node in context.spec.nodes.values())
-    return Graph(channels, frozenset(nodes), frozenset(unsure))
+    return Graph(
+        channels, frozenset(nodes), frozenset(unsure), frozenset(_channels_left_out(context))
+    )
+
+
+def _channels_left_out(context: CheckContext) -> Iterator[tuple[ChannelKind, str]]:
+    unused = context.system.unused
+    for node in unused.nodes.values() if unused else ():
+        for section, (kind, _) in _SECTIONS.items():
+            for entity in getattr(node, section).values():
+                yield kind, full_name(node, kind, getattr(entity, kind))
 
 
 def full_name(node: NodeSpec, kind: ChannelKind, name: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.diagnostics import Related
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
@@ -61,6 +62,21 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
             reported.add(path)
             say = context.at_key if path == node.path else context.at_value
             yield say(path, _RULE, f"'{node.namespace}': {fault}")
+
+
+def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
+    """No two nodes have one full name."""
+    first: dict[str, NodeSpec] = {}
+    for node in context.spec.nodes.values():
+        other = first.setdefault(node.full_name, node)
+        if other is not node:
+            yield context.at_key(
+                node.path,
+                'duplicate-node',
+                f"there is a node '{node.full_name}' already",
+                help="give one of them another name, or a 'namespace'",
+                related=[Related('the other one', context.system.positions.key(other.path))],
+            )
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:

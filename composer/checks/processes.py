@@ -57,7 +57,7 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
     if process.package not in packages:
         yield context.at_value(
             (*process.path, 'package'),
-            'unknown-package',
+            'missing-package',
             f"no package '{process.package}' is installed",
             help=did_you_mean(process.package, packages),
         )
@@ -146,7 +146,7 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
             elif target in trail:
                 names = [str(each[-1]) for each in trail[trail.index(target) :]]
                 way = ' → '.join([*names, names[0]])
-                message = f'nothing of this ever starts: {way} wait for each other'
+                message = f'{way}: these wait for each other, and none of them ever starts'
                 yield context.at_value(condition.path, 'wait-cycle', message)
             elif target not in done:
                 pending.append((target, iter(edges.get(target, ()))))

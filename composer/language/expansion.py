@@ -153,8 +153,9 @@ class _Expansion:
         return holds
 
     def _report(self, path: DataPath, message: str) -> None:
+        rule = 'bad-when' if path[2] == _WHEN else 'bad-foreach'
         span = self._filler.positions.value(path)
-        self._filled.faults.append(diagnostic_at(span, f'bad-{path[2]}', message))
+        self._filled.faults.append(diagnostic_at(span, rule, message))
 
     def _report_duplicate(self, key: str, path: DataPath, *, is_repeated: bool) -> None:
         if not is_repeated:
