@@ -19,6 +19,7 @@ from composer.runtime.executor.registry import Registry
 from composer.runtime.executor.schedule import Schedule
 from composer.runtime.executor.signals import SignalBoard
 from composer.runtime.executor.sources import Desk
+from composer.runtime.executor.switching import prompt_switching
 
 COURTESY_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
@@ -143,6 +144,7 @@ class Engine:
 
     def _enter(self) -> None:
         self.lane.enter()
+        prompt_switching.enter()
         with self._session_lock:
             self._sessions += 1
             self.schedule.admitting = not self.is_shutdown
@@ -155,6 +157,7 @@ class Engine:
             last = not self._sessions
             if last:
                 self.schedule.admitting = False
+        prompt_switching.leave()
         self.lane.leave()
         if last:
             self.wake_poll()
