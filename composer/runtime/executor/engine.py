@@ -214,7 +214,7 @@ class Engine:
     def _execute_ready(self, me: Worker) -> bool:
         """Execute about what is ready now; False if there is no more, or `me` was replaced."""
         crew, schedule = self.crew, self.schedule
-        for _ in range(max(1, len(schedule))):
+        for _ in range(len(schedule) or 1):
             if self.registry.is_stale:
                 self._refresh()
             work = schedule.claim()
@@ -251,6 +251,9 @@ class Engine:
     def _peek(self) -> bool:
         arrived = self._board.peek()
         self._board.deliver(arrived)
+        if arrived and self._pollers:
+            # A wake-up for the leader may have been among it: whoever led before looks here too.
+            self._board.wake()
         self.alarms.follow_jumps()
         return bool(arrived)
 
