@@ -30,6 +30,7 @@ class Worker:
         self.called.acquire()
         self._crew = crew
         _thread.start_new_thread(self._work, ())  # Unlike `Thread.start`, it does not wait.
+        crew.threads += 1
 
     def _work(self) -> None:
         threading.current_thread().name = 'executor-worker'
@@ -46,6 +47,7 @@ class Crew:
     def __init__(self, lead: Callable[[Worker], None]) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
+        self.threads = 0  # Those too that have only just been made.
         self._standby: Worker | None = None
         self._lead = lead
         self._timer = TimerFd(blocking=True)
@@ -65,7 +67,9 @@ class Crew:
         finally:
             # Python 3.11 keeps what it knows of such a thread for ever.
             threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
-            del self._workers[ident]
+            with self.lock:
+                del self._workers[ident]
+                self.threads -= 1
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
@@ -143,15 +147,15 @@ class Crew:
             self._spares.clear()
             self._wake_standby()
         deadline = time.monotonic() + timeout_sec
-        mine = threading.get_ident()
-        while self._workers.keys() - {mine} and time.monotonic() < deadline:
+        mine = int(threading.get_ident() in self._workers)
+        while self.threads > mine and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
-        if not self._workers:
+        if not self.threads:
             self._timer.close()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""
-        return bool(self._workers)
+        return self.threads > 0
 
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
