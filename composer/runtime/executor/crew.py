@@ -3,10 +3,13 @@
 The leader waits for events and runs the callbacks itself, so that a short callback costs no
 thread switch. A standby sleeps on a kernel timer that the leader sets before a callback; if the
 leader is still in that callback when it wakes, the standby leads, and another thread stands by.
+As long as callbacks are short the leader puts the timer off, for each waking takes the interpreter
+from it.
 A callback that was slow last time makes the standby lead at once. Spare threads end by themselves.
 """
 
 import _thread
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +19,7 @@ from typing import Any
 from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
+_PATIENCE_NS = int(PATIENCE_SEC * 1e9)
 _SPARE_SEC = 2.0
 _POLL_SEC = 0.0005
 
@@ -52,6 +56,7 @@ class Crew:
         self._lead = lead
         self._timer = TimerFd(blocking=True)
         self._armed = False
+        self._put_off_at = 0.0
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
         self._dismissed = False
@@ -112,10 +117,11 @@ class Crew:
 
     def begin(self, worker: Worker) -> None:
         """Note that `worker` begins a callback."""
-        worker.busy_since = time.monotonic()
-        if not self._armed:
+        worker.busy_since = now = time.monotonic()
+        if not self._armed or now > self._put_off_at:
             self._armed = True
-            self._timer.after_ns(int(PATIENCE_SEC * 1e9))
+            self._put_off_at = now + PATIENCE_SEC / 2
+            self._timer.after_ns(_PATIENCE_NS)
 
     def end_watch(self, worker: Worker) -> None:
         """Let the standby sleep: `worker` leads and will wait, and others want the interpreter."""
@@ -186,6 +192,7 @@ class Crew:
     def _wake_standby(self) -> None:
         if self._standby is not None:
             self._armed = True
+            self._put_off_at = math.inf
             self._timer.after_ns(1)
 
     def _stand_by(self, me: Worker) -> None:
