@@ -30,6 +30,7 @@ class ComposerExecutor(MultiThreadedExecutor):
     - `shutdown` waits for running callbacks, as rclpy documents; but not for the one it is called
       from, and without `timeout_sec` not for long once the context has been shut down.
     - Several threads may spin at the same time.
+    - While one does, the process's `sys.getswitchinterval()` is at most 1 ms: see `switching`.
 
     Args:
         num_threads: How many callbacks may run at the same time; None for as many as block.

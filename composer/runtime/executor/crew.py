@@ -3,10 +3,13 @@
 The leader waits for events and runs the callbacks itself, so that a short callback costs no
 thread switch. A standby sleeps on a kernel timer that the leader sets before a callback; if the
 leader is still in that callback when it wakes, the standby leads, and another thread stands by.
+As long as callbacks are short the leader puts the timer off, for each waking takes the interpreter
+from it.
 A callback that was slow last time makes the standby lead at once. Spare threads end by themselves.
 """
 
 import _thread
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +19,7 @@ from typing import Any
 from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
+_PATIENCE_NS = int(PATIENCE_SEC * 1e9)
 _SPARE_SEC = 2.0
 _POLL_SEC = 0.0005
 
@@ -30,6 +34,7 @@ class Worker:
         self.called.acquire()
         self._crew = crew
         _thread.start_new_thread(self._work, ())  # Unlike `Thread.start`, it does not wait.
+        crew.threads += 1
 
     def _work(self) -> None:
         threading.current_thread().name = 'executor-worker'
@@ -46,10 +51,12 @@ class Crew:
     def __init__(self, lead: Callable[[Worker], None]) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
+        self.threads = 0  # Those too that have only just been made.
         self._standby: Worker | None = None
         self._lead = lead
         self._timer = TimerFd(blocking=True)
         self._armed = False
+        self._put_off_at = 0.0
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
         self._dismissed = False
@@ -65,7 +72,9 @@ class Crew:
         finally:
             # Python 3.11 keeps what it knows of such a thread for ever.
             threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
-            del self._workers[ident]
+            with self.lock:
+                del self._workers[ident]
+                self.threads -= 1
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
@@ -108,10 +117,11 @@ class Crew:
 
     def begin(self, worker: Worker) -> None:
         """Note that `worker` begins a callback."""
-        worker.busy_since = time.monotonic()
-        if not self._armed:
+        worker.busy_since = now = time.monotonic()
+        if not self._armed or now > self._put_off_at:
             self._armed = True
-            self._timer.after_ns(int(PATIENCE_SEC * 1e9))
+            self._put_off_at = now + PATIENCE_SEC / 2
+            self._timer.after_ns(_PATIENCE_NS)
 
     def end_watch(self, worker: Worker) -> None:
         """Let the standby sleep: `worker` leads and will wait, and others want the interpreter."""
@@ -143,15 +153,15 @@ class Crew:
             self._spares.clear()
             self._wake_standby()
         deadline = time.monotonic() + timeout_sec
-        mine = threading.get_ident()
-        while self._workers.keys() - {mine} and time.monotonic() < deadline:
+        mine = int(threading.get_ident() in self._workers)
+        while self.threads > mine and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
-        if not self._workers:
+        if not self.threads:
             self._timer.close()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""
-        return bool(self._workers)
+        return self.threads > 0
 
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
@@ -182,6 +192,7 @@ class Crew:
     def _wake_standby(self) -> None:
         if self._standby is not None:
             self._armed = True
+            self._put_off_at = math.inf
             self._timer.after_ns(1)
 
     def _stand_by(self, me: Worker) -> None:

@@ -19,6 +19,7 @@ from composer.runtime.executor.registry import Registry
 from composer.runtime.executor.schedule import Schedule
 from composer.runtime.executor.signals import SignalBoard
 from composer.runtime.executor.sources import Desk
+from composer.runtime.executor.switching import prompt_switching
 
 COURTESY_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
@@ -143,6 +144,7 @@ class Engine:
 
     def _enter(self) -> None:
         self.lane.enter()
+        prompt_switching.enter()
         with self._session_lock:
             self._sessions += 1
             self.schedule.admitting = not self.is_shutdown
@@ -155,6 +157,7 @@ class Engine:
             last = not self._sessions
             if last:
                 self.schedule.admitting = False
+        prompt_switching.leave()
         self.lane.leave()
         if last:
             self.wake_poll()
@@ -211,7 +214,7 @@ class Engine:
     def _execute_ready(self, me: Worker) -> bool:
         """Execute about what is ready now; False if there is no more, or `me` was replaced."""
         crew, schedule = self.crew, self.schedule
-        for _ in range(max(1, len(schedule))):
+        for _ in range(len(schedule) or 1):
             if self.registry.is_stale:
                 self._refresh()
             work = schedule.claim()
@@ -248,6 +251,9 @@ class Engine:
     def _peek(self) -> bool:
         arrived = self._board.peek()
         self._board.deliver(arrived)
+        if arrived and self._pollers:
+            # A wake-up for the leader may have been among it: whoever led before looks here too.
+            self._board.wake()
         self.alarms.follow_jumps()
         return bool(arrived)
 

@@ -14,7 +14,6 @@ Fast DDS takes the event's lock before the reader's, and delivery takes them the
 
 import ctypes
 import os
-import struct
 import time
 from collections.abc import Callable
 from typing import Any
@@ -30,7 +29,7 @@ _RCL_RET_OK = 0
 _rcl = ctypes.CDLL(_rclpy.__file__)
 _rcl_holding_gil = ctypes.PyDLL(_rclpy.__file__)
 _libc = ctypes.CDLL(None, use_errno=True)
-_libc_holding_gil = ctypes.PyDLL(None, use_errno=True)
+_libc_holding_gil = ctypes.PyDLL(None)
 _EVENTFD_WRITE = ctypes.cast(_libc.eventfd_write, ctypes.c_void_p).value
 
 
@@ -72,12 +71,29 @@ _libc_holding_gil.timerfd_settime.argtypes = (
 )
 
 
-_EPOLL_EVENT = '=IQ' if os.uname().machine == 'x86_64' else '=I4xQ'  # Packed only there.
+_EPOLL_GAP = 0 if os.uname().machine == 'x86_64' else 1  # Packed only there.
+
+
+class _EpollEvent(ctypes.Structure):
+    _fields_ = (
+        ('events', ctypes.c_uint32),
+        ('_gap', ctypes.c_int32 * _EPOLL_GAP),
+        ('fd', ctypes.c_int32),
+        ('_rest', ctypes.c_int32),
+    )
+
+
 _MOST_EVENTS = 64
-_EPOLL_BUFFER_SIZE = _MOST_EVENTS * struct.calcsize(_EPOLL_EVENT)
+_EpollEvents = _EpollEvent * _MOST_EVENTS
+_EventCount = ctypes.c_uint64 * 1
+# Made anew only when several threads look at the same time.
+_spare_events: list[Any] = []
+_spare_counts: list[Any] = []
 
 
 _libc_holding_gil.eventfd_write.argtypes = (ctypes.c_int, ctypes.c_uint64)
+_epoll_wait = _libc_holding_gil.epoll_wait
+_eventfd_read = _libc_holding_gil.eventfd_read
 
 
 def write_eventfd(fd: int) -> None:
@@ -88,24 +104,27 @@ def write_eventfd(fd: int) -> None:
 def read_eventfd(fd: int) -> int:
     """Return and reset the count of a non-blocking eventfd, without letting go of the GIL.
 
-    Whoever lets go of it beside a computing thread waits 5 ms to have it back.
+    Whoever lets go of it beside a computing thread waits a switch interval to have it back.
     """
-    count = ctypes.c_uint64()
-    _libc_holding_gil.eventfd_read(fd, ctypes.byref(count))
-    return count.value
+    try:
+        count = _spare_counts.pop()
+    except IndexError:
+        count = _EventCount()
+    value: int = 0 if _eventfd_read(fd, count) else count[0]
+    _spare_counts.append(count)
+    return value
 
 
 def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     """Return what is ready in an epoll as (descriptor, events), without letting go of the GIL."""
-    buffer = ctypes.create_string_buffer(_EPOLL_BUFFER_SIZE)
-    count = _libc_holding_gil.epoll_wait(epoll_fd, buffer, _MOST_EVENTS, 0)
-    if count <= 0:
-        return []
-    size = struct.calcsize(_EPOLL_EVENT)
-    return [
-        (data & 0xFFFFFFFF, events)
-        for events, data in struct.iter_unpack(_EPOLL_EVENT, buffer.raw[: count * size])
-    ]
+    try:
+        found = _spare_events.pop()
+    except IndexError:
+        found = _EpollEvents()
+    count = _epoll_wait(epoll_fd, found, _MOST_EVENTS, 0)
+    arrived = [(found[i].fd, found[i].events) for i in range(count)]
+    _spare_events.append(found)
+    return arrived
 
 
 def _watcher(function_name: str) -> Callable[[int, int | None], None]:

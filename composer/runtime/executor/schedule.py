@@ -85,8 +85,8 @@ class Schedule:
         """Add `count` to what `source` has to take."""
         with self.lock:
             source.stamp += 1
-            pending = source.pending + count
-            source.pending = min(UNKNOWN, pending)
+            if source.pending < UNKNOWN:
+                source.pending += count
             if source.alive and not source.queued:
                 source.queued = True
                 self._ready.append(source)
@@ -129,7 +129,9 @@ class Schedule:
         with self.lock:
             if not (alone or self.admitting) or not self.can_admit():
                 return None
-            if self._prefer_runs:
+            if not (self._runs or self._new_runs):
+                work: Any = self._next_source()
+            elif self._prefer_runs:
                 work = self._next_run() or self._next_source()
             else:
                 work = self._next_source() or self._next_run()

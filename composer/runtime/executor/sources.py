@@ -185,7 +185,7 @@ class SubscriptionSource(Source):
             result = callback(taken[0])
         else:
             result = callback(*taken)
-        return result if self._is_async(callback) else None
+        return result if result is not None and self._is_async(callback) else None
 
 
 class ClientSource(Source):

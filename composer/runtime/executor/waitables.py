@@ -154,7 +154,7 @@ class GuardConditionSource(PolledSource):
         self._forget_event()
         callback = self.entity.callback
         result = callback()
-        return result if self._is_async(callback) else None
+        return result if result is not None and self._is_async(callback) else None
 
 
 class WaitableSource(PolledSource):
