@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
+# Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
+MAX_FINDINGS = 1000
+
+
 class Severity(Enum):
     """How much a finding weighs: an error stops `composer up`, a warning does not."""
 

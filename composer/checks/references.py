@@ -105,15 +105,11 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
         return
     for node in context.spec.nodes.values():
         for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
-            package, kind, _ = entity.type.split('/')
+            package = entity.type.partition('/')[0]
             dropped = context.was_dropped(('interfaces', package))
             unreadable = dropped or package in context.unreadable
             stands_in = context.was_dropped((*entity.path, 'type'))
-            if (
-                unreadable
-                or stands_in
-                or entity.type in catalogue.names(cast('InterfaceKind', kind), package)
-            ):
+            if unreadable or stands_in or catalogue.has(entity.type):
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path
