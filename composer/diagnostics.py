@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 # Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
 MAX_FINDINGS = 1000
+_LONGEST = 2000
 
 
 class Severity(Enum):
@@ -118,8 +119,18 @@ def diagnostic_at(
     severity: Severity = Severity.ERROR,
     related: Iterable[Related] = (),
 ) -> Diagnostic:
-    """Return a finding whose file is that of its span."""
+    """Return a finding whose file is that of its span.
+
+    Of a message that quotes enormous text, the beginning and the end are kept.
+    """
+    message, help = _shortened(message), help and _shortened(help)  # noqa: A001
     return Diagnostic(rule, message, span.source.name, span, severity, help, tuple(related))
+
+
+def _shortened(text: str) -> str:
+    if len(text) <= _LONGEST:
+        return text
+    return f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:

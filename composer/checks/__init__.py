@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from composer.checks.behaviours import check_behaviour_sources
@@ -10,16 +12,17 @@ from composer.checks.fields import check_messages
 from composer.checks.names import check_names
 from composer.checks.parameters import check_parameters
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
 from composer.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
 
 RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_names,
@@ -30,6 +33,7 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_parameters,
     check_behaviour_sources,
 )
+_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 
 
 def create_context(
@@ -49,19 +53,31 @@ def create_context(
 def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
     """Return all that is wrong with a system, by its place in the file."""
     context, declared = create_context(system, catalogue)
-    found = [finding for rule in RULES for finding in rule(context)] if context else []
-    found = [finding for finding in found if not _hangs_on_samples(finding, system)]
+    found = _apply_rules(context) if context else []
     # What several entries share through an alias is wrong once.
     once = dict.fromkeys([*system.diagnostics, *declared, *found])
-    return sorted(once, key=lambda finding: finding.sort_key)
+    findings = sorted(once, key=lambda finding: finding.sort_key)
+    if len(findings) > MAX_FINDINGS:
+        findings[MAX_FINDINGS - 1 :] = [replace(findings[MAX_FINDINGS - 1], help=_MORE)]
+    return findings
 
 
-def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:
+def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
+    samples: dict[int, list[Span]] = {}
+    for span in context.system.sampled:
+        samples.setdefault(span.line, []).append(span)
+    for rule in RULES:
+        findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
+        # One more, as a sign that there are more.
+        yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _hangs_on_samples(finding: Diagnostic, samples: Mapping[int, list[Span]]) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(
-        span.line == place.line and span.column <= place.column < span.column + span.length
-        for span in system.sampled
+        span.column <= place.column < span.column + span.length
+        for span in samples.get(place.line, ())
     )
 
 

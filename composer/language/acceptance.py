@@ -50,96 +50,113 @@ class SchemaCompiler:
             return parts[0]
         return lambda data: all(part(data) for part in parts)
 
-    def _reference(self, schema: Schema) -> Acceptor:
-        return self.compile_reference(schema['$ref'])
 
-    def _type(self, schema: Schema) -> Acceptor:
-        names = schema['type']
-        tests = [_TYPES[name] for name in ([names] if isinstance(names, str) else names)]
-        if len(tests) == 1:
-            return tests[0]
-        return lambda data: any(test(data) for test in tests)
+def _compile_reference(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    return compiler.compile_reference(schema['$ref'])
 
-    def _required(self, schema: Schema) -> Acceptor:
-        keys = schema['required']
-        return lambda data: not isinstance(data, dict) or all(key in data for key in keys)
 
-    def _entries(self, schema: Schema) -> Acceptor:
-        """Return the acceptor of `properties`, `patternProperties` and `additionalProperties`."""
-        known = {key: self.compile(part) for key, part in schema.get('properties', {}).items()}
-        patterns = [
-            (re.compile(pattern), self.compile(part))
-            for pattern, part in schema.get('patternProperties', {}).items()
-        ]
-        rest = schema.get('additionalProperties', True)
-        other = self.compile(rest) if isinstance(rest, dict) else lambda _: bool(rest)
+def _compile_type(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    names = schema['type']
+    tests = [_TYPES[name] for name in ([names] if isinstance(names, str) else names)]
+    if len(tests) == 1:
+        return tests[0]
+    return lambda data: any(test(data) for test in tests)
 
-        def accepts_entry(key: str, value: Any) -> bool:
-            matching = [accepts for pattern, accepts in patterns if pattern.search(key)]
-            if key in known:
-                matching.append(known[key])
-            return all(accepts(value) for accepts in matching or (other,))
 
-        def accepts_plain_entry(key: str, value: Any) -> bool:
-            return known.get(key, other)(value)
+def _compile_required(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    keys = schema['required']
+    return lambda data: not isinstance(data, dict) or all(key in data for key in keys)
 
-        accepts = accepts_entry if patterns else accepts_plain_entry
-        return lambda data: (
-            not isinstance(data, dict) or all(accepts(key, value) for key, value in data.items())
-        )
 
-    def _items(self, schema: Schema) -> Acceptor:
-        item = self.compile(schema['items'])
-        return lambda data: not isinstance(data, list) or all(map(item, data))
+def _compile_entries(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    """Return the acceptor of `properties`, `patternProperties` and `additionalProperties`."""
+    known = {key: compiler.compile(part) for key, part in schema.get('properties', {}).items()}
+    patterns = [
+        (re.compile(pattern), compiler.compile(part))
+        for pattern, part in schema.get('patternProperties', {}).items()
+    ]
+    rest = schema.get('additionalProperties', True)
+    other = compiler.compile(rest) if isinstance(rest, dict) else lambda _: bool(rest)
 
-    def _any_of(self, schema: Schema) -> Acceptor:
-        branches = [self.compile(branch) for branch in schema['anyOf']]
-        return lambda data: any(branch(data) for branch in branches)
+    def accepts_entry(key: str, value: Any) -> bool:
+        matching = [accepts for pattern, accepts in patterns if pattern.search(key)]
+        if key in known:
+            matching.append(known[key])
+        return all(accepts(value) for accepts in matching or (other,))
 
-    def _one_of(self, schema: Schema) -> Acceptor:
-        branches = [self.compile(branch) for branch in schema['oneOf']]
-        return lambda data: sum(branch(data) for branch in branches) == 1
+    def accepts_plain_entry(key: str, value: Any) -> bool:
+        return known.get(key, other)(value)
 
-    def _not(self, schema: Schema) -> Acceptor:
-        excluded = self.compile(schema['not'])
-        return lambda data: not excluded(data)
+    accepts = accepts_entry if patterns else accepts_plain_entry
+    return lambda data: (
+        not isinstance(data, dict) or all(accepts(key, value) for key, value in data.items())
+    )
 
-    def _enum(self, schema: Schema) -> Acceptor:
-        options = schema['enum']
-        return lambda data: any(_is_same(data, option) for option in options)
 
-    def _const(self, schema: Schema) -> Acceptor:
-        return lambda data: _is_same(data, schema['const'])
+def _compile_items(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    item = compiler.compile(schema['items'])
+    return lambda data: not isinstance(data, list) or all(map(item, data))
 
-    def _pattern(self, schema: Schema) -> Acceptor:
-        search = re.compile(schema['pattern']).search
-        return lambda data: not isinstance(data, str) or bool(search(data))
 
-    def _minimum(self, schema: Schema) -> Acceptor:
-        limit = schema['minimum']
-        return lambda data: not _is_number(data) or not data < limit
+def _compile_any_of(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    branches = [compiler.compile(branch) for branch in schema['anyOf']]
+    return lambda data: any(branch(data) for branch in branches)
 
-    def _exclusive_minimum(self, schema: Schema) -> Acceptor:
-        limit = schema['exclusiveMinimum']
-        return lambda data: not _is_number(data) or not data <= limit
 
-    def _maximum(self, schema: Schema) -> Acceptor:
-        limit = schema['maximum']
-        # NaN is beyond every maximum.
-        return lambda data: not _is_number(data) or data <= limit
+def _compile_one_of(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    branches = [compiler.compile(branch) for branch in schema['oneOf']]
+    return lambda data: sum(branch(data) for branch in branches) == 1
 
-    def _min_items(self, schema: Schema) -> Acceptor:
-        return lambda data: not isinstance(data, list) or len(data) >= schema['minItems']
 
-    def _min_length(self, schema: Schema) -> Acceptor:
-        return lambda data: not isinstance(data, str) or len(data) >= schema['minLength']
+def _compile_not(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    excluded = compiler.compile(schema['not'])
+    return lambda data: not excluded(data)
 
-    def _dependent_required(self, schema: Schema) -> Acceptor:
-        rules = schema['dependentRequired'].items()
-        return lambda data: (
-            not isinstance(data, dict)
-            or all(key not in data or all(other in data for other in keys) for key, keys in rules)
-        )
+
+def _compile_enum(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    options = schema['enum']
+    return lambda data: any(_is_same(data, option) for option in options)
+
+
+def _compile_const(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    return lambda data: _is_same(data, schema['const'])
+
+
+def _compile_pattern(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    search = re.compile(schema['pattern']).search
+    return lambda data: not isinstance(data, str) or bool(search(data))
+
+
+def _compile_minimum(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    limit = schema['minimum']
+    return lambda data: not _is_number(data) or not data < limit
+
+
+def _compile_exclusive_minimum(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    limit = schema['exclusiveMinimum']
+    return lambda data: not _is_number(data) or not data <= limit
+
+
+def _compile_maximum(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    limit = schema['maximum']
+    # NaN is beyond every maximum.
+    return lambda data: not _is_number(data) or data <= limit
+
+
+def _compile_min_items(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    return lambda data: not isinstance(data, list) or len(data) >= schema['minItems']
+
+
+def _compile_min_length(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    return lambda data: not isinstance(data, str) or len(data) >= schema['minLength']
+
+
+def _compile_dependent_required(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    rules = schema['dependentRequired'].items()
+    return lambda data: (
+        not isinstance(data, dict)
+        or all(key not in data or all(other in data for other in keys) for key, keys in rules)
+    )
 
 
 def _is_number(data: Any) -> bool:
@@ -164,23 +181,23 @@ _TYPES: dict[str, Acceptor] = {
 }
 
 _COMPILERS: dict[str, Callable[[SchemaCompiler, Schema], Acceptor]] = {
-    '$ref': SchemaCompiler._reference,
-    'type': SchemaCompiler._type,
-    'required': SchemaCompiler._required,
-    'additionalProperties': SchemaCompiler._entries,
-    'properties': SchemaCompiler._entries,
-    'patternProperties': SchemaCompiler._entries,
-    'items': SchemaCompiler._items,
-    'anyOf': SchemaCompiler._any_of,
-    'oneOf': SchemaCompiler._one_of,
-    'not': SchemaCompiler._not,
-    'enum': SchemaCompiler._enum,
-    'const': SchemaCompiler._const,
-    'pattern': SchemaCompiler._pattern,
-    'minimum': SchemaCompiler._minimum,
-    'exclusiveMinimum': SchemaCompiler._exclusive_minimum,
-    'maximum': SchemaCompiler._maximum,
-    'minItems': SchemaCompiler._min_items,
-    'minLength': SchemaCompiler._min_length,
-    'dependentRequired': SchemaCompiler._dependent_required,
+    '$ref': _compile_reference,
+    'type': _compile_type,
+    'required': _compile_required,
+    'additionalProperties': _compile_entries,
+    'properties': _compile_entries,
+    'patternProperties': _compile_entries,
+    'items': _compile_items,
+    'anyOf': _compile_any_of,
+    'oneOf': _compile_one_of,
+    'not': _compile_not,
+    'enum': _compile_enum,
+    'const': _compile_const,
+    'pattern': _compile_pattern,
+    'minimum': _compile_minimum,
+    'exclusiveMinimum': _compile_exclusive_minimum,
+    'maximum': _compile_maximum,
+    'minItems': _compile_min_items,
+    'minLength': _compile_min_length,
+    'dependentRequired': _compile_dependent_required,
 }
