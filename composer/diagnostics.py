@@ -121,16 +121,18 @@ def diagnostic_at(
 ) -> Diagnostic:
     """Return a finding whose file is that of its span.
 
-    Of a message that quotes enormous text, the beginning and the end are kept.
+    What it quotes of the file may be enormous, or no text that a terminal can show.
     """
-    message, help = _shortened(message), help and _shortened(help)  # noqa: A001
+    message, help = _printable(message), help and _printable(help)  # noqa: A001
     return Diagnostic(rule, message, span.source.name, span, severity, help, tuple(related))
 
 
-def _shortened(text: str) -> str:
-    if len(text) <= _LONGEST:
+def _printable(text: str) -> str:
+    if len(text) > _LONGEST:
+        text = f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
+    if text.isprintable():
         return text
-    return f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
+    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
