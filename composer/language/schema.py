@@ -65,13 +65,12 @@ def check_structure(
     incomplete = {path[:-1] for path in failed}
     passed_over = set(sampled)
     faults = _find_faults(data)
-    findings += [
-        fault.diagnostic(positions)
-        for fault in faults
-        if not (
-            fault.path in passed_over or (fault.rule == 'missing-key' and fault.path in incomplete)
-        )
-    ]
+    missing = {fault.path for fault in faults if fault.rule == 'missing-key'}
+    for fault in faults:
+        # What one key needs beside it is missing once, also if its entry needs it anyway.
+        known = fault.path in incomplete or (fault.path and fault.path[:-1] in missing)
+        if fault.path not in passed_over and not (fault.rule == 'missing-key' and known):
+            findings.append(fault.diagnostic(positions))
     if len(findings) >= MAX_FINDINGS:
         return dict(_REQUIRED), frozenset(), findings
     return data, frozenset([*failed, *_drop_faulty(data, faults)]), findings

@@ -47,7 +47,7 @@ def examine(content, path, catalogue):
         findings = check_system(system, catalogue)
         for finding in findings[:20]:
             render_finding(finding).encode()
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - whatever it is, it is what is sought
         return traceback.format_exc()
     if not findings and system.spec is None:
         return 'neither findings nor a system'
@@ -59,7 +59,7 @@ def examine(content, path, catalogue):
 def _work(seed, indices, results, step):
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     os.chdir(ROOT)
-    sys.stdout = sys.stderr = Path(os.devnull).open('w')
+    sys.stdout = sys.stderr = Path(os.devnull).open('w')  # noqa: SIM115 - until the process ends
     texts = seed_texts()
     catalogue = InterfaceCatalogue()
     with tempfile.TemporaryDirectory() as folder:
@@ -116,7 +116,9 @@ def examine_all(seed, count, first=0, jobs=2):
     ranges = [range(first + job, first + count, jobs) for job in range(jobs)]
     workers = [_Worker(seed, indices, results) for indices in ranges if indices]
     failures = []
-    while not all([worker.is_done() for worker in workers]):
+    done = []
+    while not done or not all(done):
+        done = [worker.is_done() for worker in workers]
         while not results.empty():
             failures.append(results.get())
         time.sleep(0.05)
