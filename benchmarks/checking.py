@@ -40,10 +40,8 @@ Figures = dict[str, float]
 
 def write_system(path: Path, nodes: int) -> Path:
     """Write a system of nodes with five entities each, every one of them right."""
-    lines = ['version: 1', 'nodes:']
-    for number in range(nodes):
-        lines.append(_NODE.format(number=number, following=(number + 1) % nodes))
-    path.write_text('\n'.join(lines), encoding='utf-8')
+    entries = [_NODE.format(number=each, following=(each + 1) % nodes) for each in range(nodes)]
+    path.write_text('version: 1\nnodes:\n' + ''.join(entries), encoding='utf-8')
     return path
 
 

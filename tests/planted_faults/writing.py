@@ -31,7 +31,7 @@ class _Writer:
         if block and (len(path) < 3 or self._chance.random() < 0.6):
             self.text.append(head)
             self.mapping(value, path, indent + 2)
-        elif isinstance(value, list) and value and self._chance.random() < 0.3:
+        elif isinstance(value, list) and len(value) > 1 and self._chance.random() < 0.3:
             self.text.append(head)
             for index, item in enumerate(value):
                 self._note(item, (*path, index), len(self.text) + 1)
