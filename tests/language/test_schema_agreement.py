@@ -1,5 +1,6 @@
 """What an editor accepts by the schema, Composer accepts, and the other way round."""
 
+import itertools
 import json
 import math
 import random
@@ -111,7 +112,7 @@ def composer_accepts(data):
 
 
 SETTINGS = settings(
-    max_examples=400, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+    max_examples=200, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
 )
 
 
@@ -137,16 +138,52 @@ def fault_of(error):
     return tuple(error.absolute_path), error.validator, error.message
 
 
+SAMPLES = {
+    'period': 1, 'rate': 2, 'behaviour': 'a:b', 'with': {'x': 1}, 'publish': 'a', 'message': {}, 'type': 'a/msg/B',
+    'clock': 'ros', 'default': 1, 'choices': [1], 'minimum': 0, 'concurrency': 'queue', 'accept': 'a:b', 'profile': 'a',
+}  # fmt: skip
+KINDS_OF_TYPES = {'service': 'srv', 'action': 'action', 'action_client': 'action'}
+OF_A_NODE = [
+    'subscription',
+    'timer',
+    'service',
+    'action',
+    'publisher',
+    'parameter',
+    'action_client',
+]
+
+
+@pytest.mark.parametrize('kind', OF_A_NODE)
+def test_every_choice_of_keys_has_one_verdict(kind):
+    definition = PLAIN['$defs'][kind]
+    known = definition.get('properties') or definition['oneOf'][-1]['properties']
+    samples = SAMPLES | {'type': f'a/{KINDS_OF_TYPES.get(kind, "msg")}/B'}
+    samples |= {'type': 'integer'} if kind == 'parameter' else {}
+    keys = [key for key in samples if key in known]
+    chosen = itertools.chain.from_iterable(
+        itertools.combinations(keys, count) for count in range(len(keys) + 1)
+    )
+    verdicts = set()
+    for names in chosen:
+        entity = {key: samples[key] for key in names}
+        data = {'version': 1, 'nodes': {'n': {f'{kind}s': {'e': entity}}}}
+        verdict = EDITOR.is_valid(data)
+        assert composer_accepts(data) == verdict, names
+        verdicts.add(verdict)
+    assert verdicts == {True, False}
+
+
 def test_documents_are_right_and_wrong():
     verdicts = []
 
-    @settings(SETTINGS, max_examples=200)
+    @settings(SETTINGS, max_examples=100)
     @given(documents())
     def collect(data):
         verdicts.append(EDITOR.is_valid(data))
 
     collect()
-    assert 20 < sum(verdicts) < len(verdicts) - 20
+    assert 10 < sum(verdicts) < len(verdicts) - 10
 
 
 @pytest.mark.parametrize('number', [math.nan, math.inf, -math.inf])
