@@ -20,10 +20,11 @@ _MAX_BITS = 10_000
 _MAX_WIDTH = 1_000
 
 # Work is counted in characters that are read or written.
-_WORK_OF_EXPRESSION = 5_000_000
+_WORK_OF_EXPRESSION = 4_000_000
 _WORK_OF_FILE = 50_000_000
 _WORK_OF_STEP = 50
 _WORK_OF_PARSING = 500
+_WORK_OF_READING = 1500
 # What an item of a list weighs, beside its text.
 _SIZE_OF_ITEM = 8
 
@@ -44,7 +45,7 @@ class Budget:
 
     def spend_on_reading(self, text: str) -> None:
         """Count a search for the end of an expression."""
-        self._spend_of_file(len(text) // 16)
+        self._spend_of_file(_WORK_OF_READING + len(text))
 
     def spend_on_parsing(self, code: str) -> None:
         """Count the parsing of an expression."""
@@ -124,7 +125,8 @@ def limit_product(left: Any, right: Any) -> None:
     """Raise if the repetition of a text or a list would be enormous."""
     for items, times in ((left, right), (right, left)):
         if isinstance(items, str | bytes | list | tuple) and isinstance(times, int):
-            _limit(measure(items) * times, what="the result of '*'")
+            size = len(items) if isinstance(items, str | bytes) else measure(items)
+            _limit(size * times, what="the result of '*'")
 
 
 def limit_replacement(text: Any, old: Any = '', new: Any = '', *_: Any, **__: Any) -> None:

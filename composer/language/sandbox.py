@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from jinja2.nodes import EvalContext
     from jinja2.runtime import Context
 
-_BEGIN = '{{'
-_LONGEST = 10_000
+_BEGIN, _END = '{{', '}}'
+# The end of an expression is sought so far; most are near.
+_USUAL, _LONGEST = 200, 10_000
 
 
 def _words(text: str) -> frozenset[str]:
@@ -116,19 +117,32 @@ class Sandbox(SandboxedEnvironment):
         Raises:
             TemplateSyntaxError: It has no end.
         """
+        for longest in (_USUAL, _LONGEST):
+            head = text[: longest + len(_END)]
+            self.budget.spend_on_reading(head)
+            try:
+                length = self._measure_whole(head)
+            except TemplateSyntaxError:
+                # It may be the cut that is wrong with it.
+                if len(head) == len(text):
+                    raise
+            else:
+                if length is not None:
+                    return length
+            if len(head) == len(text):
+                message = "the expression has no end: '}}' is missing"
+                raise TemplateSyntaxError(message, 1)
+        message = f'an expression has at most {_LONGEST} characters'
+        raise TemplateSyntaxError(message, 1)
+
+    def _measure_whole(self, text: str) -> int | None:
         length = -len(_BEGIN)
         # jinja2 makes one character of a line break of two.
-        head = text[: _LONGEST + len('}}')].replace('\r', ' ')
-        self.budget.spend_on_reading(head)
-        for _, kind, value in self.lex(_BEGIN + head):
+        for _, kind, value in self.lex(_BEGIN + text.replace('\r', ' ')):
             if kind == 'variable_end':
-                return length + value.index('}}')
+                return length + value.index(_END)
             length += len(value)
-        if len(text) > len(head):
-            message = f'an expression has at most {_LONGEST} characters'
-            raise TemplateSyntaxError(message, 1)
-        message = "the expression has no end: '}}' is missing"
-        raise TemplateSyntaxError(message, 1)
+        return None
 
     def method_of(self, value: Any, name: str) -> Method | None:
         """Return the method of a value, if it is one that expressions may call."""
