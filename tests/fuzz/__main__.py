@@ -9,6 +9,8 @@ from pathlib import Path
 from tests.fuzz.examination import examine_all, seed_texts
 from tests.fuzz.mutations import mutate
 
+_PORTION = 2000
+
 
 def main():
     """Examine mutated inputs; keep those that fail."""
@@ -20,23 +22,23 @@ def main():
     parser.add_argument('--keep', type=Path, default=Path('build/fuzz'))
     arguments = parser.parse_args()
     begun = time.monotonic()
-    failures = examine_all(
-        arguments.seed, arguments.count, first=arguments.first, jobs=arguments.jobs
-    )
-    kinds = Counter(failure.what.strip().splitlines()[-1][:200] for failure in failures)
     texts = seed_texts()
+    failures = []
     arguments.keep.mkdir(parents=True, exist_ok=True)
-    for failure in failures:
-        kept = arguments.keep / f'{arguments.seed}-{failure.index}'
-        kept.with_suffix('.yaml').write_bytes(mutate(texts, arguments.seed, failure.index))
-        kept.with_suffix('.txt').write_text(failure.what)
+    last = arguments.first + arguments.count
+    for first in range(arguments.first, last, _PORTION):
+        count = min(_PORTION, last - first)
+        found = examine_all(arguments.seed, count, first=first, jobs=arguments.jobs)
+        for failure in found:
+            kept = arguments.keep / f'{arguments.seed}-{failure.index}'
+            kept.with_suffix('.yaml').write_bytes(mutate(texts, arguments.seed, failure.index))
+            kept.with_suffix('.txt').write_text(failure.what)
+        failures += found
+        taken = time.monotonic() - begun
+        print(f'{first + count} inputs, {len(failures)} failures, {taken:.0f} s', flush=True)
+    kinds = Counter(failure.what.strip().splitlines()[-1][:200] for failure in failures)
     for kind, times in kinds.most_common():
-        sys.stdout.write(f'{times} x {kind}\n')
-    taken = time.monotonic() - begun
-    sys.stdout.write(
-        f'{arguments.count} inputs of seed {arguments.seed}: '
-        f'{len(failures)} failures in {taken:.0f} s\n'
-    )
+        print(f'{times} x {kind}')
     return 1 if failures else 0
 
 

@@ -1,7 +1,6 @@
 """python -m tests.planted_faults --systems 2000 --seed 1"""
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -21,14 +20,14 @@ def main():
     for kind, planted in sorted(score.planted.items()):
         found = f'{score.found[kind]}/{planted} found, {score.in_line[kind]} in line'
         suggested = f'{score.suggested[kind]}/{score.to_suggest[kind]} suggested'
-        sys.stdout.write(f'{kind:20} {found}, {suggested}\n')
+        print(f'{kind:20} {found}, {suggested}')
     for title in ('false_alarms', 'extra', 'missed'):
         cases = getattr(score, title)
-        sys.stdout.write(f'{title}: {len(cases)}\n')
+        print(f'{title}: {len(cases)}')
         for case in cases[: arguments.show]:
-            sys.stdout.write('   ' + ' | '.join(map(_shown, case)) + '\n')
+            print('  ', ' | '.join(map(_shown, case)))
     for what, share in score.shares().items():
-        sys.stdout.write(f'{what}: {share:.2%}\n')
+        print(f'{what}: {share:.2%}')
 
 
 def _shown(part):
