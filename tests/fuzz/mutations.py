@@ -9,6 +9,7 @@ import yaml
 from tests.fuzz.oddities import BLOCKS, EXPRESSIONS, SCALARS
 
 _TOKEN = re.compile(r'[^\s{}\[\],:]+')
+_MOST_ALIASES = 12
 _ENDS = ('\r\n', '\r', '\n\r', '\x85', '\u2028', '\n\n', '\n\t', '\n ')
 _ENCODINGS = ('utf-16', 'utf-16-le', 'utf-32', 'latin-1', 'utf-8-sig', 'cp1252', 'utf-7')
 
@@ -93,6 +94,8 @@ def _append_block(chance, text):
 
 
 def _change_tree(chance, text):
+    if text.count('*') > _MOST_ALIASES:
+        return text  # written out, it would take all memory
     try:
         data = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
         for _ in range(chance.choice((1, 2, 4))):
