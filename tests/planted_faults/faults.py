@@ -29,11 +29,12 @@ def plant(chance, system, count):
         place = _choose(chance, system, kind, taken)
         if place is None:
             continue
+        publisher = _publisher(system, place)
         found = FAULTS[kind][1](chance, system, place)
         if found:
             planted.append(Planted(kind, *found))
             # One fault in a part, so that none hides another.
-            taken |= {place[:4], _publisher(system, place)}
+            taken |= {place[:4], found[1][:4], publisher}
         if len(planted) == count:
             break
     return planted
