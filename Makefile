@@ -9,7 +9,7 @@ else
 EXTRAS := ros,interfaces,ros-test,test
 endif
 
-.PHONY: up test check format bench clean
+.PHONY: up test check format docs bench clean
 
 up: .venv/ready
 	@$(BIN)/composer up $(CONFIG)
@@ -25,6 +25,9 @@ check: .venv/ready
 format: .venv/ready
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: .venv/ready
+	$(BIN)/python docs/generate.py
 
 bench: .venv/ready
 	$(BIN)/python -m benchmarks.run --json build/bench.json $(ARGS)

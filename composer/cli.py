@@ -7,14 +7,13 @@ import platform
 import re
 import sys
 import traceback
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
+from composer.reports import FORMATS
 
-_DISTRIBUTION = 'rclpy-composer'
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
 
 
@@ -81,15 +80,50 @@ def _check_log_levels(
     return values
 
 
-def _version() -> str:
-    try:
-        return version(_DISTRIBUTION)
-    except PackageNotFoundError:
-        return 'of a source tree'
+def _check_rules(
+    _context: click.Context, _option: click.Parameter, values: tuple[str, ...]
+) -> tuple[str, ...]:
+    for value in values:
+        _find_rule(value)
+    return values
+
+
+def _check_rule(
+    _context: click.Context, _argument: click.Parameter, value: str | None
+) -> str | None:
+    if value is not None:
+        _find_rule(value)
+    return value
+
+
+def _find_rule(name: str) -> None:
+    from composer.names import suggest
+    from composer.rules import RULES
+
+    if name not in RULES:
+        near = suggest(name, RULES)
+        advice = f"did you mean '{near}'?" if near else "'composer explain' lists them"
+        message = f"no rule is called '{name}'; {advice}"
+        raise click.BadParameter(message)
+
+
+def _show_version(context: click.Context, _option: click.Parameter, value: object) -> None:
+    if value and not context.resilient_parsing:
+        from composer.version import find_version
+
+        click.echo(f'composer, version {find_version()}')
+        context.exit()
 
 
 @click.group(context_settings={'help_option_names': ['-h', '--help']})
-@click.version_option(_version(), prog_name='composer')
+@click.option(
+    '--version',
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help='Show the version and exit.',
+)
 def cli() -> None:
     """Run ROS 2 systems that are declared in YAML."""
 
@@ -144,12 +178,99 @@ def up_command(
 
 
 @cli.command('check')
-@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
-def check_command(files: tuple[Path, ...]) -> int:
-    """Say all that is wrong with FILES, without running anything. Needs no ROS."""
-    from composer.commands.check import check
+@click.argument('files', nargs=-1, required=True, metavar='FILE...')
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(list(FORMATS)),
+    default='text',
+    help='The form of the report; text by default.',
+)
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    help='Write the report to this file, and show the findings as text.',
+)
+@click.option('--strict', is_flag=True, help='Let warnings count as faults.')
+@click.option(
+    '--ignore',
+    'ignored',
+    metavar='RULE',
+    multiple=True,
+    callback=_check_rules,
+    help='Leave out what this rule finds. May be repeated.',
+)
+@click.option(
+    '--expect',
+    'expected',
+    metavar='RULE',
+    multiple=True,
+    callback=_check_rules,
+    help='Pass only if this rule finds something, and no other does. May be repeated.',
+)
+@click.option(
+    '--import',
+    'imports',
+    is_flag=True,
+    help='Import the behaviours, and check the functions too. Runs the code of their modules.',
+)
+@click.option('--quiet', '-q', is_flag=True, help='Show what is wrong and nothing else.')
+@click.option(
+    '--skip-foreign', is_flag=True, help='Pass over named files that do not look like systems.'
+)
+@click.option(
+    '--stdin-filename', metavar='PATH', default='<stdin>', help='What to take - for, in an editor.'
+)
+def check_command(  # noqa: PLR0913 - one for each option
+    files: tuple[str, ...],
+    *,
+    format_name: str,
+    output: Path | None,
+    strict: bool,
+    ignored: tuple[str, ...],
+    expected: tuple[str, ...],
+    imports: bool,
+    quiet: bool,
+    skip_foreign: bool,
+    stdin_filename: str,
+) -> int:
+    """Say all that is wrong with FILES, without running anything. Needs no ROS.
 
-    return check(files)
+    A file may be a pattern in quotes, a folder (all systems in it are checked), or - for standard
+    input.
+    """
+    from composer.commands.check import CheckOptions, check
+
+    options = CheckOptions(
+        format=format_name,
+        output=output,
+        is_strict=strict,
+        ignored=ignored,
+        expected=expected,
+        is_quiet=quiet,
+        imports=imports,
+        skip_foreign=skip_foreign,
+        stdin_name=stdin_filename,
+    )
+    return check(files, options)
+
+
+@cli.command('explain')
+@click.argument('rule', required=False, callback=_check_rule)
+def explain_command(rule: str | None) -> int:
+    """Say what RULE means, with a bad and a good example; without RULE, list all."""
+    from composer.commands.explain import explain
+
+    return explain(rule)
+
+
+@cli.command('schema')
+@click.option('--path', 'path_only', is_flag=True, help='Print where the schema lies.')
+def schema_command(*, path_only: bool) -> int:
+    """Print the schema of the language (JSON Schema), for editors."""
+    from composer.commands.schema import print_schema
+
+    return print_schema(path_only=path_only)
 
 
 @cli.group('interfaces')
@@ -185,10 +306,13 @@ def interfaces_show_command(name: str) -> int:
 
 
 def _bug_report(arguments: list[str]) -> str:
+    from composer.version import find_version
+
+    python = f'Python {platform.python_version()}, {platform.platform()}'
     return '\n'.join(
         [
             'This is a bug in Composer, not in your file. Please report it with what follows.',
-            f'  composer {_version()}, Python {platform.python_version()}, {platform.platform()}',
+            f'  composer {find_version()}, {python}',
             f'  arguments: {arguments}',
             traceback.format_exc().rstrip(),
         ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 if TYPE_CHECKING:
     from pathlib import Path
 
-_FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
+FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 
 
@@ -36,10 +36,12 @@ class FunctionSource:
     Attributes:
         kind: `None` if it cannot be told without running the module.
         signature: `None` if it cannot be told without running the module.
+        definition: Its syntax tree; `None` if it cannot be told without running the module.
     """
 
     kind: FunctionKind | None = None
     signature: inspect.Signature | None = None
+    definition: FunctionNode | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,9 @@ class ModuleSource:
     Attributes:
         functions: What can be called, or may be: its kind and signature where they can be told.
         constants: The names that cannot be called, and what they are.
+        imports: What the names that are only ever imported stand for, in full with dots; imports
+            for type checkers included.
+        lines: Its text.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: Why its text is not Python, or `None`.
     """
@@ -56,6 +61,8 @@ class ModuleSource:
     path: Path | None
     functions: dict[str, FunctionSource] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
+    imports: dict[str, str] = field(default_factory=dict)
+    lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
 
@@ -65,7 +72,8 @@ def read_module(path: Path) -> ModuleSource:
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
     try:
-        tree = ast.parse(path.read_bytes(), str(path))
+        text = path.read_bytes()
+        tree = ast.parse(text, str(path))
         # The compiler finds what the parser lets pass: `return` outside a function, say.
         compile(tree, str(path), 'exec', dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -76,7 +84,14 @@ def read_module(path: Path) -> ModuleSource:
         return ModuleSource(path, syntax_error=f'{path}: {error.strerror}')
     reader = _ModuleReader()
     reader.read(tree.body)
-    return ModuleSource(path, reader.functions, reader.constants, reader.is_open)
+    return ModuleSource(
+        path,
+        reader.functions,
+        reader.constants,
+        {name: full_name for name, full_name in reader.imports.items() if full_name},
+        tuple(text.decode(errors='replace').splitlines()),
+        reader.is_open,
+    )
 
 
 class _ModuleReader:
@@ -88,6 +103,7 @@ class _ModuleReader:
     def __init__(self) -> None:
         self.functions: dict[str, FunctionSource] = {}
         self.constants: dict[str, str] = {}
+        self.imports: dict[str, str] = {}
         self.is_open = False
         self._conditions = 0
 
@@ -118,9 +134,12 @@ class _ModuleReader:
             if alias.name == '*':
                 self.is_open = True
             elif isinstance(statement, ast.Import):
-                self._constant((alias.asname or alias.name).partition('.')[0], 'a module')
+                name = (alias.asname or alias.name).partition('.')[0]
+                self._constant(name, 'a module', alias.name if alias.asname else name)
             else:
-                self._bind(alias.asname or alias.name, FunctionSource())
+                within = '' if statement.level else statement.module
+                full_name = f'{within}.{alias.name}' if within else ''
+                self._bind(alias.asname or alias.name, FunctionSource(), full_name)
 
     def _read_assignment(self, statement: ast.Assign | ast.AnnAssign) -> None:
         targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
@@ -134,21 +153,28 @@ class _ModuleReader:
                 elif value is not None:
                     self._bind(node.id, FunctionSource())
 
-    def _bind(self, name: str, function: FunctionSource) -> None:
+    def _bind(self, name: str, function: FunctionSource, full_name: str = '') -> None:
         if self._conditions and (name in self.functions or name in self.constants):
             function = FunctionSource()
+        self._note_import(name, full_name)
         self.constants.pop(name, None)
         self.functions[name] = function
 
-    def _constant(self, name: str, what: str) -> None:
+    def _constant(self, name: str, what: str, full_name: str = '') -> None:
         if self._conditions and name in self.functions:
-            self._bind(name, FunctionSource())
+            self._bind(name, FunctionSource(), full_name)
             return
+        self._note_import(name, full_name)
         self.functions.pop(name, None)
         self.constants[name] = what
 
+    def _note_import(self, name: str, full_name: str) -> None:
+        """Note what a name stands for now; what stands for several things is not known."""
+        if self.imports.setdefault(name, full_name) != full_name:
+            self.imports[name] = ''
 
-def describe_function(node: _FunctionNode) -> FunctionSource:
+
+def describe_function(node: FunctionNode) -> FunctionSource:
     """Return the kind and signature of a function definition; decorators may change both."""
     if node.decorator_list:
         return FunctionSource()
@@ -157,10 +183,10 @@ def describe_function(node: _FunctionNode) -> FunctionSource:
         kind = FunctionKind.ASYNC_GENERATOR if yields else FunctionKind.COROUTINE
     else:
         kind = FunctionKind.GENERATOR if yields else FunctionKind.PLAIN
-    return FunctionSource(kind, _read_signature(node.args))
+    return FunctionSource(kind, _read_signature(node.args), node)
 
 
-def _own_nodes(function: _FunctionNode) -> list[ast.AST]:
+def _own_nodes(function: FunctionNode) -> list[ast.AST]:
     """Return the nodes of a function's body without those of functions inside it."""
     found: list[ast.AST] = []
     pending: list[ast.AST] = list(function.body)

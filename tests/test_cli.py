@@ -15,6 +15,7 @@ ROOT = Path(composer.__file__).parents[1]
 GREETER = ROOT / 'configs' / 'greeter.yaml'
 VALID = ROOT / 'tests' / 'data' / 'valid'
 INVALID = ROOT / 'tests' / 'data' / 'invalid'
+EXAMPLES = ROOT / 'composer' / 'examples'
 
 # A `sitecustomize` with which nothing of ROS can be imported, as if it were not installed.
 WITHOUT_ROS = """
@@ -80,16 +81,16 @@ def test_each_file_is_named(run):
 
 
 def test_a_faulty_file_fails_with_all_that_is_wrong(run):
-    path = INVALID / 'duplicate-key.yaml'
-    code, out, err = run('check', path)
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('check', folder / 'bad.yaml')
     assert code == 1
-    assert err == '3 faults in 1 file\n'
-    expected = (INVALID / 'duplicate-key.txt').read_text()
-    assert out.replace(f'{INVALID}/', '') == expected + '\n'
+    assert err == '2 faults in 1 file\n'
+    expected = (folder / 'bad.txt').read_text()
+    assert out.replace(f'{folder}/', '') == expected + '\n'
 
 
 def test_faults_of_one_file_do_not_hide_the_others(run):
-    version = INVALID / 'unsupported-version.yaml'
+    version = EXAMPLES / 'unsupported-version' / 'bad.yaml'
     missing = INVALID / 'no_such_file.yaml'
     code, out, err = run('check', version, GREETER, missing)
     assert code == 1
@@ -101,7 +102,7 @@ def test_faults_of_one_file_do_not_hide_the_others(run):
 
 @pytest.mark.parametrize('name', ['unreadable-file', 'too-deep', 'yaml-syntax'])
 def test_an_unreadable_file_is_one_fault(run, name):
-    code, out, err = run('check', INVALID / f'{name}.yaml')
+    code, out, err = run('check', EXAMPLES / name / 'bad.yaml')
     assert (code, err) == (1, '1 fault in 1 file\n')
     assert out.count('error[') == 1
     assert 'Traceback' not in out
@@ -126,16 +127,17 @@ def test_check_imports_no_behaviour(tmp_path):
 def test_without_interfaces_check_says_what_it_did_not_check(run, monkeypatch, tmp_path):
     monkeypatch.setenv('AMENT_PREFIX_PATH', '')
     monkeypatch.setattr(sys, 'prefix', str(tmp_path))
-    code, out, err = run('check', INVALID / 'unknown-type.yaml')
-    assert (code, err) == (0, '')
-    assert out.splitlines()[1] == (
-        'not checked without ROS 2: interface types and the fields of messages'
-    )
+    path = EXAMPLES / 'unknown-type' / 'bad.yaml'
+    code, out, err = run('check', path)
+    assert (code, out) == (0, f'{path}: ok, 1 node\n')
+    assert err == 'not checked without ROS 2: interface types and the fields of messages\n'
 
 
-def test_a_closed_pipe_is_no_bug():
-    faulty = INVALID / 'many_faults.yaml'
-    command = f'{sys.executable} -m composer check {" ".join([str(faulty)] * 200)} | head -n 1'
+def test_a_closed_pipe_is_no_bug(tmp_path):
+    text = (INVALID / 'many_faults.yaml').read_text()
+    for number in range(200):
+        (tmp_path / f'{number}.yaml').write_text(text)
+    command = f'{sys.executable} -m composer check {tmp_path} | head -n 1'
     result = start(['sh', '-c', command])
     assert 'This is a bug' not in result.stderr
     assert 'Traceback' not in result.stderr
@@ -208,10 +210,11 @@ def test_the_version_is_told(run):
 
 
 def test_up_says_what_is_wrong_and_starts_nothing(run):
-    code, out, err = run('up', INVALID / 'duplicate-key.yaml')
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('up', folder / 'bad.yaml')
     assert (code, out) == (1, '')
-    expected = (INVALID / 'duplicate-key.txt').read_text()
-    assert err.replace(f'{INVALID}/', '') == expected + '\n'
+    expected = (folder / 'bad.txt').read_text()
+    assert err.replace(f'{folder}/', '') == expected + '\n'
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,17 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from composer.checks.annotations import check_annotations
 from composer.checks.behaviours import check_behaviour_sources
 from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
+from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_names
+from composer.checks.node_uses import UseReader
 from composer.checks.parameters import check_parameters
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.uses import check_uses
+from composer.checks.wiring import check_wiring
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, Span
+    from composer.rules.record import Need
 
 RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_names,
@@ -32,6 +38,9 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_annotations,
+    check_uses,
+    check_wiring,
 )
 _MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 
@@ -47,29 +56,56 @@ def create_context(
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.path))
-    return CheckContext(system, system.spec, catalogue, modules, unreadable), findings
+    uses = UseReader(modules)
+    return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
 
-def check_system(system: LoadedSystem, catalogue: InterfaceCatalogue) -> list[Diagnostic]:
-    """Return all that is wrong with a system, by its place in the file."""
+def check_system(
+    system: LoadedSystem,
+    catalogue: InterfaceCatalogue,
+    further: Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]] | None = None,
+) -> list[Diagnostic]:
+    """Return all that is wrong with a system, by its place in the file.
+
+    Args:
+        further: What else is to be checked; it is given what was found so far.
+    """
     context, declared = create_context(system, catalogue)
-    found = _apply_rules(context) if context else []
+    found = list(_apply_rules(context)) if context else []
+    samples = _by_line(system.sampled)
+    if context and further:
+        more = further(context, found)
+        found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias is wrong once.
     once = dict.fromkeys([*system.diagnostics, *declared, *found])
-    findings = sorted(once, key=lambda finding: finding.sort_key)
-    if len(findings) > MAX_FINDINGS:
-        findings[MAX_FINDINGS - 1 :] = [replace(findings[MAX_FINDINGS - 1], help=_MORE)]
-    return findings
+    unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
+    unchecked |= set() if further else {'import'}
+    heard = apply_ignore_comments(
+        once, system.positions.source, None if system.diagnostics else unchecked
+    )
+    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
+
+
+def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
+    if len(findings) <= MAX_FINDINGS:
+        return findings
+    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
+    return [*findings[: MAX_FINDINGS - 1], last]
 
 
 def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
-    samples: dict[int, list[Span]] = {}
-    for span in context.system.sampled:
-        samples.setdefault(span.line, []).append(span)
+    samples = _by_line(context.system.sampled)
     for rule in RULES:
         findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
         # One more, as a sign that there are more.
         yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _by_line(spans: Iterable[Span]) -> dict[int, list[Span]]:
+    lines: dict[int, list[Span]] = {}
+    for span in spans:
+        lines.setdefault(span.line, []).append(span)
+    return lines
 
 
 def _hangs_on_samples(finding: Diagnostic, samples: Mapping[int, list[Span]]) -> bool:

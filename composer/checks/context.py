@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, Severity, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from composer.checks.node_uses import UseReader
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language import LoadedSystem
     from composer.language.positions import DataPath
@@ -20,6 +23,7 @@ class CheckContext:
     """A system and what there is to hold it against.
 
     Attributes:
+        uses: Reads what behaviours do with their nodes.
         unreadable: The interface packages of the file that something was wrong with; it has been
             reported, and nothing is known of their types.
     """
@@ -28,13 +32,14 @@ class CheckContext:
     spec: SystemSpec
     catalogue: InterfaceCatalogue
     modules: ModuleFinder
+    uses: UseReader
     unreadable: frozenset[str] = frozenset()
 
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing only because its own fault was reported already."""
         return path in self.system.dropped
 
-    def at_value(
+    def at_value(  # noqa: PLR0913 - the words of a finding
         self,
         path: DataPath,
         rule: str,
@@ -44,10 +49,11 @@ class CheckContext:
         first: bool = False,
         help: str | None = None,  # noqa: A002 - the word that the finding shows
         severity: Severity = Severity.ERROR,
+        related: Iterable[Related] = (),
     ) -> Diagnostic:
         """Return a finding at a value, or at the last (or `first`) `part` of its text."""
         span = self.system.positions.value(path).narrowed_to(part, first=first)
-        return diagnostic_at(span, rule, message, help=help, severity=severity)
+        return diagnostic_at(span, rule, message, help=help, severity=severity, related=related)
 
     def at_key(
         self,
@@ -57,7 +63,21 @@ class CheckContext:
         *,
         help: str | None = None,  # noqa: A002 - the word that the finding shows
         severity: Severity = Severity.ERROR,
+        related: Iterable[Related] = (),
     ) -> Diagnostic:
         """Return a finding at a key."""
         span = self.system.positions.key(path)
-        return diagnostic_at(span, rule, message, help=help, severity=severity)
+        return diagnostic_at(span, rule, message, help=help, severity=severity, related=related)
+
+    def related(self, path: DataPath, message: str) -> Related:
+        """Return a second place of a finding: that of a key."""
+        return Related(message, self.system.positions.key(path))
+
+    def related_value(self, path: DataPath, message: str) -> Related:
+        """Return a second place of a finding: that of a value."""
+        return Related(message, self.system.positions.value(path))
+
+    def inner(self, path: DataPath, key: str) -> DataPath:
+        """Return the path of `key` in a mapping, or of the mapping where that is written short."""
+        within = (*path, key)
+        return within if within in self.system.positions.values else path

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.names import (
+    MAX_TOPIC_NAME,
     expand_name,
     find_namespace_fault,
     find_node_name_fault,
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 
 _RULE = 'bad-name'
 
+# By the keys of a node that turn them on.
+_LONGEST_OWN_SERVICES = {
+    'parameter_services': 'set_parameters_atomically',
+    'type_description_service': 'get_type_description',
+    'logger_services': 'get_logger_levels',
+}
+
 
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS will see."""
@@ -31,6 +39,8 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_node_name_fault(name)
         if fault:
             yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
+        else:
+            yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)
@@ -50,6 +60,20 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
 
 
+def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    """Check that the names which the node's own services get are not too long."""
+    for key, service in _LONGEST_OWN_SERVICES.items():
+        private = f'~/{service}'
+        if getattr(node, key) and _find_full_name_fault(node, private):
+            length = len(expand_name(private, node.name, node.namespace))
+            message = (
+                f"the node's service '{private}' has {length} characters in full, "
+                f'and ROS allows {MAX_TOPIC_NAME}'
+            )
+            help_text = f"shorten the node's name, or write '{key}: false'"
+            yield context.at_key(node.path, _RULE, message, help=help_text)
+
+
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
     for endpoint in node.endpoints:
         yield from _check_ros_name(context, node, endpoint.path, 'topic', endpoint.topic)
@@ -62,7 +86,7 @@ def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnost
 def _check_ros_name(
     context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name)
+    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name, kind)
     if not fault:
         return
     message = f"'{name}' cannot name {with_article(kind)}: {fault}"
@@ -74,13 +98,15 @@ def _check_ros_name(
         yield context.at_key(entity, _RULE, message, help=help_text)
 
 
-def _find_full_name_fault(node: NodeSpec, topic: str) -> str | None:
+def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
     """Return what becomes wrong with a name in its namespace: its length, say."""
     if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
         return None
     full = expand_name(topic, node.name, node.namespace)
-    fault = find_topic_name_fault(full)
-    return fault and f"in full it is '{full}', and {fault}"
+    # An action's name is the beginning of those of its topics and services.
+    longest = f'{full}/_action/cancel_goal' if kind == 'action' else full
+    fault = find_topic_name_fault(longest)
+    return fault and f"in full it is '{longest}', and {fault}"
 
 
 def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
@@ -98,7 +124,7 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = _find_rule_name_fault(name)
+            fault = _find_rule_name_fault(name) or _find_full_name_fault(node, name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
 

@@ -3,43 +3,148 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from composer.checks import check_system
-from composer.diagnostics import has_errors
-from composer.errors import ExitCode
+from composer.commands.selection import select_files
+from composer.commands.terminal import wants_colour
+from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
-from composer.reports.text import render_finding
+from composer.language import load_system, load_system_content
+from composer.language.source import MAX_BYTES
+from composer.reports import render_report
+from composer.reports.report import CheckedFile, Report
+from composer.reports.text import render_files, summarize
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Sequence
 
-    from composer.diagnostics import Diagnostic
+    from composer.commands.importing import ImportCheck
+    from composer.language import LoadedSystem
+
+_STANDARD_INPUT = '-'
 
 
-def check(paths: tuple[Path, ...]) -> int:
-    """Check files and print what was found; return the exit code."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions:
+    """How to check, and how to say what was found.
+
+    Attributes:
+        format: One of `composer.reports.FORMATS`.
+        output: Where the report goes; `None` for standard output.
+        is_strict: Whether warnings count.
+        ignored: Rules whose findings are left out.
+        expected: The rules that have to fire, exactly these; empty if none should.
+        is_quiet: Whether findings are all that is shown.
+        imports: Whether behaviours are imported.
+        skip_foreign: Whether named files that do not look like systems are passed over.
+        stdin_name: The path that standard input is checked as.
+    """
+
+    format: str = 'text'
+    output: Path | None = None
+    is_strict: bool = False
+    ignored: tuple[str, ...] = ()
+    expected: tuple[str, ...] = ()
+    is_quiet: bool = False
+    imports: bool = False
+    skip_foreign: bool = False
+    stdin_name: str = '<stdin>'
+
+
+def check(words: Sequence[str], options: CheckOptions) -> int:
+    """Check files and say what was found; return the exit code.
+
+    Args:
+        words: Files, folders, patterns, and `-` for standard input.
+
+    Raises:
+        ComposerError: The report cannot be written.
+    """
+    report = _inspect(words, options)
+    _show(report, options)
+    if options.expected:
+        return _compare(report, options)
+    return ExitCode.FAILED if report.has_failed else ExitCode.DONE
+
+
+def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     catalogue = InterfaceCatalogue()
-    found: list[Diagnostic] = []
-    for path in paths:
-        system = load_system(path)
-        findings = check_system(system, catalogue)
-        for finding in findings:
-            click.echo(render_finding(finding) + '\n')
-        if not findings and system.spec:
-            click.echo(f'{path}: ok, {count(len(system.spec.nodes), "node")}')
-        found += findings
+    selection = select_files(words, skip_foreign=options.skip_foreign)
+    imports = _import_check() if options.imports else None
+    files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
+    for path in selection.paths:
+        system = _load(path, options)
+        findings = check_system(system, catalogue, imports)
+        kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
+        nodes = len(system.spec.nodes) if system.spec else None
+        files.append(CheckedFile(str(system.path), kept, nodes))
+    unchecked = _list_unchecked(catalogue, imports)
+    return Report(tuple(files), unchecked, options.is_strict)
+
+
+def _import_check() -> ImportCheck:
+    from composer.commands.importing import ImportCheck
+
+    return ImportCheck()
+
+
+def _load(path: Path, options: CheckOptions) -> LoadedSystem:
+    if str(path) != _STANDARD_INPUT:
+        return load_system(path)
+    return load_system_content(sys.stdin.buffer.read(MAX_BYTES + 1), Path(options.stdin_name))
+
+
+def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:
+    """Return what this machine has not shown, in one line, if there is anything."""
+    unchecked = []
     if not catalogue.available:
-        click.echo('not checked without ROS 2: interface types and the fields of messages')
-    if found:
-        faulty = len({finding.file for finding in found})
-        click.echo(f'{count(len(found), "fault")} in {count(faulty, "file")}', file=sys.stderr)
-    return ExitCode.FAILED if has_errors(found) else ExitCode.DONE
+        unchecked.append('interface types and the fields of messages')
+    if imports and imports.missing_ros:
+        unchecked.append(f'what imports ROS itself ({", ".join(sorted(imports.missing_ros))})')
+    return (f'not checked without ROS 2: {"; ".join(unchecked)}',) if unchecked else ()
 
 
-def count(number: int, noun: str) -> str:
-    """Return `1 node`, `2 nodes`."""
-    return f'{number} {noun}' if number == 1 else f'{number} {noun}s'
+def _show(report: Report, options: CheckOptions) -> None:
+    """Write the report; the terminal gets the findings as text if it goes elsewhere."""
+    if options.output is not None:
+        _write(options.output, render_report(report, options.format))
+    if options.format == 'text' or options.output is not None:
+        colour = wants_colour()
+        text = render_files(report, colour=colour, is_quiet=options.is_quiet)
+        click.echo(text, nl=False, color=colour)
+    else:
+        click.echo(render_report(report, options.format), nl=False, color=False)
+    if options.is_quiet:
+        return
+    for line in report.not_checked:
+        click.echo(line, err=True)
+    if report.findings:
+        click.echo(summarize(report.findings), err=True)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding='utf-8', errors='backslashreplace')
+    except OSError as error:
+        message = f'cannot write the report to {path}: {error.strerror}'
+        raise ComposerError(message) from error
+
+
+def _compare(report: Report, options: CheckOptions) -> int:
+    """Hold what fired against what was expected to."""
+    fired = {finding.rule for finding in report.findings}
+    expected = set(options.expected)
+    for rule in sorted(expected - fired):
+        click.echo(f"'{rule}' was expected and did not fire", err=True)
+    for rule in sorted(fired - expected):
+        click.echo(f"'{rule}' fired and was not expected", err=True)
+    if fired != expected:
+        return ExitCode.FAILED
+    if not options.is_quiet:
+        click.echo(f'as expected: {", ".join(sorted(expected))}', err=True)
+    return ExitCode.DONE

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from composer.checks import check_system, create_context
-from composer.checks.behaviours import check_behaviour_call
+from composer.checks.ignoring import leave_out_silenced
+from composer.commands.importing import import_behaviours
+from composer.commands.terminal import wants_colour
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import provide_declared
 from composer.language import LoadedSystem, load_system
 from composer.language.arguments import describe_arguments
-from composer.language.bindings import node_bindings
 from composer.module_finder import project_search_path
 from composer.reports.text import render_finding
 
@@ -61,7 +62,7 @@ def up(
 
     provide_declared(system, lambda line: click.echo(line, err=True))
     with project_on_path(project_search_path(path)):
-        functions, findings = _import_behaviours(system, catalogue)
+        functions, findings = _import(system, catalogue)
         if _report(findings):
             return ExitCode.FAILED
         return run_system(
@@ -81,37 +82,21 @@ def describe_file_arguments(path: Path) -> str:
     return describe_arguments(system.arguments)
 
 
-def _import_behaviours(
+def _import(
     system: LoadedSystem, catalogue: InterfaceCatalogue
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
-    """Import every behaviour, and hold the functions themselves against their calls."""
-    from composer.runtime import behaviours
-
+    """Import every behaviour; return the functions, and what is wrong that nobody ignores."""
     context, _ = create_context(system, catalogue)
-    functions: dict[str, Callable[..., Any]] = {}
-    findings: list[Diagnostic] = []
     if context is None:
-        return functions, findings
-    for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
-            spec = binding.behaviour
-            try:
-                function = functions.get(spec.name) or behaviours.import_behaviour(spec)
-            except behaviours.BehaviourImportError as error:
-                findings.append(
-                    context.at_value(
-                        spec.path, 'broken-behaviour', str(error), part=spec.name, help=error.help
-                    )
-                )
-                continue
-            functions[spec.name] = function
-            kind, signature = behaviours.kind_of(function), behaviours.signature_of(function)
-            findings += check_behaviour_call(context, binding, kind, signature)
-    return functions, findings
+        return {}, []
+    functions, findings = import_behaviours(context)
+    # Comments that silence nothing were reported before.
+    return functions, leave_out_silenced(findings, system.positions.source)
 
 
 def _report(findings: list[Diagnostic]) -> bool:
     """Show findings on standard error; return whether they forbid a start."""
+    colour = wants_colour(is_error=True)
     for finding in findings:
-        click.echo(render_finding(finding) + '\n', err=True)
+        click.echo(render_finding(finding, colour=colour) + '\n', err=True, color=colour)
     return has_errors(findings)

@@ -69,7 +69,14 @@ def load_system_text(
     text: str, path: Path = Path('<text>'), words: Sequence[str] | None = None
 ) -> LoadedSystem:
     """Read the text of a file that would stand at `path`."""
-    return _load(parse_document(text.encode(), str(path)), path, words)
+    return load_system_content(text.encode(), path, words)
+
+
+def load_system_content(
+    content: bytes, path: Path, words: Sequence[str] | None = None
+) -> LoadedSystem:
+    """Read the bytes of a file that would stand at `path`."""
+    return _load(parse_document(content, str(path)), path, words)
 
 
 def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:

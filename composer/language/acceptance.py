@@ -15,7 +15,7 @@ Schema: TypeAlias = dict[str, Any]
 
 _DEFINITIONS = '#/$defs/'
 # What says nothing of the data.
-_NOTES = frozenset(('$schema', '$id', '$defs', 'title', 'description', 'x-expected'))
+_NOTES = frozenset(('$schema', '$id', '$defs', 'title', 'description', 'examples', 'x-expected'))
 
 
 class SchemaCompiler:

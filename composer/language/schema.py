@@ -8,14 +8,13 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from itertools import islice, takewhile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import MAX_FINDINGS
 from composer.language.acceptance import Acceptor, SchemaCompiler
 from composer.language.schema_faults import StructureFault, explain
+from composer.language.schema_file import schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -23,19 +22,11 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, Key, SourceMap
 
-SCHEMA_NAME = 'composer.schema.json'
-
 # What editors accept in place of a number, a word and the like. Here, the values are in place.
 _TEMPLATE = {'$ref': '#/$defs/template'}
 
 # What a file without these keys is read on with, once their absence has been reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
-
-
-def schema_path() -> Path:
-    """Return where the schema lies: beside the package in a checkout, inside it in a wheel."""
-    packaged = Path(str(resources.files('composer'))) / 'schemas' / SCHEMA_NAME
-    return packaged if packaged.exists() else packaged.parents[2] / 'schemas' / SCHEMA_NAME
 
 
 def check_structure(

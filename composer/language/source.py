@@ -44,13 +44,13 @@ def read_document(path: Path, name: str | None = None) -> Document:
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         return _unreadable(name, f'cannot read the file: {reason}')
-    if len(content) > MAX_BYTES:
-        return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
     return parse_document(content, name)
 
 
 def parse_document(content: bytes, name: str) -> Document:
     """Read the text of a file: UTF-8, one YAML document, a mapping at its top."""
+    if len(content) > MAX_BYTES:
+        return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
     try:
         text = content.decode('utf-8-sig')
     except UnicodeDecodeError as error:

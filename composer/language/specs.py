@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.names import join_names
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -18,8 +20,8 @@ OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
-DEFAULT_THREADS = 8
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
+DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 REENTRANT = 'reentrant'
 
 
@@ -75,12 +77,17 @@ class ParameterSpec:
 
 @dataclass(frozen=True, slots=True)
 class PublisherSpec:
-    """A publisher."""
+    """A publisher.
+
+    Attributes:
+        external: Whether its subscriptions are in no file.
+    """
 
     name: str
     type: str
     topic: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -92,6 +99,7 @@ class SubscriptionSpec:
         behaviour: `None` if messages are passed on as they are.
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
+        external: Whether its publishers are in no file.
     """
 
     name: str
@@ -102,6 +110,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     on_error: OnError
+    external: bool
     path: DataPath
 
 
@@ -145,12 +154,17 @@ class ServiceSpec:
 
 @dataclass(frozen=True, slots=True)
 class ServiceClientSpec:
-    """A service that behaviours call."""
+    """A service that behaviours call.
+
+    Attributes:
+        external: Whether its server is in no file.
+    """
 
     name: str
     type: str
     service: str
     qos: QosSpec
+    external: bool
     path: DataPath
 
 
@@ -179,6 +193,7 @@ class ActionClientSpec:
     Attributes:
         feedback: Hears the feedback to each goal.
         result: Hears the result of each goal.
+        external: Whether its server is in no file.
     """
 
     name: str
@@ -186,6 +201,7 @@ class ActionClientSpec:
     action: str
     feedback: BehaviourSpec | None
     result: BehaviourSpec | None
+    external: bool
     path: DataPath
 
 
@@ -195,6 +211,10 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        parameter_services: Whether others can list, read and set its parameters.
+        rosout: Whether what it logs goes to `/rosout`, too.
+        type_description_service: Whether it answers which types it uses.
+        logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
     """
@@ -204,6 +224,10 @@ class NodeSpec:
     description: str
     log_level: LogLevel | None
     use_sim_time: bool
+    parameter_services: bool
+    rosout: bool
+    type_description_service: bool
+    logger_services: bool
     on_error: OnError
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
@@ -219,6 +243,11 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/arm`."""
+        return join_names(self.namespace, self.name)
 
     @property
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
@@ -249,14 +278,16 @@ class SystemSpec:
         name: The file's name without its ending.
         interfaces: The folders of interface packages to build if they are not installed.
         qos: The named profiles of the file.
-        threads: How many callbacks may run at the same time.
+        threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
+        diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
     """
 
     name: str
     description: str
     interfaces: Mapping[str, str]
     qos: Mapping[str, QosSpec]
-    threads: int
+    threads: int | None
     shutdown_timeout_sec: float
+    diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]

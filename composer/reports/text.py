@@ -5,38 +5,97 @@ from __future__ import annotations
 import unicodedata
 from typing import TYPE_CHECKING
 
+import click
+
+from composer.diagnostics import Severity
+from composer.reports.report import count_severities
+
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
+    from composer.reports.report import Report
 
 # Of longer lines only the surroundings of the fault are shown.
 _WIDEST_LINE = 160
 
+_COLOURS = {Severity.ERROR: 'red', Severity.WARNING: 'yellow'}
 
-def render_finding(finding: Diagnostic) -> str:
+
+def render_report(report: Report) -> str:
+    """Return all findings, and a line for each file without any."""
+    return render_files(report, colour=False)
+
+
+def render_files(report: Report, *, colour: bool, is_quiet: bool = False) -> str:
+    """Return all findings; unless `is_quiet`, also a line for each file without any."""
+    blocks = []
+    shown: set[object] = set()
+    for file in report.files:
+        fresh = [finding for finding in file.findings if finding.sort_key not in shown]
+        shown |= {finding.sort_key for finding in fresh}
+        blocks += [f'{render_finding(finding, colour=colour)}\n\n' for finding in fresh]
+        if not file.findings and file.nodes is not None and not is_quiet:
+            blocks.append(f'{escape(file.name)}: ok, {count(file.nodes, "node")}\n')
+    return ''.join(blocks)
+
+
+def summarize(findings: list[Diagnostic]) -> str:
+    """Return `2 faults and 1 warning in 1 file`."""
+    errors, warnings = count_severities(findings)
+    counts = [count(errors, 'fault')] if errors else []
+    counts += [count(warnings, 'warning')] if warnings else []
+    files = len({finding.file for finding in findings})
+    return f'{" and ".join(counts)} in {count(files, "file")}'
+
+
+def count(number: int, noun: str) -> str:
+    """Return `1 node`, `2 nodes`."""
+    return f'{number} {noun}' if number == 1 else f'{number} {noun}s'
+
+
+def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
     """Return a finding as it is shown on a terminal; without a newline at its end."""
-    place = str(finding.span) if finding.span and finding.span.length else finding.file
-    if finding.span and not finding.span.length:
-        place = f'{finding.file}:{finding.span.line}:{finding.span.column}'
-    lines = [f'{place}: {finding.severity.value}[{finding.rule}]: {_escaped(finding.message)}']
-    if finding.span:
-        lines += _render_excerpt(finding.span)
-    lines += [f'  {related.span}: {related.message}' for related in finding.related]
+    style = click.style if colour else _plain
+    span = finding.span
+    place = f'{finding.file}:{span.line}:{span.column}' if span else finding.file
+    hue = _COLOURS[finding.severity]
+    rule = style(f'{finding.severity.value}[{finding.rule}]', fg=hue, bold=True)
+    lines = [f'{style(f"{escape(place)}:", bold=True)} {rule}: {escape(finding.message)}']
+    if span:
+        shown, carets = _render_excerpt(span) or ('', '')
+        lines += [shown, style(carets, fg=hue)] if shown else []
+    lines += [
+        f'  {escape(str(related.span))}: {escape(related.message)}' for related in finding.related
+    ]
     if finding.help:
-        lines.append(f'  help: {_escaped(finding.help)}')
+        lines.append(f'  {style("help:", fg="cyan")} {escape(finding.help)}')
     return '\n'.join(lines)
 
 
-def _render_excerpt(span: Span) -> list[str]:
+def escape(text: str) -> str:
+    """Return a text on one line, with what a terminal would obey written as escapes."""
+    if text.isprintable():
+        return text
+    return ''.join(
+        character if character.isprintable() else character.encode('unicode_escape').decode()
+        for character in text
+    )
+
+
+def _plain(text: str, **_style: object) -> str:
+    return text
+
+
+def _render_excerpt(span: Span) -> tuple[str, str] | None:
     text, start = _cropped(span.source.line(span.line), span.column - 1)
     if not text.strip():
-        return []
+        return None
     number = str(span.line)
     before = text[:start]
     marked = text[start : start + span.length]
     indent = ''.join(' ' * _width(character) for character in before)
     carets = '^' * max(sum(map(_width, marked)), 1)
     shown = ''.join(' ' if character == '\t' else _printable(character) for character in text)
-    return [f'  {number} | {shown}', f'  {" " * len(number)} | {indent}{carets}']
+    return f'  {number} | {shown}', f'  {" " * len(number)} | {indent}{carets}'
 
 
 def _cropped(text: str, start: int) -> tuple[str, int]:
@@ -50,14 +109,6 @@ def _width(character: str) -> int:
     if unicodedata.combining(character):
         return 0
     return 2 if unicodedata.east_asian_width(character) in 'WF' else 1
-
-
-def _escaped(text: str) -> str:
-    """Return a text on one line, with what a terminal would obey written as escapes."""
-    return ''.join(
-        character if character.isprintable() else character.encode('unicode_escape').decode()
-        for character in text
-    )
 
 
 def _printable(character: str) -> str:

@@ -37,9 +37,9 @@ def test_the_first_thousand_findings_are_shown_and_that_there_are_more(text, rul
 def test_a_message_that_quotes_enormous_text_is_cut():
     text = 'version: 1\nx-l: &l "' + 'a b' * 100_000 + '"\n'
     text += 'nodes: {n: {publishers: {p: {type: std_msgs/msg/String, topic: *l}}}}\n'
-    (finding,) = check(text)
-    assert len(finding.message) < 3000
-    assert finding.message.startswith("'a ba ba b")
+    messages = [finding.message for finding in check(text)]
+    assert any(message.startswith("'a ba ba b") for message in messages)
+    assert all(len(message) < 3000 for message in messages)
 
 
 def test_a_message_holds_nothing_that_a_terminal_would_obey():

@@ -169,7 +169,7 @@ version: 1
 interfaces: {my_defs: defs}
 nodes:
   a:
-    publishers: {p: my_defs/msg/Thing}
+    publishers: {p: {type: my_defs/msg/Thing, external: true}}
     timers: {t: {period: 1, publish: p, message: {x: 1}}}
 """
 

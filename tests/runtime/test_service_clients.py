@@ -121,7 +121,8 @@ def insist(node):
             time.sleep(0.05)
 
 def undeclared(node):
-    node.call('asc')
+    name = 'asc'
+    node.call(name)
 
 def wrong_request(node):
     node.call('ask', {'dat': True})
@@ -332,7 +333,7 @@ def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
     assert server.stdout.readline() == 'asked\n'
     server.kill()
 
-    line = child.wait_for_line("'/ask'")
+    line = child.wait_for_line("CallTimeoutError: '/ask'")
     assert line == (
         "[INFO] [client]: CallTimeoutError: '/ask' did not answer within 2 s (None), 0 pending"
     )

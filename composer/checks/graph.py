@@ -1,0 +1,213 @@
+"""Who meets whom: all publishers, subscriptions, servers and clients by their full names.
+
+Names are resolved as ROS does: namespaces, private names, then the node's remapping rules. ROS 2
+Jazzy does not remap the names of actions, only those of the topics and services they consist of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from composer.names import expand_name, join_names, remap_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.language.positions import DataPath
+    from composer.language.specs import (
+        ActionClientSpec,
+        ActionSpec,
+        NodeSpec,
+        PublisherSpec,
+        QosSpec,
+        ServiceClientSpec,
+        ServiceSpec,
+        SubscriptionSpec,
+    )
+
+    Entity: TypeAlias = (
+        PublisherSpec
+        | SubscriptionSpec
+        | ServiceSpec
+        | ServiceClientSpec
+        | ActionSpec
+        | ActionClientSpec
+    )
+
+ChannelKind: TypeAlias = Literal['topic', 'service', 'action']
+
+# By the sections of a node: what meets under one name, and the entity in words.
+_SECTIONS: dict[str, tuple[ChannelKind, str]] = {
+    'publishers': ('topic', 'publisher'),
+    'subscriptions': ('topic', 'subscription'),
+    'services': ('service', 'service'),
+    'service_clients': ('service', 'service client'),
+    'actions': ('action', 'action'),
+    'action_clients': ('action', 'action client'),
+}
+_PROVIDING = ('publishers', 'services', 'actions')
+_SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """One end of a channel.
+
+    Attributes:
+        noun: Its kind in words, as in `service client`.
+    """
+
+    node: NodeSpec
+    entity: Entity
+    noun: str
+
+    @property
+    def path(self) -> DataPath:
+        """Where it is declared."""
+        return self.entity.path
+
+    @property
+    def qos(self) -> QosSpec | None:
+        """The QoS as declared; actions have none."""
+        return getattr(self.entity, 'qos', None)
+
+    def __str__(self) -> str:
+        """Return `publisher 'scan' of node 'lidar'`."""
+        return f"{self.noun} '{self.entity.name}' of node '{self.node.name}'"
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic, service or action, and who meets there.
+
+    Attributes:
+        providers: Its publishers, or its servers.
+        users: Its subscriptions, or its clients.
+    """
+
+    kind: ChannelKind
+    name: str
+    providers: list[Endpoint] = field(default_factory=list)
+    users: list[Endpoint] = field(default_factory=list)
+
+    @property
+    def ends(self) -> list[Endpoint]:
+        """All ends."""
+        return [*self.providers, *self.users]
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """All channels of a system.
+
+    Attributes:
+        nodes: The full names of the nodes.
+        unsure: The kinds of channels that may have further ends: a name hangs on an argument
+            that is not given yet, or is missing for a fault of its own.
+    """
+
+    channels: dict[tuple[ChannelKind, str], Channel]
+    nodes: frozenset[str]
+    unsure: frozenset[ChannelKind]
+
+    def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
+        """Yield the channels of a kind."""
+        return (channel for channel in self.channels.values() if channel.kind == kind)
+
+
+def build_graph(context: CheckContext) -> Graph:
+    """Return who meets whom in a system."""
+    doubts = _Doubts(context)
+    channels: dict[tuple[ChannelKind, str], Channel] = {}
+    unsure = set(doubts.lacking)
+    for node in context.spec.nodes.values():
+        for section, (kind, noun) in _SECTIONS.items():
+            for entity in getattr(node, section).values():
+                if doubts.about_name(node, entity.path, kind):
+                    unsure.add(kind)
+                    continue
+                name = full_name(node, kind, getattr(entity, kind))
+                channel = channels.setdefault((kind, name), Channel(kind, name))
+                ends = channel.providers if section in _PROVIDING else channel.users
+                ends.append(Endpoint(node, entity, noun))
+    nodes = (join_names(node.namespace, node.name) for node in context.spec.nodes.values())
+    return Graph(channels, frozenset(nodes), frozenset(unsure))
+
+
+def full_name(node: NodeSpec, kind: ChannelKind, name: str) -> str:
+    """Return the name of a node's topic, service or action as others see it."""
+    full = expand_name(name, node.name, node.namespace)
+    if not node.remap or kind not in _SCHEMES:
+        return full
+    return remap_name(full, node.remap, node.name, node.namespace, _SCHEMES[kind])
+
+
+class _Doubts:
+    """Which names are not the real ones: samples, and what stands in for something wrong."""
+
+    def __init__(self, context: CheckContext) -> None:
+        positions = context.system.positions
+        sampled = set(context.system.sampled)
+        paths = {
+            path
+            for spans in ((positions.keys, positions.values) if sampled else ())
+            for path, span in spans.items()
+            if span in sampled
+        }
+        self._paths = paths | context.system.dropped
+        self.lacking = {
+            kind
+            for path in context.system.dropped
+            if path[:1] == ('nodes',) and len(path) <= _DEPTH_OF_ENTITIES
+            for kind in _kinds_in(path)
+        }
+        self._nodes = {
+            path[1]
+            for path in self._paths
+            if path[:1] == ('nodes',) and len(path) > 1 and _moves_node(path)
+        }
+        self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
+
+    def about_name(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
+        """Return whether an entity may have another name than it seems."""
+        if not self._paths:
+            return False
+        return (
+            self._all
+            or node.path[-1] in self._nodes
+            or entity in self._paths
+            or (*entity, kind) in self._paths
+        )
+
+
+# Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
+_DEPTH_OF_SECTIONS = 2
+_DEPTH_OF_ENTITIES = 4
+_WITHOUT_CHANNELS = {
+    'description',
+    'log_level',
+    'on_error',
+    'on_parameters',
+    'on_start',
+    'on_stop',
+    'parameters',
+    'state',
+    'timers',
+    'use_sim_time',
+}
+
+
+def _kinds_in(path: DataPath) -> set[ChannelKind]:
+    """Return of what kinds of channels ends are missing without the data at a path."""
+    section = str(path[_DEPTH_OF_SECTIONS]) if len(path) > _DEPTH_OF_SECTIONS else ''
+    if section in _SECTIONS:
+        return {_SECTIONS[section][0]}
+    # An unknown key may be any section, misspelt.
+    return set() if section in _WITHOUT_CHANNELS else {'topic', 'service', 'action'}
+
+
+def _moves_node(path: DataPath) -> bool:
+    """Return whether what is at a path has a say in all names of its node."""
+    return len(path) <= _DEPTH_OF_SECTIONS or path[_DEPTH_OF_SECTIONS] in ('namespace', 'remap')

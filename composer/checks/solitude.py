@@ -1,0 +1,118 @@
+"""Publishers, subscriptions and clients without another end.
+
+A warning: the other end may be elsewhere, which `external: true` says.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Severity
+from composer.names import find_topic_name_fault, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.checks.graph import Channel, Endpoint, Graph
+    from composer.diagnostics import Diagnostic
+
+# What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
+_OF_ROS = {
+    '/clock',
+    '/diagnostics',
+    '/diagnostics_agg',
+    '/diagnostics_toplevel_state',
+    '/parameter_events',
+    '/rosout',
+    '/tf',
+    '/tf_static',
+}
+# Each node of rclpy serves these (`ParameterService`, `TypeDescriptionService`).
+_OF_EVERY_NODE = {
+    'describe_parameters',
+    'get_parameter_types',
+    'get_parameters',
+    'get_type_description',
+    'list_parameters',
+    'set_parameters',
+    'set_parameters_atomically',
+}
+# Topics and services that actions consist of.
+_OF_ACTIONS = '/_action/'
+# Names are compared one by one; a file that wants more suggestions is checked without the rest.
+_MOST_COMPARED = 5_000
+
+_MESSAGES = {
+    'publisher': ('no-subscription', "nothing in this system hears '{}'"),
+    'subscription': ('no-publisher', "nothing in this system publishes '{}'"),
+    'service client': ('no-server', "nothing in this system serves '{}'"),
+    'action client': ('no-server', "nothing in this system serves '{}'"),
+}
+
+
+def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+    """Everyone who needs another end has one, or says that it is elsewhere."""
+    partners = _Partners(graph)
+    for channel in graph.channels.values():
+        if not _is_alone(graph, channel):
+            continue
+        for end in channel.ends:
+            if end.noun in _MESSAGES and not getattr(end.entity, 'external', True):
+                near = partners.nearest(channel, end)
+                yield _explain(context, channel, end, near)
+
+
+def _is_alone(graph: Graph, channel: Channel) -> bool:
+    if channel.providers and channel.users:
+        return False
+    if channel.kind in graph.unsure or channel.name in _OF_ROS or _OF_ACTIONS in channel.name:
+        return False
+    if find_topic_name_fault(channel.name):
+        # That is a finding of its own.
+        return False
+    owner, _, last = channel.name.rpartition('/')
+    if channel.kind != 'service' or last not in _OF_EVERY_NODE:
+        return True
+    return owner not in graph.nodes
+
+
+def _explain(
+    context: CheckContext, channel: Channel, end: Endpoint, near: str | None
+) -> Diagnostic:
+    rule, message = _MESSAGES[end.noun]
+    inner = (*end.path, channel.kind)
+    at = context.at_value if inner in context.system.positions.values else context.at_key
+    help_text = "say 'external: true' if the other end is elsewhere"
+    return at(
+        inner,
+        rule,
+        message.format(channel.name),
+        help=f"did you mean '{near}'? Otherwise {help_text}" if near else help_text,
+        severity=Severity.WARNING,
+    )
+
+
+class _Partners:
+    """Whom those without another end may have meant: names with an end of the right type."""
+
+    def __init__(self, graph: Graph) -> None:
+        # Names are compared without their namespaces, in which all names look alike.
+        self._names: dict[tuple[str, str, bool], dict[str, str]] = {}
+        for channel in graph.channels.values():
+            last = channel.name.rpartition('/')[2]
+            for ends, provides in ((channel.providers, True), (channel.users, False)):
+                for end in ends:
+                    key = (channel.kind, end.entity.type, provides)
+                    self._names.setdefault(key, {})[last] = channel.name
+        self._comparisons = 0
+
+    def nearest(self, channel: Channel, end: Endpoint) -> str | None:
+        """Return the full name that was most likely meant."""
+        wants_provider = bool(channel.users)
+        names = self._names.get((channel.kind, end.entity.type, wants_provider), {})
+        self._comparisons += len(names)
+        if self._comparisons > _MOST_COMPARED:
+            return None
+        near = suggest(channel.name.rpartition('/')[2], names)
+        return names[near] if near else None

@@ -1,0 +1,2 @@
+def steer(node, heading):
+    node.state.heading = heading

@@ -1,0 +1,5 @@
+RATE_HZ = int('10')
+
+
+def start(node):
+    return RATE_HZ

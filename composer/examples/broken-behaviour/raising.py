@@ -1,0 +1,5 @@
+RATE_HZ = int('ten')
+
+
+def start(node):
+    return RATE_HZ

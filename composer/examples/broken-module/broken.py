@@ -1,0 +1,2 @@
+def start(node):
+    return (3

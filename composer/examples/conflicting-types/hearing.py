@@ -1,0 +1,2 @@
+def hear(node, message):
+    node.logger.info(str(message.data))

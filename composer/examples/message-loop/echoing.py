@@ -1,0 +1,2 @@
+def answer(node, message):
+    return f'You said {message.data}'

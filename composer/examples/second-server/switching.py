@@ -1,0 +1,3 @@
+def switch(node, request):
+    node.state.on = request.data
+    return {'success': True}

@@ -1,0 +1,5 @@
+SPEED = 3
+
+
+def start(node):
+    node.state.speed = SPEED

@@ -1,0 +1,11 @@
+def switch(node, request):
+    node.state.on = request.data
+    return {'success': True}
+
+
+def turn_on(node):
+    node.call('switch', True)
+
+
+def turn_off(node):
+    node.call('swich', False)

@@ -1,0 +1,2 @@
+def drive(node):
+    node.state.distance += node.parameters.speed

@@ -1,0 +1,89 @@
+"""Comments that silence rules: `# composer: ignore[rule, rule]`, for the line they stand in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import yaml
+
+from composer.diagnostics import Span
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.diagnostics import SourceFile
+
+_MARK = 'composer:'
+_COMMENT = re.compile(r'(?:^|(?<=\s))#\s*composer:\s*ignore\b\s*(?:\[(?P<rules>[^\]]*)\])?')
+_RULE = re.compile(r'[^\s,]+')
+_Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+# Line and column, both counted from 0.
+_Place: TypeAlias = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class IgnoreComment:
+    """A comment that silences rules.
+
+    Attributes:
+        rules: Where each of them is named; `text` is the name.
+    """
+
+    span: Span
+    rules: tuple[Span, ...]
+
+
+def read_ignore_comments(source: SourceFile) -> list[IgnoreComment]:
+    """Return the comments of a file that silence rules; what looks like one in a scalar is text.
+
+    Of a text that is not YAML those before the fault are returned.
+    """
+    if not any(_MARK in line for line in source.lines):
+        return []
+    found = list(_find_candidates(source))
+    if not found:
+        return []
+    texts, end = _find_scalars(source)
+    return [
+        comment
+        for comment in found
+        if (place := _place(comment.span)) < end
+        and not any(start <= place < stop for start, stop in texts)
+    ]
+
+
+def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
+    for number, line in enumerate(source.lines, start=1):
+        for match in _COMMENT.finditer(line) if _MARK in line else ():
+            start = match.start('rules')
+            rules = tuple(
+                Span(source, number, start + rule.start() + 1, len(rule.group()))
+                for rule in _RULE.finditer(match.group('rules') or '')
+            )
+            span = Span(source, number, match.start() + 1, match.end() - match.start())
+            yield IgnoreComment(span, rules)
+
+
+def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:
+    """Return where scalars reach from and to, and where the text stops being YAML."""
+    found = []
+    try:
+        for token in yaml.scan('\n'.join(source.lines), Loader=_Loader):
+            if isinstance(token, yaml.ScalarToken):
+                start = token.start_mark.line, token.start_mark.column
+                if token.style in ('|', '>'):
+                    # A comment may stand behind the indicator; the text begins in the next line.
+                    start = token.start_mark.line + 1, 0
+                found.append((start, (token.end_mark.line, token.end_mark.column)))
+    except yaml.MarkedYAMLError as error:
+        mark = error.context_mark or error.problem_mark
+        return found, (mark.line, mark.column) if mark else (0, 0)
+    except yaml.YAMLError:
+        return found, (0, 0)
+    return found, (len(source.lines), 0)
+
+
+def _place(span: Span) -> _Place:
+    return span.line - 1, span.column - 1

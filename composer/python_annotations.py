@@ -1,0 +1,95 @@
+"""What an annotation says, told by the imports of its module and without running it."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_BUILTINS = {'bool', 'bytes', 'dict', 'float', 'int', 'list', 'set', 'str', 'tuple'}
+_GENERATORS = {'AsyncGenerator', 'AsyncIterable', 'AsyncIterator'} | {
+    'Generator',
+    'Iterable',
+    'Iterator',
+}
+_KINDS = ('msg', 'srv', 'action')
+_PARTS = {
+    'srv': {'Request', 'Response'},
+    'action': {'Goal', 'Result', 'Feedback'},
+}
+# `package.kind.Name`
+_LENGTH = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Annotation:
+    """What could be told of an annotation; nothing, for one that may mean anything.
+
+    Attributes:
+        interface: The full name of an interface type, as in `std_msgs/msg/String` or
+            `std_srvs/srv/SetBool_Request`.
+        builtin: The name of a built-in type, as in `str`.
+        items: What a generator yields, and what it returns last.
+    """
+
+    interface: str | None = None
+    builtin: str | None = None
+    items: tuple[ast.expr, ...] = ()
+
+
+def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> Annotation:
+    """Return what an annotation of a module says.
+
+    Args:
+        imports: What the module's names stand for, in full with dots.
+    """
+    if isinstance(expression, ast.Constant) and isinstance(expression.value, str):
+        try:
+            expression = ast.parse(expression.value, mode='eval').body
+        except (SyntaxError, ValueError):
+            return Annotation()
+    if isinstance(expression, ast.Subscript):
+        return _read_subscript(expression)
+    name = _dotted(expression)
+    if name in _BUILTINS and name not in imports:
+        return Annotation(builtin=name)
+    first, separator, rest = name.partition('.')
+    full = imports.get(first)
+    return Annotation(interface=_interface(full + separator + rest)) if full else Annotation()
+
+
+def _read_subscript(expression: ast.Subscript) -> Annotation:
+    name = _dotted(expression.value)
+    if name in _BUILTINS:
+        return Annotation(builtin=name)
+    if name.rpartition('.')[2] in _GENERATORS:
+        items = expression.slice
+        return Annotation(items=tuple(items.elts if isinstance(items, ast.Tuple) else [items]))
+    return Annotation()
+
+
+def _dotted(expression: ast.expr | None) -> str:
+    """Return `a.b.c`, or nothing if it is no such thing."""
+    if isinstance(expression, ast.Name):
+        return expression.id
+    if isinstance(expression, ast.Attribute):
+        before = _dotted(expression.value)
+        return f'{before}.{expression.attr}' if before else ''
+    return ''
+
+
+def _interface(name: str) -> str | None:
+    """Return the interface type that a dotted name is, as generated packages name them."""
+    # The classes lie in modules with an underscore first, such as `std_msgs.msg._string`.
+    parts = [part for part in name.split('.') if not part.startswith('_')]
+    if len(parts) < _LENGTH or parts[1] not in _KINDS or not parts[2][:1].isupper():
+        return None
+    full = '/'.join(parts[:_LENGTH])
+    if len(parts) == _LENGTH:
+        return full
+    inner = parts[_LENGTH]
+    is_part = len(parts) == _LENGTH + 1 and inner in _PARTS.get(parts[1], ())
+    return f'{full}_{inner}' if is_part else None

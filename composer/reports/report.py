@@ -1,0 +1,68 @@
+"""What a check found, as every format shows it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Severity, has_errors
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedFile:
+    """A file and what is wrong with it.
+
+    Attributes:
+        name: The path as the user wrote it.
+        findings: From top to bottom; also those in files that this one names.
+        nodes: How many nodes it declares; `None` if it could not be read.
+    """
+
+    name: str
+    findings: tuple[Diagnostic, ...] = ()
+    nodes: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All that a run of `composer check` found.
+
+    Attributes:
+        not_checked: What could not be looked at on this machine, a line each.
+        is_strict: Whether warnings count as faults.
+    """
+
+    files: tuple[CheckedFile, ...]
+    not_checked: tuple[str, ...] = ()
+    is_strict: bool = False
+
+    @property
+    def findings(self) -> list[Diagnostic]:
+        """All findings, file by file; what several files share is found once."""
+        found = [finding for file in self.files for finding in file.findings]
+        return list({finding.sort_key: finding for finding in reversed(found)}.values())[::-1]
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether anything found forbids a start, or counts as if it did."""
+        return has_errors(self.findings) or (self.is_strict and bool(self.findings))
+
+
+def count_severities(findings: list[Diagnostic]) -> tuple[int, int]:
+    """Return how many errors and how many warnings there are."""
+    errors = sum(finding.severity is Severity.ERROR for finding in findings)
+    return errors, len(findings) - errors
+
+
+def relative_path(name: str) -> str:
+    """Return a path relative to the working folder if it lies in it, with forward slashes."""
+    if name.startswith('<'):
+        return name
+    path = Path(os.path.abspath(name))  # noqa: PTH100 - `resolve` would follow links
+    folder = Path.cwd()
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()

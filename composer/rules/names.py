@@ -1,0 +1,27 @@
+"""Rules of the names that ROS will see."""
+
+from __future__ import annotations
+
+from composer.rules.record import Family, Rule
+
+_NAMES = 'https://design.ros2.org/articles/topic_and_service_names.html'
+
+NAMES = Family(
+    'names',
+    "names, by ROS's own rules",
+    (
+        Rule(
+            'bad-name',
+            'A node, namespace, topic, service, action, parameter or QoS profile has a name that '
+            'ROS does not allow.',
+            'ROS refuses to create it.',
+            _NAMES,
+        ),
+        Rule(
+            'bad-remap',
+            'A remapping rule renames what is not remapped, or has an unknown scheme.',
+            'ROS refuses the rule, or it would be without effect.',
+            'https://docs.ros.org/en/jazzy/How-To-Guides/Node-arguments.html',
+        ),
+    ),
+)

@@ -1,0 +1,194 @@
+"""Annotations against what behaviours are wired to: wrong ones are found, odd ones let pass."""
+
+import pytest
+
+IMPORTS = """\
+from __future__ import annotations
+from typing import Any, Generator, Iterator, Optional, TypeVar, Union, TYPE_CHECKING
+import std_msgs.msg
+import std_msgs.msg as messages
+import geometry_msgs
+from composer import Node
+from elsewhere import Strange
+from std_msgs import msg
+from std_msgs.msg import Float64, Int32, String
+from std_msgs.msg import String as Text
+from std_msgs.msg._string import String as Inner
+from std_srvs.srv import SetBool, SetBool_Request, Trigger
+from geometry_msgs.msg import Point, Twist, Vector3
+try:
+    from std_msgs.msg import Bool
+except ImportError:
+    Bool = None
+T = TypeVar('T')
+"""
+LISTENER = """
+  a:
+    subscriptions: {in: {type: std_msgs/msg/String, external: true, behaviour: parts:hear}}
+"""
+
+
+@pytest.mark.parametrize(
+    'annotation',
+    [
+        'String',
+        'Text',
+        'Inner',
+        'msg.String',
+        'messages.String',
+        'std_msgs.msg.String',
+        "'String'",
+        "'not python'",
+        'Any',
+        'Strange',
+        'Bool',
+        'T',
+        'object',
+        'Optional[Int32]',
+        'Int32 | None',
+        'Union[Int32, String]',
+        'Unknown',
+        'Int32.field',
+        'find()',
+    ],
+)
+def test_a_right_annotation_passes_and_so_does_what_cannot_be_told(check, annotation):
+    code = IMPORTS + f'def hear(node: Node, message: {annotation}): ...\n'
+    assert check(LISTENER, code) == []
+
+
+@pytest.mark.parametrize(
+    ('annotation', 'shown'),
+    [
+        ('Int32', 'std_msgs/msg/Int32'),
+        ('msg.Int32', 'std_msgs/msg/Int32'),
+        ('messages.Int32', 'std_msgs/msg/Int32'),
+        ("'Int32'", 'std_msgs/msg/Int32'),
+        ('geometry_msgs.msg.Twist', 'geometry_msgs/msg/Twist'),
+        ('SetBool.Request', 'std_srvs/srv/SetBool.Request'),
+        ('SetBool_Request', 'std_srvs/srv/SetBool.Request'),
+        ('SetBool', 'std_srvs/srv/SetBool'),
+        ('str', 'str'),
+        ('dict[str, str]', 'dict'),
+    ],
+)
+def test_an_annotation_of_another_type_is_a_fault(check, annotation, shown):
+    code = IMPORTS + f'def hear(node: Node, message: {annotation}): ...\n'
+    assert check(LISTENER, code, rule='wrong-annotation') == [
+        f"'hear' takes a {shown} as 'message', and is given a std_msgs/msg/String"
+    ]
+
+
+def test_the_node_comes_first(check):
+    code = IMPORTS + 'def hear(message: String, node: Node): ...\n'
+    assert check(LISTENER, code, rule='wrong-annotation') == [
+        "'hear' takes a std_msgs/msg/String as 'message', and is given the node first"
+    ]
+
+
+SERVER = """
+  a:
+    services: {set_it: {type: std_srvs/srv/SetBool, behaviour: parts:serve}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('annotations', 'faults'),
+    [
+        ('request: SetBool.Request) -> SetBool.Response', 0),
+        ('request: SetBool_Request) -> dict[str, object]', 0),
+        ('request: SetBool.Request) -> tuple[bool, str]', 0),
+        ('request: SetBool.Response) -> None', 1),
+        ('request: Trigger.Request) -> SetBool.Response', 1),
+        pytest.param('request) -> SetBool.Request', 1, marks=pytest.mark.ros),
+        pytest.param('request) -> bool', 1, marks=pytest.mark.ros),
+    ],
+)
+def test_a_service_is_annotated_with_its_parts(check, annotations, faults):
+    code = IMPORTS + f'def serve(node, {annotations}: ...\n'
+    assert len(check(SERVER, code, rule='wrong-annotation')) == faults
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('published', 'annotation', 'is_right'),
+    [
+        ('std_msgs/msg/String', 'str', True),
+        ('std_msgs/msg/String', 'String', True),
+        ('std_msgs/msg/String', 'dict', True),
+        ('std_msgs/msg/String', 'None', True),
+        ('std_msgs/msg/String', 'Optional[str]', True),
+        ('std_msgs/msg/String', 'Optional[int]', True),
+        ('std_msgs/msg/String', 'int', False),
+        ('std_msgs/msg/String', 'Int32', False),
+        ('std_msgs/msg/Float64', 'int', True),
+        ('std_msgs/msg/Float64', 'float', True),
+        ('std_msgs/msg/Float64', 'str', False),
+        ('std_msgs/msg/Int32', 'float', False),
+        ('geometry_msgs/msg/Twist', 'float', False),
+        ('geometry_msgs/msg/Twist', 'Twist', True),
+        ('geometry_msgs/msg/Point', 'Vector3', False),
+        ('geometry_msgs/msg/Polygon', 'list', True),
+        ('std_msgs/msg/Empty', 'None', True),
+    ],
+)
+def test_what_is_returned_makes_the_message(check, published, annotation, is_right):
+    nodes = f"""
+  a:
+    publishers: {{out: {{type: {published}, external: true}}}}
+    timers: {{tick: {{period: 1, behaviour: parts:tick, publish: out}}}}
+"""
+    code = IMPORTS + f'def tick(node: Node) -> {annotation}: ...\n'
+    assert (check(nodes, code) == []) == is_right
+    generator = IMPORTS + f'def tick(node) -> Generator[{annotation}, None, None]:\n    yield\n'
+    assert (check(nodes, generator) == []) == is_right
+
+
+@pytest.mark.ros
+def test_a_message_may_be_the_sole_field_of_another(check):
+    nodes = """
+  a:
+    publishers: {out: {type: test_msgs/msg/Nested, external: true}}
+    timers: {tick: {period: 1, behaviour: parts:tick, publish: out}}
+"""
+    code = 'from test_msgs.msg import BasicTypes\ndef tick(node) -> BasicTypes: ...\n'
+    assert check(nodes, code) == []
+
+
+@pytest.mark.ros
+def test_types_of_one_name_are_the_same_if_they_have_the_same_fields(check, tmp_path):
+    folder = tmp_path / 'own_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'String.msg').write_text('string data\n')
+    (folder / 'Int32.msg').write_text('int64 data\n')
+    code = 'from own_msgs.msg import Int32, String\n\ndef hear(node, message: {}): ...\n'
+    before = 'interfaces: {own_msgs: own_msgs}\n'
+    assert check(LISTENER, code.format('String'), before=before) == []
+    other = LISTENER.replace('msg/String', 'msg/Int32')
+    found = check(other, code.format('Int32'), before=before)
+    assert [rule for _, rule in found] == ['wrong-annotation']
+
+
+@pytest.mark.ros
+def test_an_action_is_annotated_with_its_parts(check):
+    nodes = """
+  a:
+    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
+    action_clients: {do: {type: test_msgs/action/Fibonacci, feedback: parts:feel, result: parts:end}}
+    on_start: parts:send
+"""
+    code = """
+        from collections.abc import Generator
+        from test_msgs.action import Fibonacci
+
+        def do(node, goal: Fibonacci.{}) -> Generator[{}, None, {}]:
+            yield
+
+        def feel(node, feedback: Fibonacci.{}): ...
+        def end(node, result: Fibonacci.Result): ...
+        def send(node): node.send_goal('do')
+    """
+    right = code.format('Goal', 'list[int]', 'Fibonacci.Result', 'Feedback')
+    assert check(nodes, right) == []
+    wrong = code.format('Result', 'Fibonacci.Goal', 'str', 'Result')
+    assert len(check(nodes, wrong, rule='wrong-annotation')) == 4

@@ -1,0 +1,146 @@
+"""What is written beside the code is true: generated pages, hooks, and the schema's examples."""
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+import composer
+from composer import cli
+from composer.language.schema_file import schema_path
+
+ROOT = Path(composer.__file__).parents[1]
+SCHEMA = json.loads(schema_path().read_text())
+
+
+def generated():
+    spec = importlib.util.spec_from_file_location('generate', ROOT / 'docs' / 'generate.py')
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.generate()
+
+
+@pytest.mark.parametrize('name', ['reference.md', 'rules.md'])
+def test_a_generated_page_is_current(name):
+    current = (ROOT / 'docs' / name).read_text() == generated()[name]
+    assert current, f"docs/{name} is not current: run 'make docs'"
+
+
+def test_the_links_of_a_page_lead_to_its_sections():
+    for text in generated().values():
+        sections = {
+            line.lstrip('# ').lower().replace(' ', '-').replace('`', '')
+            for line in text.splitlines()
+            if re.match('#+ ', line)
+        }
+        assert set(re.findall(r'\]\(#([^)]*)\)', text)) <= sections
+
+
+def test_every_key_has_its_row():
+    page = generated()['reference.md']
+
+    def keys(schema):
+        if isinstance(schema, dict):
+            yield from schema.get('properties', {})
+            for name, value in schema.items():
+                if name != 'examples':
+                    yield from keys(value)
+        elif isinstance(schema, list):
+            for value in schema:
+                yield from keys(value)
+
+    assert [key for key in keys(SCHEMA) if f'| `{key}` |' not in page] == []
+
+
+@pytest.mark.parametrize(
+    ('where', 'example'),
+    [
+        *((None, example) for example in SCHEMA['examples']),
+        *(
+            (name, example)
+            for name, definition in SCHEMA['$defs'].items()
+            for example in definition.get('examples', ())
+        ),
+    ],
+)
+def test_an_example_of_the_schema_fits_it(where, example):
+    schema = SCHEMA if where is None else SCHEMA | {'$ref': f'#/$defs/{where}'}
+    if where is not None:
+        schema = {'$ref': f'#/$defs/{where}', '$defs': SCHEMA['$defs']}
+    Draft202012Validator(schema).validate(example)
+
+
+def test_the_modeline_of_shipped_systems_names_the_schema():
+    for path in (ROOT / 'configs').glob('*.yaml'):
+        first = path.read_text().partition('\n')[0]
+        match = re.fullmatch(r'# yaml-language-server: \$schema=(\S+)', first)
+        assert match, path
+        assert (path.parent / match[1]).resolve() == schema_path().resolve()
+
+
+# Hooks
+
+
+def test_the_hook_runs_a_command_that_there_is(tmp_path):
+    (hook,) = yaml.safe_load((ROOT / '.pre-commit-hooks.yaml').read_text())
+    assert (hook['id'], hook['language'], hook['types']) == ('composer-check', 'python', ['yaml'])
+    (tmp_path / 'rover.yaml').write_text('version: 1\nnodes: {1st: {}}\n')
+    (tmp_path / 'compose.yaml').write_text('version: "3"\nservices: {}\n')
+    words = hook['entry'].split()
+    assert words[0] == 'composer'
+    result = subprocess.run(
+        [sys.executable, '-m', *words, 'compose.yaml', 'rover.yaml'],
+        cwd=tmp_path,
+        env={'PYTHONPATH': str(ROOT), 'PATH': ''},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert result.stdout.count('error[') == 1
+    assert result.stdout.startswith('rover.yaml:2:9: error[bad-name]: ')
+
+
+def test_the_action_checks_what_its_inputs_say(tmp_path):
+    action = yaml.safe_load((ROOT / 'action.yml').read_text())
+    assert set(action['inputs']) == {'files', 'args'}
+    assert action['runs']['using'] == 'composite'
+    script = action['runs']['steps'][-1]['run']
+    (tmp_path / 'composer-check' / 'bin').mkdir(parents=True)
+    command = tmp_path / 'composer-check' / 'bin' / 'composer'
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m composer "$@"\n')
+    command.chmod(0o755)
+    (tmp_path / 'rover.yaml').write_text('version: 1\nnodes: {1st: {}}\n')
+    result = subprocess.run(
+        ['bash', '-e', '-c', script],
+        cwd=tmp_path,
+        env={
+            'PYTHONPATH': str(ROOT),
+            'PATH': '/usr/bin:/bin',
+            'RUNNER_TEMP': str(tmp_path),
+            'FILES': '*.yaml $(touch ran)',
+            'ARGS': '--strict',
+        },
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert '::error file=rover.yaml,line=2,endLine=2,col=9,' in result.stdout
+    assert not (tmp_path / 'ran').exists()
+
+
+@pytest.mark.parametrize('path', ['README.md'])
+def test_the_commands_of_the_recipes_take_their_options(path):
+    text = (ROOT / path).read_text()
+    context = cli.cli.commands['check'].make_context
+    for line in re.findall(r'^\s*(?:\$|-) composer check (.*)$', text, re.MULTILINE):
+        context('check', line.split(), resilient_parsing=True)
