@@ -105,7 +105,7 @@ def _change_tree(chance, text):
         if chance.random() < 0.5:
             return json.dumps(data, ensure_ascii=False, default=str)[:1_000_000]
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError):
+    except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
         return text  # it is broken enough
 
 

@@ -187,7 +187,7 @@ class Generator:
         module, _, name = bound['behaviour'].partition(':')
         body = [f'node.parameters.{each}' for each in node['parameters']]
         body += [f'node.publish({each!r}, None)' for each in node.get('publishers', ())]
-        body += [f'node.call({each!r}, None)' for each in node.get('service_clients', ())]
+        body += [f'node.call_async({each!r}, None)' for each in node.get('service_clients', ())]
         body += [f'node.send_goal({each!r}, None)' for each in node.get('action_clients', ())]
         self.modules[module][name].body = body
         node['on_start'] = self.chance.choice((bound, bound['behaviour']))
