@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from composer.checks.annotations import check_annotations
@@ -15,16 +17,17 @@ from composer.checks.parameters import check_parameters
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
+from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
 from composer.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
     from composer.rules.record import Need
 
 RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
@@ -39,6 +42,7 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_uses,
     check_wiring,
 )
+_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 
 
 def create_context(
@@ -67,10 +71,11 @@ def check_system(
         further: What else is to be checked; it is given what was found so far.
     """
     context, declared = create_context(system, catalogue)
-    found = [finding for rule in RULES for finding in rule(context)] if context else []
+    found = list(_apply_rules(context)) if context else []
+    samples = _by_line(system.sampled)
     if context and further:
-        found += further(context, found)
-    found = [finding for finding in found if not _hangs_on_samples(finding, system)]
+        more = further(context, found)
+        found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias is wrong once.
     once = dict.fromkeys([*system.diagnostics, *declared, *found])
     unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
@@ -78,15 +83,37 @@ def check_system(
     heard = apply_ignore_comments(
         once, system.positions.source, None if system.diagnostics else unchecked
     )
-    return sorted(heard, key=lambda finding: finding.sort_key)
+    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
 
 
-def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:
+def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
+    if len(findings) <= MAX_FINDINGS:
+        return findings
+    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
+    return [*findings[: MAX_FINDINGS - 1], last]
+
+
+def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
+    samples = _by_line(context.system.sampled)
+    for rule in RULES:
+        findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
+        # One more, as a sign that there are more.
+        yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _by_line(spans: Iterable[Span]) -> dict[int, list[Span]]:
+    lines: dict[int, list[Span]] = {}
+    for span in spans:
+        lines.setdefault(span.line, []).append(span)
+    return lines
+
+
+def _hangs_on_samples(finding: Diagnostic, samples: Mapping[int, list[Span]]) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(
-        span.line == place.line and span.column <= place.column < span.column + span.length
-        for span in system.sampled
+        span.column <= place.column < span.column + span.length
+        for span in samples.get(place.line, ())
     )
 
 
