@@ -108,6 +108,32 @@ def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     ]
 
 
+class _PollFd(ctypes.Structure):
+    _fields_ = (('fd', ctypes.c_int), ('events', ctypes.c_short), ('revents', ctypes.c_short))
+
+
+class _TimeSpec(ctypes.Structure):
+    _fields_ = (('sec', ctypes.c_long), ('nsec', ctypes.c_long))
+
+
+_POLLIN = 1
+_libc.ppoll.argtypes = (
+    ctypes.POINTER(_PollFd),
+    ctypes.c_ulong,
+    ctypes.POINTER(_TimeSpec),
+    ctypes.c_void_p,
+)
+
+
+def wait_readable(fd: int, timeout_sec: float) -> None:
+    """Wait until `fd` is readable, a signal comes, or exactly `timeout_sec` has passed.
+
+    Python's own waits count in whole milliseconds and round up.
+    """
+    timeout = _TimeSpec(*divmod(int(timeout_sec * 1e9), 1_000_000_000))
+    _libc.ppoll(ctypes.byref(_PollFd(fd, _POLLIN, 0)), 1, ctypes.byref(timeout), None)
+
+
 def _watcher(function_name: str) -> Callable[[int, int | None], None]:
     function = getattr(_rcl, function_name)
     function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)

@@ -12,7 +12,12 @@ import select
 import threading
 from typing import Protocol
 
-from composer.runtime.executor.rcl import peek_epoll, read_eventfd, write_eventfd
+from composer.runtime.executor.rcl import (
+    peek_epoll,
+    read_eventfd,
+    wait_readable,
+    write_eventfd,
+)
 
 _MOST_EVENTS = 512
 
@@ -132,6 +137,9 @@ class SignalBoard:
 
     def wait(self, timeout_sec: float | None) -> list[tuple[int, int]]:
         """Wait for signals, for ever if `timeout_sec` is None; `deliver` is to follow."""
+        if timeout_sec:
+            wait_readable(self._epoll.fileno(), timeout_sec)
+            timeout_sec = 0
         return self._epoll.poll(timeout_sec, _MOST_EVENTS)
 
     def peek(self) -> list[tuple[int, int]]:
