@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from composer.runtime.executor.forks import end_child
 from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
@@ -36,6 +37,8 @@ class Worker:
         with self._crew.enlisted(self):
             while self.job is not None:
                 self.job(self)
+                if self._crew.is_inherited:
+                    end_child()
                 self.job = None
                 self._crew.rest(self)
 
@@ -46,6 +49,7 @@ class Crew:
     def __init__(self, lead: Callable[[Worker], None]) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
+        self.is_inherited = False
         self._standby: Worker | None = None
         self._lead = lead
         self._timer = TimerFd(blocking=True)
@@ -148,6 +152,15 @@ class Crew:
             time.sleep(_POLL_SEC)
         if not self._workers:
             self._timer.close()
+
+    def leave_to_parent(self) -> None:
+        """Be without threads, but for one whose callback forked this process."""
+        self.is_inherited = True
+        self.leader = self._standby = None
+        self._spares.clear()
+        mine = threading.get_ident()
+        self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
+        self._timer.leave_to_parent()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""

@@ -13,6 +13,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from composer.runtime.executor.alarms import Alarms, Delay
 from composer.runtime.executor.crew import PATIENCE_SEC, Crew, Worker
 from composer.runtime.executor.execution import Execution
+from composer.runtime.executor.forks import end_child, free_locks
 from composer.runtime.executor.lane import Lane
 from composer.runtime.executor.news import News
 from composer.runtime.executor.registry import Registry
@@ -59,6 +60,8 @@ class Engine:
 
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins, unless it tells of a lost context."""
+        if self.crew.is_inherited:
+            end_child(error)
         if isinstance(error, _rclpy.RCLError) and not self.context_is_valid():
             return
         self._errors.append(error)
@@ -114,7 +117,8 @@ class Engine:
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         self.lane.enter()
         try:
-            self._look_at_everything()
+            if self.is_alive():
+                self._look_at_everything()
             while self.is_alive() and not condition() and not self._run_one():
                 left = None if deadline is None else deadline - time.monotonic()
                 if left is not None and left <= 0:
@@ -280,6 +284,16 @@ class Engine:
 
     def _is_admitting(self) -> bool:
         return self.schedule.admitting
+
+    def leave_to_parent(self) -> None:
+        """Be shut down: this process was forked, and all of this is its parent's."""
+        parts = (self.executor, self.schedule, self.alarms, self.news, self._board)
+        free_locks((self, *parts, self.lane, self.registry, self.crew))
+        self.is_shutdown = True
+        self.schedule.leave_to_parent(int(self.crew.is_in_callback()))
+        self._pollers.clear()
+        for part in (self._board, self.alarms.timer, self.lane, self.registry, self.crew):
+            part.leave_to_parent()
 
     def tear_down(self, nodes: list[Any]) -> None:
         """Let go of the entities of `nodes`, the threads and what they waited for."""

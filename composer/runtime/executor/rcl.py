@@ -22,6 +22,7 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.errors import ComposerError
+from composer.runtime.executor.forks import lay_over
 
 _CLOCK_MONOTONIC = 1
 _TFD_TIMER_ABSTIME = 1
@@ -187,11 +188,22 @@ class TimerFd:
     """A kernel timer on the monotonic clock that makes a file descriptor readable."""
 
     def __init__(self, *, blocking: bool) -> None:
-        flags = os.O_CLOEXEC if blocking else os.O_CLOEXEC | os.O_NONBLOCK
         self._blocking = blocking
-        self.fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
-        if self.fd < 0:
+        self.fd = self._create()
+
+    def _create(self) -> int:
+        flags = os.O_CLOEXEC if self._blocking else os.O_CLOEXEC | os.O_NONBLOCK
+        fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
+        if fd < 0:
             raise OSError(ctypes.get_errno(), 'timerfd_create failed')
+        return fd
+
+    def leave_to_parent(self) -> None:
+        """Be a timer that the parent of this process has not."""
+        if self.fd >= 0:
+            fresh = self._create()
+            lay_over((self.fd,), fresh)
+            os.close(fresh)
 
     def set_ns(self, deadline_ns: int) -> None:
         """Expire once at `deadline_ns` of `time.monotonic_ns()`; at once if that has passed."""

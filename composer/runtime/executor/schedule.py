@@ -144,6 +144,12 @@ class Schedule:
             if source is not None and not suspended:
                 self._release(source)
 
+    def leave_to_parent(self, executing: int) -> None:
+        """Begin nothing; of all callbacks under way, only `executing` are in this process."""
+        self.admitting = False
+        self.executing = executing
+        self.waiting = 0
+
     def refuse(self, source: Source) -> None:
         """Undo a claim of `source`, whose group would not have it; `retry` brings it back."""
         with self.lock:

@@ -12,6 +12,7 @@ import select
 import threading
 from typing import Protocol
 
+from composer.runtime.executor.forks import lay_over
 from composer.runtime.executor.rcl import (
     peek_epoll,
     read_eventfd,
@@ -156,6 +157,18 @@ class SignalBoard:
                 read_eventfd(self._wake_fd)
             else:
                 self._others[fd].on_signal(1)
+
+    def leave_to_parent(self) -> None:
+        """Have descriptors that the parent of this process has not; they say nothing."""
+        if self._epoll.closed:
+            return
+        eventfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        lay_over((self._wake_fd, *self._signals), eventfd)
+        os.close(eventfd)
+        with select.epoll() as epoll:
+            lay_over((self._epoll.fileno(),), epoll.fileno())
+        self._signals.clear()
+        self._others.clear()
 
     def close(self) -> None:
         """Give back every descriptor; nothing else is called after that."""

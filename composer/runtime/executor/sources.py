@@ -14,6 +14,7 @@ from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
 from composer.runtime.executor import rcl
+from composer.runtime.executor.forks import end_child
 from composer.runtime.executor.missed import Missed
 from composer.runtime.executor.schedule import Group, Schedule
 from composer.runtime.executor.signals import UNKNOWN
@@ -250,6 +251,8 @@ class ServiceSource(Source):
             return NOTHING
         callback = service.callback
         response = callback(request, service.srv_type.Response())
+        if self.desk.executor.is_inherited:
+            end_child()
         if self._is_async(callback):
             return self._respond(response, header)
         service.send_response(response, header)
