@@ -69,6 +69,10 @@ class Schedule:
     def __len__(self) -> int:
         return len(self._ready) + len(self._runs) + len(self._new_runs)
 
+    def count_runs(self) -> int:
+        """Return how many tasks could run now."""
+        return len(self._runs) + len(self._new_runs)
+
     def can_admit(self) -> bool:
         """Tell whether one more callback may run."""
         return self.executing - self.waiting < self._most_at_once

@@ -24,7 +24,9 @@ _MOST_EVENTS = 512
 
 
 class Listener(Protocol):
-    """What wants to hear of an announcement."""
+    """What wants to hear of an announcement; of several at a time, the least `rank` first."""
+
+    rank: int
 
     def on_signal(self, count: int) -> None:
         """Take note of `count` announcements; the count may be too high, never too low."""
@@ -69,8 +71,9 @@ _descriptors = _Descriptors()
 class Signal:
     """One eventfd and who listens to it."""
 
-    def __init__(self, fd: int) -> None:
+    def __init__(self, fd: int, rank: int) -> None:
         self.fd = fd
+        self.rank = rank
         self.listeners: list[Listener] = []
 
     def on_signal(self) -> None:
@@ -108,7 +111,7 @@ class SignalBoard:
         with self._lock:
             if shared is None:
                 try:
-                    shared = Signal(_descriptors.get())
+                    shared = Signal(_descriptors.get(), listener.rank)
                 except OSError:
                     if not self._signals:
                         raise
@@ -149,6 +152,8 @@ class SignalBoard:
 
     def deliver(self, arrived: list[tuple[int, int]]) -> None:
         """Tell the listeners of the signals that `wait` returned."""
+        if len(arrived) > 1:
+            arrived.sort(key=self._rank)
         for fd, _ in arrived:
             signal = self._signals.get(fd)
             if signal is not None:
@@ -157,6 +162,10 @@ class SignalBoard:
                 read_eventfd(self._wake_fd)
             else:
                 self._others[fd].on_signal(1)
+
+    def _rank(self, event: tuple[int, int]) -> int:
+        signal = self._signals.get(event[0])
+        return 0 if signal is None else signal.rank
 
     def leave_to_parent(self) -> None:
         """Have descriptors that the parent of this process has not; they say nothing."""

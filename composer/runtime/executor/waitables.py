@@ -47,6 +47,7 @@ class ActionSource(Source):
     Any of its parts announcing something leads to a look with a wait set of its own.
     """
 
+    rank = 4
     __slots__ = ('_looking', '_parts', '_timers', '_wait_set', '_watched_clock')
 
     def held(self) -> Any:
