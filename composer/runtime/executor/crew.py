@@ -56,6 +56,7 @@ class Crew:
         self._armed = False
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
+        self._hired = 0  # With those whose threads are yet to begin.
         self._dismissed = False
         self._handover: threading.Lock | None = None
 
@@ -69,7 +70,9 @@ class Crew:
         finally:
             # Python 3.11 keeps what it knows of such a thread for ever.
             threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
-            del self._workers[ident]
+            with self.lock:
+                del self._workers[ident]
+                self._hired -= 1
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
@@ -87,6 +90,8 @@ class Crew:
     def muster(self) -> None:
         """See that there are a leader and a standby."""
         with self.lock:
+            if self._dismissed:
+                return
             if self.leader is None:
                 self.leader = self._call(self._lead)
             self._appoint_standby()
@@ -147,11 +152,12 @@ class Crew:
             self._spares.clear()
             self._wake_standby()
         deadline = time.monotonic() + timeout_sec
-        mine = threading.get_ident()
-        while self._workers.keys() - {mine} and time.monotonic() < deadline:
+        mine = int(threading.get_ident() in self._workers)
+        while self._hired > mine and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
-        if not self._workers:
-            self._timer.close()
+        with self.lock:
+            if not self._hired:
+                self._timer.close()
 
     def leave_to_parent(self) -> None:
         """Be without threads, but for one whose callback forked this process."""
@@ -160,11 +166,12 @@ class Crew:
         self._spares.clear()
         mine = threading.get_ident()
         self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
+        self._hired = len(self._workers)
         self._timer.leave_to_parent()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""
-        return bool(self._workers)
+        return bool(self._hired)
 
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
@@ -186,7 +193,9 @@ class Crew:
             worker.job = job
             worker.called.release()
             return worker
-        return Worker(self, job)
+        worker = Worker(self, job)
+        self._hired += 1
+        return worker
 
     def _appoint_standby(self) -> None:
         if self._standby is None:

@@ -49,6 +49,7 @@ class Engine:
         self.registry = Registry(desk, self.lane)
         self.crew = Crew(Leader(self).lead)
         self._sessions = 0
+        self._loners = 0
         self._session_lock = threading.Lock()
         self._settling = 0
         self._errors: deque[BaseException] = deque()
@@ -108,6 +109,8 @@ class Engine:
             timeout_sec = None
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         self.lane.enter()
+        with self._session_lock:
+            self._loners += 1
         try:
             if self.is_alive():
                 self._look_at_everything()
@@ -117,7 +120,11 @@ class Engine:
                     break
                 self._await_work(left)
         finally:
+            with self._session_lock:
+                self._loners -= 1
             self.lane.leave()
+            if self.is_shutdown:
+                self.news.tell()
         self.raise_error()
 
     def settle(self, timeout_sec: float | None) -> bool:
@@ -132,8 +139,9 @@ class Engine:
 
     def stop(self, timeout_sec: float | None) -> bool:
         """Begin no more callbacks, ever; returns whether those that ran have ended in time."""
-        self.is_shutdown = True
-        self.schedule.admitting = False
+        with self._session_lock:
+            self.is_shutdown = True
+            self.schedule.close()
         self.wake()
         return self.settle(timeout_sec)
 
@@ -217,7 +225,9 @@ class Engine:
                 self.registry.drop(node)
         self.lane.close()
         self.crew.dismiss(COURTESY_SEC)
-        if not self.crew.is_manned():
+        if not self.crew.is_in_callback():
+            self.news.wait_for(lambda: not self._loners, COURTESY_SEC)
+        if not self._loners and not self.crew.is_manned():
             self.polling.close()
 
 

@@ -228,9 +228,9 @@ class TimerFd:
 
     def close(self) -> None:
         """Give back the descriptor; nothing else is called after that."""
-        if self.fd >= 0:
-            os.close(self.fd)
-            self.fd = -1
+        fd, self.fd = self.fd, -1
+        if fd >= 0:
+            os.close(fd)
 
     def __del__(self) -> None:
         self.close()

@@ -55,6 +55,7 @@ class Schedule:
         self.executing = 0
         self.waiting = 0
         self.admitting = False
+        self.is_closed = False
         self._most_at_once = most_at_once
         self._wake = wake
         self._ready: deque[Source] = deque()
@@ -131,7 +132,7 @@ class Schedule:
         With `alone`, also while nobody spins: for the one callback of `spin_once`.
         """
         with self.lock:
-            if not (alone or self.admitting) or not self.can_admit():
+            if self.is_closed or not (alone or self.admitting) or not self.can_admit():
                 return None
             if self._prefer_runs:
                 work = self._next_run() or self._next_source()
@@ -140,6 +141,12 @@ class Schedule:
             if work is not None:
                 self.executing += 1
             return work
+
+    def close(self) -> None:
+        """Let nothing be claimed any more."""
+        with self.lock:
+            self.is_closed = True
+            self.admitting = False
 
     def finish(self, source: Source | None, *, suspended: bool = False) -> None:
         """Note that what was claimed has run; `source` frees its group unless it is suspended."""
@@ -150,6 +157,7 @@ class Schedule:
 
     def leave_to_parent(self, executing: int) -> None:
         """Begin nothing; of all callbacks under way, only `executing` are in this process."""
+        self.is_closed = True
         self.admitting = False
         self.executing = executing
         self.waiting = 0

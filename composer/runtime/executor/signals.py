@@ -160,7 +160,7 @@ class SignalBoard:
                 signal.on_signal()
             elif fd == self._wake_fd:
                 read_eventfd(self._wake_fd)
-            else:
+            elif fd in self._others:  # Or it was detached since it came.
                 self._others[fd].on_signal(1)
 
     def _rank(self, event: tuple[int, int]) -> int:
