@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
+import warnings
 from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
@@ -35,7 +36,10 @@ class SystemExecutor(ComposerExecutor):
     """
 
     def __init__(self, context: Context, threads: int | None, log: Callable[[str], None]) -> None:
-        super().__init__(threads, context=context)
+        with warnings.catch_warnings():
+            # rclpy advises against one thread here, but means its own executors.
+            warnings.simplefilter('ignore', UserWarning)
+            super().__init__(threads, context=context)
         self._log = log
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from composer.runtime.executor.forks import end_child
 from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
@@ -34,13 +35,14 @@ class Worker:
         self.called.acquire()
         self._crew = crew
         _thread.start_new_thread(self._work, ())  # Unlike `Thread.start`, it does not wait.
-        crew.threads += 1
 
     def _work(self) -> None:
         threading.current_thread().name = 'executor-worker'
         with self._crew.enlisted(self):
             while self.job is not None:
                 self.job(self)
+                if self._crew.is_inherited:
+                    end_child()
                 self.job = None
                 self._crew.rest(self)
 
@@ -51,7 +53,7 @@ class Crew:
     def __init__(self, lead: Callable[[Worker], None]) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
-        self.threads = 0  # Those too that have only just been made.
+        self.is_inherited = False
         self._standby: Worker | None = None
         self._lead = lead
         self._timer = TimerFd(blocking=True)
@@ -59,6 +61,7 @@ class Crew:
         self._put_off_at = 0.0
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
+        self._hired = 0  # With those whose threads are yet to begin.
         self._dismissed = False
         self._handover: threading.Lock | None = None
 
@@ -74,7 +77,7 @@ class Crew:
             threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
             with self.lock:
                 del self._workers[ident]
-                self.threads -= 1
+                self._hired -= 1
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
@@ -92,6 +95,8 @@ class Crew:
     def muster(self) -> None:
         """See that there are a leader and a standby."""
         with self.lock:
+            if self._dismissed:
+                return
             if self.leader is None:
                 self.leader = self._call(self._lead)
             self._appoint_standby()
@@ -154,14 +159,25 @@ class Crew:
             self._wake_standby()
         deadline = time.monotonic() + timeout_sec
         mine = int(threading.get_ident() in self._workers)
-        while self.threads > mine and time.monotonic() < deadline:
+        while self._hired > mine and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
-        if not self.threads:
-            self._timer.close()
+        with self.lock:
+            if not self._hired:
+                self._timer.close()
+
+    def leave_to_parent(self) -> None:
+        """Be without threads, but for one whose callback forked this process."""
+        self.is_inherited = True
+        self.leader = self._standby = None
+        self._spares.clear()
+        mine = threading.get_ident()
+        self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
+        self._hired = len(self._workers)
+        self._timer.leave_to_parent()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""
-        return self.threads > 0
+        return bool(self._hired)
 
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
@@ -183,7 +199,9 @@ class Crew:
             worker.job = job
             worker.called.release()
             return worker
-        return Worker(self, job)
+        worker = Worker(self, job)
+        self._hired += 1
+        return worker
 
     def _appoint_standby(self) -> None:
         if self._standby is None:

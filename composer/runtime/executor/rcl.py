@@ -21,6 +21,7 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.errors import ComposerError
+from composer.runtime.executor.forks import lay_over
 
 _CLOCK_MONOTONIC = 1
 _TFD_TIMER_ABSTIME = 1
@@ -127,6 +128,32 @@ def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     return arrived
 
 
+class _PollFd(ctypes.Structure):
+    _fields_ = (('fd', ctypes.c_int), ('events', ctypes.c_short), ('revents', ctypes.c_short))
+
+
+class _TimeSpec(ctypes.Structure):
+    _fields_ = (('sec', ctypes.c_long), ('nsec', ctypes.c_long))
+
+
+_POLLIN = 1
+_libc.ppoll.argtypes = (
+    ctypes.POINTER(_PollFd),
+    ctypes.c_ulong,
+    ctypes.POINTER(_TimeSpec),
+    ctypes.c_void_p,
+)
+
+
+def wait_readable(fd: int, timeout_sec: float) -> None:
+    """Wait until `fd` is readable, a signal comes, or exactly `timeout_sec` has passed.
+
+    Python's own waits count in whole milliseconds and round up.
+    """
+    timeout = _TimeSpec(*divmod(int(timeout_sec * 1e9), 1_000_000_000))
+    _libc.ppoll(ctypes.byref(_PollFd(fd, _POLLIN, 0)), 1, ctypes.byref(timeout), None)
+
+
 def _watcher(function_name: str) -> Callable[[int, int | None], None]:
     function = getattr(_rcl, function_name)
     function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -180,11 +207,22 @@ class TimerFd:
     """A kernel timer on the monotonic clock that makes a file descriptor readable."""
 
     def __init__(self, *, blocking: bool) -> None:
-        flags = os.O_CLOEXEC if blocking else os.O_CLOEXEC | os.O_NONBLOCK
         self._blocking = blocking
-        self.fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
-        if self.fd < 0:
+        self.fd = self._create()
+
+    def _create(self) -> int:
+        flags = os.O_CLOEXEC if self._blocking else os.O_CLOEXEC | os.O_NONBLOCK
+        fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
+        if fd < 0:
             raise OSError(ctypes.get_errno(), 'timerfd_create failed')
+        return fd
+
+    def leave_to_parent(self) -> None:
+        """Be a timer that the parent of this process has not."""
+        if self.fd >= 0:
+            fresh = self._create()
+            lay_over((self.fd,), fresh)
+            os.close(fresh)
 
     def set_ns(self, deadline_ns: int) -> None:
         """Expire once at `deadline_ns` of `time.monotonic_ns()`; at once if that has passed."""
@@ -209,9 +247,9 @@ class TimerFd:
 
     def close(self) -> None:
         """Give back the descriptor; nothing else is called after that."""
-        if self.fd >= 0:
-            os.close(self.fd)
-            self.fd = -1
+        fd, self.fd = self.fd, -1
+        if fd >= 0:
+            os.close(fd)
 
     def __del__(self) -> None:
         self.close()
