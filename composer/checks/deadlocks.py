@@ -56,8 +56,7 @@ class _Wait:
 
     @property
     def answering_group(self) -> Group | None:
-        group = getattr(self.server.entity, 'group', None)
-        return None if group == REENTRANT else (self.server.node.name, group or '')
+        return _group_of(self.server.node, getattr(self.server.entity, 'group', None))
 
     def __str__(self) -> str:
         return f"{self.binding.owner} of node '{self.node.name}'"
@@ -98,12 +97,15 @@ def _find_waits(context: CheckContext, graph: Graph) -> Iterator[_Wait]:
 
 def _groups_by_path(node: NodeSpec) -> dict[DataPath, Group]:
     """Return the mutually exclusive group of each behaviour that runs in one."""
-    entities = (*node.triggers, *node.services.values())
-    return {
-        (*entity.path, 'behaviour'): (node.name, entity.group or '')
-        for entity in entities
-        if entity.group != REENTRANT
+    groups = {
+        (*entity.path, 'behaviour'): _group_of(node, entity.group)
+        for entity in (*node.triggers, *node.services.values())
     }
+    return {path: group for path, group in groups.items() if group}
+
+
+def _group_of(node: NodeSpec, name: str | None) -> Group | None:
+    return None if name == REENTRANT else (node.name, name or '')
 
 
 def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
