@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from composer.language.positions import DataPath
     from composer.language.specs import NodeSpec
 
+# Of a chain of calls, how many are named.
+_MOST_SHOWN = 8
+
 # A callback group: the node's name and the group's own.
 Group = tuple[str, str]
 
@@ -189,7 +192,10 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
             'neither can go on'
         )
     else:
-        way = ' → '.join(f"'{wait.service}'" for wait in chain)
+        names = [f"'{wait.service}'" for wait in chain]
+        if len(names) > _MOST_SHOWN:
+            names[_MOST_SHOWN - 1 : -1] = ['…']
+        way = ' → '.join(names)
         message = (
             f'{first} waits for a chain of services that comes back to its own callback group, '
             f'so that none can go on: {way}'
@@ -201,7 +207,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         part=first.binding.behaviour.function,
         help=f"give {last.server.noun} '{last.server.entity.name}' a group of its own, "
         "or 'group: reentrant'",
-        related=[_served_here(context, wait) for wait in chain],
+        related=[_served_here(context, wait) for wait in chain[:_MOST_SHOWN]],
     )
 
 
