@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.names import (
+    MAX_TOPIC_NAME,
     expand_name,
     find_namespace_fault,
     find_node_name_fault,
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 
 _RULE = 'bad-name'
 
+# By the keys of a node that turn them on.
+_LONGEST_OWN_SERVICES = {
+    'parameter_services': 'set_parameters_atomically',
+    'type_description_service': 'get_type_description',
+    'logger_services': 'get_logger_levels',
+}
+
 
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS will see."""
@@ -31,6 +39,8 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_node_name_fault(name)
         if fault:
             yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
+        else:
+            yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
         for parameter in node.parameters.values():
             fault = find_parameter_name_fault(parameter.name)
@@ -48,6 +58,20 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
         if fault and path not in reported:
             reported.add(path)
             yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
+
+
+def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    """Check that the names which the node's own services get are not too long."""
+    for key, service in _LONGEST_OWN_SERVICES.items():
+        private = f'~/{service}'
+        if getattr(node, key) and _find_full_name_fault(node, private):
+            length = len(expand_name(private, node.name, node.namespace))
+            message = (
+                f"the node's service '{private}' has {length} characters in full, "
+                f'and ROS allows {MAX_TOPIC_NAME}'
+            )
+            help_text = f"shorten the node's name, or write '{key}: false'"
+            yield context.at_key(node.path, _RULE, message, help=help_text)
 
 
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from composer.diagnostics import Severity
 from composer.language.parameters import find_type_fault, find_type_faults
 
 if TYPE_CHECKING:
@@ -24,7 +25,10 @@ _OF_EVERY_NODE = {
         'a key of the node, not one of its parameters',
         "move it out of 'parameters:'",
     ),
-    'start_type_description_service': ('declared by every node of ROS itself', 'remove it'),
+    'start_type_description_service': (
+        'declared by every node of ROS itself',
+        "write 'type_description_service:' in the node, which sets it",
+    ),
 }
 
 # With this relative tolerance rclpy compares doubles (`Node._apply_floating_point_range`).
@@ -36,6 +40,15 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for parameter in node.parameters.values():
             yield from _check_parameter(context, parameter)
+        if node.on_parameters is not None and not node.parameter_services:
+            yield context.at_key(
+                (*node.path, 'on_parameters'),
+                'unreachable-parameters',
+                f"node '{node.name}' has no parameter services: 'on_parameters' hears only of "
+                'changes that its own behaviours make',
+                help="write 'parameter_services: true' in the node, or remove 'on_parameters'",
+                severity=Severity.WARNING,
+            )
 
 
 def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:

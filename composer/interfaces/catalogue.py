@@ -49,6 +49,7 @@ class InterfaceCatalogue:
         self._documents: dict[str, dict[str, Any] | None] = {}
         self._descriptions: dict[str, InterfaceDescription | None] = {}
         self._packages: dict[str, Path] | None = None
+        self._indices: dict[tuple[str, InterfaceKind], frozenset[str]] = {}
 
     @property
     def available(self) -> bool:
@@ -143,7 +144,12 @@ class InterfaceCatalogue:
                 self._packages.update(dict.fromkeys(_list_names(prefix / _INDEX), prefix))
         return self._packages
 
-    def _indexed(self, package: str, kind: InterfaceKind) -> Iterator[str]:
+    def _indexed(self, package: str, kind: InterfaceKind) -> frozenset[str]:
+        if (package, kind) not in self._indices:
+            self._indices[package, kind] = frozenset(self._read_index(package, kind))
+        return self._indices[package, kind]
+
+    def _read_index(self, package: str, kind: InterfaceKind) -> Iterator[str]:
         prefix = self._prefix_of(package)
         if prefix is None:
             return

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from composer.language.parameters import convert_parameter_value, infer_parameter_type
 from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
+    DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
-    DEFAULT_THREADS,
     ActionClientSpec,
     ActionSpec,
     BehaviourSpec,
@@ -50,8 +50,9 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         description=data.get('description', ''),
         interfaces=MappingProxyType(data.get('interfaces', {})),
         qos=_parse_entries(data, (), 'qos', _parse_named_qos),
-        threads=int(executor.get('threads', DEFAULT_THREADS)),
+        threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
+        diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
         nodes=_parse_entries(
             data,
             (),
@@ -59,6 +60,26 @@ def parse_system(data: Data, name: str) -> SystemSpec:
             lambda name, node, path: _NodeParser(defaults, node, path).parse(name),
         ),
     )
+
+
+_INHERITED = frozenset(
+    {
+        'log_level',
+        'use_sim_time',
+        'on_error',
+        'parameter_services',
+        'rosout',
+        'type_description_service',
+        'logger_services',
+    }
+)
+
+
+def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as it is written
+    if data is False:
+        return None
+    period = data.get('period') if isinstance(data, dict) else None
+    return DEFAULT_DIAGNOSTICS_PERIOD_SEC if period is None else float(period)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +90,12 @@ class _Defaults:
 
 
 def _parse_defaults(data: Data) -> _Defaults:
-    inherited = {'log_level', 'use_sim_time', 'on_error'}
     return _Defaults(
         namespace=expand_namespace(data.get('namespace', '')),
         qos=_parse_qos(data['qos'], ('defaults', 'qos'))
         if 'qos' in data
         else QosSpec(DEFAULT_PROFILE, {}, ()),
-        node={key: value for key, value in data.items() if key in inherited},
+        node={key: value for key, value in data.items() if key in _INHERITED},
     )
 
 
@@ -96,6 +116,10 @@ class _NodeParser:
             description=data.get('description', ''),
             log_level=data.get('log_level'),
             use_sim_time=data.get('use_sim_time', False),
+            parameter_services=data.get('parameter_services', _has_parameters(data)),
+            rosout=data.get('rosout', True),
+            type_description_service=data.get('type_description_service', False),
+            logger_services=data.get('logger_services', False),
             on_error=self._on_error,
             parameters=_parse_entries(data, path, 'parameters', _parse_parameter),
             state=MappingProxyType(data.get('state', {})),
@@ -201,6 +225,10 @@ class _NodeParser:
             data = {'behaviour': data}
             return _parse_behaviour(data, self._path, (*self._path, key))
         return _parse_behaviour(data, (*self._path, key)) if data else None
+
+
+def _has_parameters(node: Data) -> bool:
+    return bool(node.get('parameters')) or 'on_parameters' in node
 
 
 def _parse_entries(

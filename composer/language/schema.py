@@ -63,21 +63,23 @@ def check_structure(
     dropped: set[DataPath] = set(failed)
     for path in failed:
         data = _without(data, path)
-    while misspelt := [fault for fault in _find_faults(data) if _can_be_mended(fault, data)]:
+    faults = _find_faults(data)
+    while misspelt := [fault for fault in faults if _can_be_mended(fault, data)]:
         for fault in misspelt:
             if _can_be_mended(fault, data):
                 findings.append(fault.diagnostic(positions))
                 data = _with_key_renamed(data, fault.path, str(fault.meant))
                 positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
+        faults = _find_faults(data)
     incomplete = {path[:-1] for path in failed}
     findings += [
         fault.diagnostic(positions)
-        for fault in _find_faults(data)
+        for fault in faults
         if not (
             fault.path in sampled or (fault.rule == 'missing-key' and fault.path in incomplete)
         )
     ]
-    while faults := _find_faults(data):
+    while faults:
         for fault in faults:
             if fault.stand_in:
                 path = (*fault.path, fault.stand_in[0])
@@ -87,6 +89,7 @@ def check_structure(
                 data = _without(data, path) if path else data
             dropped.add(path)
         data = _REQUIRED | data
+        faults = _find_faults(data)
     return data, frozenset(dropped), findings
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.names import join_names
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -18,8 +20,8 @@ OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
-DEFAULT_THREADS = 8
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
+DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 REENTRANT = 'reentrant'
 
 
@@ -209,6 +211,10 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        parameter_services: Whether others can list, read and set its parameters.
+        rosout: Whether what it logs goes to `/rosout`, too.
+        type_description_service: Whether it answers which types it uses.
+        logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
     """
@@ -218,6 +224,10 @@ class NodeSpec:
     description: str
     log_level: LogLevel | None
     use_sim_time: bool
+    parameter_services: bool
+    rosout: bool
+    type_description_service: bool
+    logger_services: bool
     on_error: OnError
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
@@ -233,6 +243,11 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/arm`."""
+        return join_names(self.namespace, self.name)
 
     @property
     def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
@@ -263,14 +278,16 @@ class SystemSpec:
         name: The file's name without its ending.
         interfaces: The folders of interface packages to build if they are not installed.
         qos: The named profiles of the file.
-        threads: How many callbacks may run at the same time.
+        threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
+        diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
     """
 
     name: str
     description: str
     interfaces: Mapping[str, str]
     qos: Mapping[str, QosSpec]
-    threads: int
+    threads: int | None
     shutdown_timeout_sec: float
+    diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]

@@ -82,7 +82,7 @@ class _Server(ActionServer):
         """See the base class."""
         callback = execute_callback or self._execution.callback
         if self._execution.is_async:
-            self._live.services.create_task(self._execute_in_task, callback, goal_handle)
+            self._live.services.executor.create_task(self._execute_in_task, callback, goal_handle)
         else:
             threading.Thread(
                 target=self._execute_in_thread, args=(callback, goal_handle), daemon=True
@@ -105,7 +105,7 @@ class _Server(ActionServer):
 
     def _add(self, goal: Any) -> None:
         # The node has not ended before the results of all its goals are sent.
-        self._tokens[goal_key(goal)] = self._live.ledger.begin(None)
+        self._tokens[goal_key(goal)] = self._live.ledger.begin()
         self._queue.add(goal)
 
     def _end(self, goal: Any) -> None:
@@ -157,7 +157,6 @@ class _Execution:
         action_class: Any = import_interface(spec.type)
         behaviour = node.function(spec.behaviour)
         self._node = node
-        self._spec = spec
         self._queue = queue
         self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
         self._kind = kind_of(behaviour)
@@ -166,6 +165,17 @@ class _Execution:
         self._to_result = converter_for(action_class.Result).convert
         self._to_feedback = converter_for(action_class.Feedback).convert
         self.is_async = self._kind in (FunctionKind.COROUTINE, FunctionKind.ASYNC_GENERATOR)
+        drives = {
+            FunctionKind.GENERATOR: self._drive,
+            FunctionKind.ASYNC_GENERATOR: self._drive_async,
+            FunctionKind.COROUTINE: self._call_async,
+        }
+        self._goal_call = node.call(
+            f"action '{spec.name}'",
+            spec.path,
+            drives.get(self._kind, self._call),
+            on_error=spec.on_error,
+        )
         self.callback: Callable[[Any], Any] = (
             self._execute_async if self.is_async else self._execute
         )
@@ -174,8 +184,7 @@ class _Execution:
         results: list[Any] = []
         try:
             if not self._end_early(goal):
-                drive = self._drive if self._kind is FunctionKind.GENERATOR else self._call
-                self._call_of(partial(drive, goal), results).run()
+                self._goal_call.delivering(results.append).run(goal)
             return self._result_of(goal, results)
         finally:
             self._queue.finished(goal)
@@ -184,10 +193,8 @@ class _Execution:
         results: list[Any] = []
         try:
             if not self._end_early(goal):
-                is_generator = self._kind is FunctionKind.ASYNC_GENERATOR
-                drive = self._drive_async if is_generator else self._call_async
-                call = self._call_of(partial(drive, goal), results)
-                await call.as_callback(FunctionKind.COROUTINE)()
+                call = self._goal_call.delivering(results.append)
+                await call.as_callback(FunctionKind.COROUTINE)(goal)
             return self._result_of(goal, results)
         finally:
             self._queue.finished(goal)
@@ -197,11 +204,6 @@ class _Execution:
             # Its behaviour raised.
             goal.abort()
         return results[0] if results else self._result_class()
-
-    def _call_of(self, function: Callable[[], Any], results: list[Any]) -> Any:
-        owner = f"action '{self._spec.name}'"
-        call = self._node.call(owner, self._spec.path, function, on_error=self._spec.on_error)
-        return call.delivering(results.append)
 
     def _call(self, goal: Any) -> Any:
         return self._succeed(goal, self._begin(goal.request))

@@ -49,7 +49,13 @@ class Gate:
 
 
 class _GatedGroup(CallbackGroup):
-    """Asks its gate before it asks the kind of group that it is mixed with."""
+    """Asks its gate before it asks the kind of group that it is mixed with.
+
+    Attributes:
+        wakes_executor: Tells the executor that it is woken when a gate opens, and need not ask.
+    """
+
+    wakes_executor = True
 
     def __init__(self, gate: Gate) -> None:
         super().__init__()

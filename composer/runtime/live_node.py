@@ -9,8 +9,6 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node as RosNode
-from rclpy.parameter import Parameter
 
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
@@ -18,23 +16,24 @@ from composer.runtime.calls import BehaviourCall, CallLedger
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.node import Node, Publish
 from composer.runtime.remote_parameters import RemoteParameters
+from composer.runtime.ros_node import ComposedRosNode
 from composer.runtime.supervision import ErrorReporter
 from composer.runtime.waiting import CoroutineWaits, ThreadWaits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from contextlib import AbstractContextManager
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.context import Context
-    from rclpy.task import Task
     from rclpy.timer import Timer
 
     from composer.language.positions import DataPath, SourceMap
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError, QosSpec
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
+    from composer.runtime.health import EntityHealth, HealthBoard
     from composer.runtime.service_clients import ServiceClient
+    from composer.runtime.system_executor import SystemExecutor
     from composer.runtime.waiting import StopSignal
 
 
@@ -47,10 +46,11 @@ class SystemServices:
         ros_arguments: The arguments after `--ros-args` of the command line.
         act_on_error: Takes a node's name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
-        create_task: Runs a function or coroutine function among the callbacks.
-        waiting: The context in which a callback may wait for other callbacks.
+        executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
         failures: Which services failed lately.
+        without_parameter_services: The full names of the nodes that have none.
+        health: How the entities of the system fare; `None` measures nothing.
     """
 
     context: Context
@@ -60,10 +60,11 @@ class SystemServices:
     ros_arguments: Sequence[str]
     act_on_error: Callable[[str, OnError], None]
     shutdown: Callable[[int], None]
-    create_task: Callable[..., Task]
-    waiting: Callable[[], AbstractContextManager[None]]
+    executor: SystemExecutor
     stop: StopSignal
     failures: ServiceFailures
+    without_parameter_services: frozenset[str]
+    health: HealthBoard | None
 
 
 @dataclass(slots=True)
@@ -82,7 +83,7 @@ class LiveNode:
 
     spec: NodeSpec
     services: SystemServices
-    ros: RosNode
+    ros: ComposedRosNode
     face: Node
     errors: ErrorReporter
     publishers: dict[str, Publish]
@@ -111,6 +112,22 @@ class LiveNode:
         """Return a behaviour as a function of its positional arguments."""
         return self.services.functions[behaviour.name]
 
+    def health(self, owner: str) -> EntityHealth | None:
+        """Return the health of an entity in words, `None` if it is not measured."""
+        board = self.services.health
+        return None if board is None else board.entity(self.full_name, owner)
+
+    def follow(self, owner: str, entity: Any) -> None:
+        """Let the health of an entity in words tell what its ROS entity has missed."""
+        health = self.health(owner)
+        if health is not None:
+            health.follow(partial(self.services.executor.missed, self.ros, entity))
+
+    @property
+    def full_name(self) -> str:
+        """The node's name with its namespace."""
+        return str(self.ros.get_fully_qualified_name())
+
     def call(
         self,
         owner: str,
@@ -128,15 +145,23 @@ class LiveNode:
             publish: The publisher that takes what the function returns.
         """
         place = self.place(path)
+        health = self.health(owner)
 
         def failed(owner: str, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
+            if health is not None:
+                health.note_error(error)
             self.errors.report(owner, place, error)
             self.services.act_on_error(self.spec.name, on_error or self.spec.on_error)
 
         return BehaviourCall(
-            owner, function, self.ledger, deliver=self._delivery(publish), failed=failed
+            owner,
+            function,
+            self.ledger,
+            deliver=self._delivery(publish),
+            failed=failed,
+            times=None if health is None else health.times,
         )
 
     def hook(
@@ -188,24 +213,13 @@ class LiveNode:
 
 def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
     """Create a node without entities."""
-    remapping = [part for old, new in spec.remap for part in ('-r', f'{old}:={new}')]
-    overrides = [Parameter('use_sim_time', value=True)] if spec.use_sim_time else None
-    # Global arguments hold for every node of the process, where a __node rule would give all of
-    # them one name. The command line's rules come first: the first that matches wins.
-    ros = RosNode(
-        spec.name,
-        context=services.context,
-        namespace=spec.namespace,
-        cli_args=['--ros-args', *services.ros_arguments, *remapping],
-        use_global_arguments=False,
-        parameter_overrides=overrides,
-    )
+    ros = ComposedRosNode(spec, services.context, services.ros_arguments)
     publishers: dict[str, Publish] = {}
     service_clients: dict[str, ServiceClient] = {}
     action_clients: dict[str, ActionClient] = {}
     background = ReentrantCallbackGroup()
     gate = Gate()
-    waits = ThreadWaits(services.waiting, services.stop)
+    waits = ThreadWaits(services.executor.waiting, services.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
     node = LiveNode(
@@ -218,7 +232,7 @@ def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
         service_clients=service_clients,
         action_clients=action_clients,
         waits=waits,
-        coroutine_waits=CoroutineWaits(ros, background, waits),
+        coroutine_waits=CoroutineWaits(services.executor, waits),
         background=background,
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),

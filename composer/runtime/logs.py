@@ -1,10 +1,12 @@
-"""Levels of the ROS loggers, from the file and the command line."""
+"""The ROS loggers: their levels, from the file and the command line, and their publishers."""
 
 from __future__ import annotations
 
+import ctypes
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.logging import LoggingSeverity, get_logger, get_logger_level, set_logger_level
 
 if TYPE_CHECKING:
@@ -14,6 +16,10 @@ if TYPE_CHECKING:
 
 # The logger of Composer itself, for what concerns the whole system.
 system_logger = get_logger('composer')
+
+_rosout_is_enabled = ctypes.PyDLL(_rclpy.__file__).rcl_logging_rosout_enabled
+_rosout_is_enabled.restype = ctypes.c_bool
+_PROBE = 'composer_probe'
 
 
 @contextmanager
@@ -41,6 +47,21 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
     finally:
         for name, severity in before.items():
             set_logger_level(name, severity)
+
+
+def has_rosout_publisher(logger_name: str) -> bool:
+    """Return whether rcl knows a publisher for what this logger says.
+
+    rcl keeps these publishers by the logger's name, from the creation of the first node with that
+    name to the end of any of them. It answers whether there is one when it is asked for a
+    sublogger, but always with yes where `/rosout` is turned off for the whole process.
+    """
+    if not _rosout_is_enabled():
+        return False
+    found: bool = _rclpy.rclpy_logging_rosout_add_sublogger(logger_name, _PROBE)
+    if found:
+        _rclpy.rclpy_logging_rosout_remove_sublogger(logger_name, _PROBE)
+    return found
 
 
 def _logger_name(node: NodeSpec) -> str:

@@ -55,7 +55,14 @@ class PayloadError(ComposerError):
 class PayloadConverter:
     """Converts payloads to messages of one class; get it from `converter_for`."""
 
-    __slots__ = ('_readers', '_single', '_takes_bare_messages', 'message_class', 'type_name')
+    __slots__ = (
+        '_readers',
+        '_rules',
+        '_single',
+        '_takes_bare_messages',
+        'message_class',
+        'type_name',
+    )
 
     def __init__(self, message_class: type) -> None:
         """Compile the rules for a message class, and for those of its nested messages.
@@ -68,6 +75,10 @@ class PayloadConverter:
         self.message_class = message_class
         self.type_name = description.name
         self._readers = {field.name: _reader_for(field.type) for field in description.fields}
+        self._rules = tuple(
+            (field.name, _type_that_fits(field.type), self._readers[field.name])
+            for field in description.fields
+        )
         first = description.fields[0] if len(description.fields) == 1 else None
         self._single = first.name if first else None
         self._takes_bare_messages = first is not None and first.type.kind == 'message'
@@ -80,6 +91,9 @@ class PayloadConverter:
                 that it has and what it was given.
         """
         try:
+            # What behaviours give most often, without a detour.
+            if type(payload) is self.message_class:
+                return self._check(payload)
             return self.read(payload)
         except FieldError as error:
             raise PayloadError(self.type_name, error) from None
@@ -127,8 +141,10 @@ class PayloadConverter:
         return message
 
     def _check(self, message: object) -> object:
-        for name, read in self._readers.items():
+        for name, fits, read in self._rules:
             value = getattr(message, name)
+            if type(value) is fits:
+                continue
             try:
                 kept = read(value)
             except FieldError as error:
@@ -148,6 +164,13 @@ def converter_for(message_class: type) -> PayloadConverter:
         UnsupportedFieldError: a field has a type that `.msg` files do not have.
     """
     return PayloadConverter(message_class)
+
+
+def _type_that_fits(field_type: FieldType) -> type | None:
+    """Return the Python type whose every value a field can hold as it is, if there is one."""
+    if field_type.array is not None:
+        return None
+    return {'float64': float, 'bool': bool}.get(field_type.kind)
 
 
 def _reader_for(field_type: FieldType) -> Reader:

@@ -75,6 +75,10 @@ class RemoteParameters:
         full_name = expand_namespace(node_name, self._node.spec.namespace)
         if not node_name.startswith('/'):
             full_name = join_names(self._node.spec.namespace, node_name)
+        if full_name in self._node.services.without_parameter_services:
+            message = f"node '{full_name}' has no parameter services"
+            advice = "write 'parameter_services: true' where the file declares it"
+            raise ServiceNotAvailableError(message, help=advice)
         client = self._client(kind, join_names(full_name, service))
         begun = time.monotonic()
         waits = self._node.waits

@@ -37,12 +37,12 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     behaviour = node.function(spec.behaviour)
     function = partial(behaviour, node.face, **spec.behaviour.arguments)
     owner = f"service '{spec.name}'"
+    call = node.call(owner, spec.path, function, on_error=spec.on_error)
     full_name = node.ros.resolve_service_name(spec.service)
     failures = node.services.failures
 
     def answering(responses: list[Any]) -> Any:
         """Return the call for one request; its response is appended to `responses`."""
-        call = node.call(owner, spec.path, function, on_error=spec.on_error)
         return call.delivering(lambda payload: responses.append(convert(payload)))
 
     def response_of(responses: list[Any]) -> Any:

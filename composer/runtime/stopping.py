@@ -54,7 +54,9 @@ def _run_on_stop(node: LiveNode, timeout_sec: float) -> None:
     call = node.hook('on_stop', hook)
     if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
         done = threading.Event()
-        task = node.services.create_task(call.as_callback(FunctionKind.COROUTINE), node.face)
+        task = node.services.executor.create_task(
+            call.as_callback(FunctionKind.COROUTINE), node.face
+        )
         task.add_done_callback(lambda _task: done.set())
         done.wait(timeout_sec)
     else:

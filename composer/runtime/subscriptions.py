@@ -20,14 +20,15 @@ if TYPE_CHECKING:
 def create_subscriptions(node: LiveNode) -> None:
     """Create the node's subscriptions, each with its behaviour, or passing messages on."""
     for spec in node.spec.subscriptions.values():
+        owner = f"subscription '{spec.name}'"
         call = node.call(
-            f"subscription '{spec.name}'",
+            owner,
             spec.path,
             _create_function(node, spec),
             on_error=spec.on_error,
             publish=spec.publish,
         )
-        node.ros.create_subscription(
+        subscription = node.ros.create_subscription(
             import_interface(spec.type),
             spec.topic,
             call.as_callback(),
@@ -37,6 +38,7 @@ def create_subscriptions(node: LiveNode) -> None:
             # QoS events then wake the stock executor at once, again and again.
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        node.follow(owner, subscription)
 
 
 def _create_function(node: LiveNode, spec: SubscriptionSpec) -> Callable[[Any], Any]:

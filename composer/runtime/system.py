@@ -13,6 +13,8 @@ from rclpy.context import Context
 from composer.errors import ComposerError, ExitCode, StartError, UsageError
 from composer.runtime.entities import create_entities
 from composer.runtime.failures import ServiceFailures
+from composer.runtime.health import HealthBoard
+from composer.runtime.health_publisher import HealthPublisher
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
 from composer.runtime.stopping import stop_nodes
@@ -25,8 +27,10 @@ if TYPE_CHECKING:
 
     from composer.language.positions import SourceMap
     from composer.language.specs import NodeSpec, SystemSpec
+    from composer.runtime.calls import RunningCall
 
 _EXECUTOR_STOP_SEC = 1.0
+_GONE_SEC = 2.0
 
 
 class System:
@@ -54,7 +58,7 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = Context()
         _init_context(self._context, ros_arguments)
-        self._executor = SystemExecutor(self._context, spec.threads, report=system_logger.error)
+        self._executor = SystemExecutor(self._context, spec.threads, log=system_logger.error)
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(
             context=self._context,
@@ -64,11 +68,15 @@ class System:
             ros_arguments=ros_arguments,
             act_on_error=self._supervisor.act,
             shutdown=self.request_stop,
-            create_task=self._executor.create_task,
-            waiting=self._executor.waiting,
+            executor=self._executor,
             stop=self._stop_signal,
             failures=ServiceFailures(),
+            without_parameter_services=frozenset(
+                node.full_name for node in spec.nodes.values() if not node.parameter_services
+            ),
+            health=None if spec.diagnostics_period_sec is None else HealthBoard(),
         )
+        self._health_publisher: HealthPublisher | None = None
 
     @property
     def stop_requested(self) -> bool:
@@ -85,8 +93,6 @@ class System:
             self._exit_code = code
         self._stop_signal.set()
         self._wake_ups.put(None)
-        # Coroutines that waited are resumed when the executor looks at them again.
-        self._executor.wake()
 
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
@@ -99,9 +105,11 @@ class System:
                 self._create(spec)
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
+            self._publish_health()
             self._executor.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None
+            self._executor.wake()
             for node in list(self._nodes.values()):
                 self._run_on_start(node)
         except BaseException:
@@ -113,8 +121,7 @@ class System:
         nodes = '1 node' if count == 1 else f'{count} nodes'
         elapsed = time.monotonic() - self._begun
         system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
-        for node in self._nodes.values():
-            self._open(node)
+        self._open(list(self._nodes.values()))
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -169,10 +176,11 @@ class System:
         node.gate.serves = not self.stop_requested
         self._executor.wake()
 
-    def _open(self, node: LiveNode) -> None:
-        node.gate.open()
-        for timer in node.timers:
-            timer.reset()
+    def _open(self, nodes: list[LiveNode]) -> None:
+        for node in nodes:
+            node.gate.open()
+            for timer in node.timers:
+                timer.reset()
         self._executor.wake()
 
     def _restart(self, name: str) -> None:
@@ -185,9 +193,15 @@ class System:
             if not old.ledger.wait_until_idle(self._spec.shutdown_timeout_sec):
                 system_logger.error(f"node '{name}' is not restarted: one of its behaviours hangs")
                 old.gate.open()
+                self._executor.wake()
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
+            if not old.ros.wait_until_gone(_GONE_SEC):
+                system_logger.warn(
+                    f"node '{name}': something still holds an entity of the node before its "
+                    'restart, so its log may be missing on /rosout'
+                )
             try:
                 node = self._create(old.spec)
                 self._executor.add_node(node.ros)
@@ -196,10 +210,31 @@ class System:
                 system_logger.error(f'restart: {error}')
                 self._supervisor.act(name, 'restart')
                 return
-            self._open(node)
+            self._open([node])
         system_logger.warn(f"node '{name}' was restarted")
 
+    def _publish_health(self) -> None:
+        board, period_sec = self._services.health, self._spec.diagnostics_period_sec
+        if board is None or period_sec is None:
+            return
+        publisher = HealthPublisher(self._spec.name, period_sec, board, self._running_calls)
+        try:
+            publisher.start(self._context, self._services.ros_arguments)
+        except ImportError as error:
+            system_logger.warn(f'there will be no /diagnostics: {error}')
+        else:
+            self._health_publisher = publisher
+
+    def _running_calls(self) -> list[tuple[str, RunningCall]]:
+        return [
+            (node.full_name, call)
+            for node in list(self._nodes.values())
+            for call in node.ledger.running()
+        ]
+
     def _tear_down(self) -> None:
+        if self._health_publisher is not None:
+            self._health_publisher.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)

@@ -28,8 +28,9 @@ def create_timers(node: LiveNode) -> None:
     """Create the node's timers; they tick once the node has started."""
     for spec in node.spec.timers.values():
         ticker = _Ticker(node, spec)
+        owner = f"timer '{spec.name}'"
         call = node.call(
-            f"timer '{spec.name}'",
+            owner,
             spec.path,
             ticker.function,
             on_error=spec.on_error,
@@ -44,6 +45,7 @@ def create_timers(node: LiveNode) -> None:
             autostart=False,
         )
         node.timers.append(ticker.timer)
+        node.follow(owner, ticker.timer)
 
 
 def _create_clock(name: ClockName) -> Clock | None:

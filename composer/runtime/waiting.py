@@ -10,9 +10,9 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 
 from composer.errors import SystemStoppingError
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from rclpy.callback_groups import CallbackGroup
-    from rclpy.node import Node as RosNode
+    from composer.runtime.executor import ComposerExecutor
 
 _POLL_SEC = 0.01
 
@@ -146,18 +145,15 @@ class ThreadWaits:
 
 
 class CoroutineWaits:
-    """The same for coroutines, which a timer of the node resumes.
+    """The same for coroutines, which the executor resumes.
 
     Args:
-        group: A group that no behaviour is in, so that its timers always run.
         threads: The waits of the same node's threads.
     """
 
-    def __init__(self, ros: RosNode, group: CallbackGroup, threads: ThreadWaits) -> None:
-        self._ros = ros
-        self._group = group
+    def __init__(self, executor: ComposerExecutor, threads: ThreadWaits) -> None:
+        self._executor = executor
         self._threads = threads
-        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     async def until_done(self, future: Future, timeout_sec: float | None) -> bool:
         """See `ThreadWaits.until_done`."""
@@ -172,35 +168,26 @@ class CoroutineWaits:
             if timeout_sec is None:
                 await first
             else:
-                await self._with_timer(timeout_sec, wake, first)
+                await self._or_later(timeout_sec, wake, first)
         return self._threads.ended(future, wake, yields=yields)
 
     async def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
         """See `ThreadWaits.until_true`."""
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
-        first: Future = Future()
+        while not condition():
+            if self._threads.gives_up():
+                raise stopping_error()
+            if deadline is not None and time.monotonic() >= deadline:
+                return False
+            pause: Future = Future()
+            await self._or_later(_POLL_SEC, partial(pause.set_result, None), pause)
+        return True
 
-        def look() -> None:
-            late = deadline is not None and time.monotonic() >= deadline
-            if (late or condition() or self._threads.gives_up()) and not first.done():
-                first.set_result(None)
-
-        look()
-        if not first.done():
-            await self._with_timer(_POLL_SEC, look, first)
-        if condition():
-            return True
-        if self._threads.gives_up():
-            raise stopping_error()
-        return False
-
-    async def _with_timer(
-        self, period_sec: float, callback: Callable[[], Any], awaited: Future
+    async def _or_later(
+        self, delay_sec: float, callback: Callable[[], Any], awaited: Future
     ) -> None:
-        timer = self._ros.create_timer(
-            period_sec, callback, callback_group=self._group, clock=self._clock
-        )
+        delay = self._executor.call_later(delay_sec, callback)
         try:
             await awaited
         finally:
-            self._ros.destroy_timer(timer)
+            delay.cancel()

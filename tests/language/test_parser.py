@@ -26,13 +26,27 @@ def test_a_system_has_the_name_of_its_file(tmp_path):
 def test_a_system_without_anything_has_the_defaults():
     spec = load('nodes: {}')
     assert (spec.description, dict(spec.qos), dict(spec.nodes)) == ('', {}, {})
-    assert (spec.threads, spec.shutdown_timeout_sec) == (8, 5.0)
+    assert (spec.threads, spec.shutdown_timeout_sec) == (None, 5.0)
 
 
 def test_the_executor_is_as_declared():
     spec = load('nodes: {}\nexecutor: {threads: 2, shutdown_timeout: 1}')
     assert (spec.threads, spec.shutdown_timeout_sec) == (2, 1.0)
     assert isinstance(spec.shutdown_timeout_sec, float)
+
+
+@pytest.mark.parametrize(
+    ('written', 'period_sec'),
+    [
+        ('', 1.0),
+        ('diagnostics: true', 1.0),
+        ('diagnostics: {}', 1.0),
+        ('diagnostics: {period: 5}', 5.0),
+        ('diagnostics: false', None),
+    ],
+)
+def test_diagnostics_have_a_period_or_are_off(written, period_sec):
+    assert load(f'nodes: {{}}\n{written}').diagnostics_period_sec == period_sec
 
 
 def test_an_empty_node_has_the_defaults():
@@ -49,6 +63,47 @@ def test_an_empty_node_has_the_defaults():
     ):  # fmt: skip
         assert dict(entries) == {}
     assert node.path == ('nodes', 'rover')
+
+
+@pytest.mark.parametrize(
+    ('node', 'has_them'),
+    [
+        ('{}', False),
+        ('{parameters: {}}', False),
+        ('{use_sim_time: true}', False),
+        ('{parameters: {speed: 1}}', True),
+        ('{on_parameters: b:f}', True),
+        ('{parameters: {speed: 1}, parameter_services: false}', False),
+        ('{parameter_services: true}', True),
+    ],
+)
+def test_a_node_has_parameter_services_if_it_has_parameters_or_says_so(node, has_them):
+    assert load_node(node).parameter_services is has_them
+
+
+def test_of_other_services_a_node_has_only_rosout_by_itself():
+    node = load_node('{parameters: {speed: 1}}')
+    assert (node.rosout, node.type_description_service, node.logger_services) == (
+        True, False, False
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    'key', ['parameter_services', 'rosout', 'type_description_service', 'logger_services']
+)
+@pytest.mark.parametrize('value', [True, False])
+def test_defaults_turn_services_on_or_off_and_a_node_has_the_last_word(key, value):
+    word, opposite = str(value).lower(), str(not value).lower()
+    spec = load(
+        f'defaults: {{{key}: {word}}}\n'
+        'nodes:\n'
+        '  heir: {parameters: {speed: 1}}\n'
+        '  plain: {}\n'
+        f'  own: {{{key}: {opposite}}}\n'
+    )
+    assert [getattr(spec.nodes[name], key) for name in ('heir', 'plain', 'own')] == [
+        value, value, not value
+    ]  # fmt: skip
 
 
 def test_nodes_inherit_what_they_do_not_say():

@@ -256,6 +256,8 @@ WANTS = {
     'executor': '{threads: "{{ v }}", shutdown_timeout: "{{ v }}"}',
     'qos': '{p: {depth: "{{ v }}", history: "{{ v }}", deadline: "{{ v }}"}}',
     'nodes': '{n: {use_sim_time: "{{ v }}", log_level: "{{ v }}", on_error: "{{ v }}", '
+    'parameter_services: "{{ v }}", rosout: "{{ v }}", '
+    'type_description_service: "{{ v }}", logger_services: "{{ v }}", '
     'on_start: "{{ v }}", publishers: {a: "{{ v }}", b: {type: "{{ v }}"}}, '
     'parameters: {c: {default: 1, read_only: "{{ v }}", minimum: "{{ v }}", type: "{{ v }}"}}, '
     'timers: {t: {period: "{{ v }}", clock: "{{ v }}", behaviour: "b.{{ v }}:f"}}}}',
@@ -271,7 +273,7 @@ def test_the_schema_lets_editors_accept_expressions_for_numbers_words_and_types(
     for wrong in ('{ v }', 'v }}', 'fast'):
         text = json.dumps(data).replace('{{ v }}', wrong).replace(f'b.{wrong}:f', 'b:f')
         # Those of the parameter are one.
-        assert len(list(validator.iter_errors(json.loads(text)))) == 14
+        assert len(list(validator.iter_errors(json.loads(text)))) == 18
 
 
 def test_with_the_values_in_place_the_schema_accepts_no_expression():

@@ -23,5 +23,6 @@ Locks are held for moments and nothing is called under them but the next in this
 """
 
 from composer.runtime.executor.composer_executor import ComposerExecutor
+from composer.runtime.executor.missed import Missed
 
-__all__ = ['ComposerExecutor']
+__all__ = ['ComposerExecutor', 'Missed']

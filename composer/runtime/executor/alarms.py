@@ -124,8 +124,13 @@ class Delay:
 
     def __init__(self, alarms: Alarms, delay_sec: float, function: Any) -> None:
         self.deadline_ns: int | None = None
+        self._alarms = alarms
         self._function = function
         alarms.set(self, time.monotonic_ns() + int(delay_sec * 1e9))
+
+    def cancel(self) -> None:
+        """Call it no more, if that is yet to come."""
+        self._alarms.set(self, None)
 
     def on_deadline(self) -> None:
         """Call the function."""

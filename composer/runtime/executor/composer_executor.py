@@ -3,15 +3,17 @@
 import atexit
 import os
 import weakref
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
 from rclpy.task import Future, Task
 
+from composer.runtime.executor.alarms import Delay
 from composer.runtime.executor.engine import COURTESY_SEC, Engine
+from composer.runtime.executor.missed import Missed
 from composer.runtime.executor.tasks import Resume, TaskRun
 
 _MOST_THREADS = 256
@@ -35,7 +37,8 @@ class ComposerExecutor(MultiThreadedExecutor):
     """
 
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
-        super().__init__(num_threads, context=context)
+        # The pool of the base class is not used, and of one thread it warns.
+        super().__init__(2, context=context)
         self._engine = Engine(self, num_threads or _MOST_THREADS, self._guard, self._sigint_gc)
         _executors.add(self)
 
@@ -47,6 +50,22 @@ class ComposerExecutor(MultiThreadedExecutor):
         task: Any = Task(callback, args, kwargs, executor=self)
         self._engine.schedule.add_run(TaskRun(task))
         return task
+
+    def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> Delay:
+        """Add a callback as `create_task` does, `delay_sec` from now; it can be cancelled."""
+        return Delay(self._engine.alarms, delay_sec, lambda: self.create_task(callback))
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Let a callback wait for others: meanwhile it does not count against `num_threads`."""
+        if not self._engine.crew.step_aside():
+            yield
+            return
+        self._engine.schedule.step_aside(1)
+        try:
+            yield
+        finally:
+            self._engine.schedule.step_aside(-1)
 
     def add_node(self, node: Any) -> bool:
         """Manage the callbacks of `node`; returns False if it is here already."""
@@ -69,9 +88,18 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._engine.registry.drop(node)
         self.wake()
 
+    def missed(self, node: Any, entity: Any) -> Missed:
+        """Return what a subscription or timer of `node` missed because callbacks took too long.
+
+        Counting begins when the executor sees the entity; an unknown entity has missed nothing.
+        """
+        source = self._engine.registry.source_of(node, entity)
+        return Missed() if source is None else source.missed()
+
     def wake(self) -> None:
-        """Look anew at the entities, the context and the conditions that are waited for."""
+        """Look anew at the entities, their groups, the context and what is waited for."""
         self._engine.registry.is_stale = True
+        self._engine.schedule.retry()
         self._engine.wake()
 
     def spin(self) -> None:

@@ -17,6 +17,7 @@ from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
 _SPARE_SEC = 2.0
+_POLL_SEC = 0.0005
 
 
 class Worker:
@@ -51,6 +52,7 @@ class Crew:
         self._armed = False
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
+        self._dismissed = False
         self._handover: threading.Lock | None = None
 
     @contextmanager
@@ -61,12 +63,22 @@ class Crew:
         try:
             yield
         finally:
+            # Python 3.11 keeps what it knows of such a thread for ever.
+            threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
             del self._workers[ident]
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
         worker = self._workers.get(threading.get_ident())
         return worker is not None and worker.busy_since > 0
+
+    def step_aside(self) -> bool:
+        """Lead no more if the present thread does; returns whether it runs a callback at all."""
+        worker = self._workers.get(threading.get_ident())
+        if worker is None or not worker.busy_since:
+            return False
+        self.pass_on(worker)
+        return True
 
     def muster(self) -> None:
         """See that there are a leader and a standby."""
@@ -122,9 +134,30 @@ class Crew:
             self._wake_standby()
         handover.acquire(timeout=PATIENCE_SEC)
 
+    def dismiss(self, timeout_sec: float) -> None:
+        """End the threads that have nothing to do, and wait for that; for the end of all use."""
+        with self.lock:
+            self._dismissed = True
+            for spare in self._spares:
+                spare.called.release()
+            self._spares.clear()
+            self._wake_standby()
+        deadline = time.monotonic() + timeout_sec
+        mine = threading.get_ident()
+        while self._workers.keys() - {mine} and time.monotonic() < deadline:
+            time.sleep(_POLL_SEC)
+        if not self._workers:
+            self._timer.close()
+
+    def is_manned(self) -> bool:
+        """Tell whether any thread is left."""
+        return bool(self._workers)
+
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
         with self.lock:
+            if self._dismissed:
+                return
             self._spares.append(worker)
         if worker.called.acquire(timeout=_SPARE_SEC):
             return

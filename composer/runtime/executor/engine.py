@@ -282,11 +282,15 @@ class Engine:
         return self.schedule.admitting
 
     def tear_down(self, nodes: list[Any]) -> None:
-        """Let go of the entities of `nodes` and of the lane."""
+        """Let go of the entities of `nodes`, the threads and what they waited for."""
         for node in nodes:
             with suppress(InvalidHandle):
                 self.registry.drop(node)
         self.lane.close()
+        self.crew.dismiss(COURTESY_SEC)
+        if not self.crew.is_manned():
+            self._board.close()
+            self.alarms.timer.close()
 
 
 class _Attempt:

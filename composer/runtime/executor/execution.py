@@ -35,7 +35,7 @@ class Execution:
     def _execute_source(self, source: Source) -> bool:
         outcome: Any = NOTHING
         suspended = False
-        begun = source.group.reentrant
+        begun = source.group.admits_all
         try:
             begun = begun or source.entity.callback_group.beginning_execution(source.entity)
             if begun:
@@ -55,12 +55,20 @@ class Execution:
         return outcome is not NOTHING
 
     def _put_off(self, source: Source) -> None:
-        """Try again soon: the group is held by another executor, or has rules of its own."""
-        self._schedule.give_back(source)
-        Delay(self._alarms, _RETRY_SEC, lambda: self._schedule.announce(source, 0))
+        """Try again: the group is held by another executor, or has rules of its own.
+
+        One that refuses for long sets `wakes_executor`, and then wakes the executor itself.
+        """
+        self._schedule.refuse(source)
+        group = source.entity.callback_group
+        if not getattr(group, 'wakes_executor', False):
+            Delay(self._alarms, _RETRY_SEC, self._schedule.retry)
+        elif group.can_execute(source.entity):
+            # It changed its mind before this was noted.
+            self._schedule.retry()
 
     def _release(self, source: Source) -> None:
-        if not source.group.reentrant:
+        if not source.group.admits_all:
             source.entity.callback_group.ending_execution(source.entity)
 
     def _begin(self, coroutine: Any, source: Source) -> bool:

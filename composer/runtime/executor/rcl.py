@@ -188,5 +188,11 @@ class TimerFd:
         else:
             read_eventfd(self.fd)  # Which reads eight bytes, here as there.
 
+    def close(self) -> None:
+        """Give back the descriptor; nothing else is called after that."""
+        if self.fd >= 0:
+            os.close(self.fd)
+            self.fd = -1
+
     def __del__(self) -> None:
-        os.close(self.fd)
+        self.close()

@@ -68,6 +68,11 @@ class Registry:
         if changed:
             self._lane.look_soon()
 
+    def source_of(self, node: Any, entity: Any) -> Source | None:
+        """Return the source of an entity of `node`, None if it is not listened to."""
+        entities = self._nodes.get(node)
+        return None if entities is None else entities.sources.get(entity)
+
     def drop(self, node: Any) -> None:
         """Listen no more to the entities of `node`."""
         with self._lock:

@@ -19,11 +19,13 @@ from composer.runtime.executor.signals import UNKNOWN
 class Group:
     """The state of one callback group in one executor."""
 
-    __slots__ = ('__weakref__', 'active', 'exclusive', 'parked', 'reentrant')
+    __slots__ = ('__weakref__', 'active', 'admits_all', 'exclusive', 'parked', 'reentrant')
 
     def __init__(self, callback_group: Any) -> None:
         self.exclusive = isinstance(callback_group, MutuallyExclusiveCallbackGroup)
-        self.reentrant = type(callback_group) is ReentrantCallbackGroup
+        self.reentrant = isinstance(callback_group, ReentrantCallbackGroup)
+        # A subclass may have rules of its own.
+        self.admits_all = type(callback_group) is ReentrantCallbackGroup
         self.active = False
         self.parked: deque[Source] = deque()
 
@@ -51,6 +53,7 @@ class Schedule:
     def __init__(self, most_at_once: int, wake: Any) -> None:
         self.lock = threading.RLock()  # A finalizer may create a task.
         self.executing = 0
+        self.waiting = 0
         self.admitting = False
         self._most_at_once = most_at_once
         self._wake = wake
@@ -58,6 +61,7 @@ class Schedule:
         self._runs: list[Run] = []
         self._new_runs: list[Run] = []
         self._held: list[Run] = []
+        self._refused: list[Source] = []
         self._nodes: set[Any] = set()
         self._prefer_runs = True
         self._groups: WeakKeyDictionary[Any, Group] = WeakKeyDictionary()
@@ -67,7 +71,7 @@ class Schedule:
 
     def can_admit(self) -> bool:
         """Tell whether one more callback may run."""
-        return self.executing < self._most_at_once
+        return self.executing - self.waiting < self._most_at_once
 
     def group_of(self, callback_group: Any) -> Group:
         """Return the state of `callback_group`."""
@@ -123,7 +127,7 @@ class Schedule:
         With `alone`, also while nobody spins: for the one callback of `spin_once`.
         """
         with self.lock:
-            if not (alone or self.admitting) or self.executing >= self._most_at_once:
+            if not (alone or self.admitting) or not self.can_admit():
                 return None
             if self._prefer_runs:
                 work = self._next_run() or self._next_source()
@@ -140,16 +144,31 @@ class Schedule:
             if source is not None and not suspended:
                 self._release(source)
 
-    def give_back(self, source: Source) -> None:
-        """Undo a claim of `source`, whose group refused it; `announce` brings it back."""
+    def refuse(self, source: Source) -> None:
+        """Undo a claim of `source`, whose group would not have it; `retry` brings it back."""
         with self.lock:
             self.executing -= 1
+            source.pending += 1
+            source.queued = True
+            self._refused.append(source)
             group = source.group
             group.active = False
-            source.queued = False
-            source.pending += 1
             if group.parked:
                 self._ready.append(group.parked.popleft())
+
+    def retry(self) -> None:
+        """Have the groups asked again that refused a source."""
+        if self._refused:
+            with self.lock:
+                self._ready += self._refused
+                self._refused = []
+            self._wake()
+
+    def step_aside(self, number: int) -> None:
+        """Count so many more callbacks as waiting: others run in their places."""
+        with self.lock:
+            self.waiting += number
+        self._wake()
 
     def _release(self, source: Source) -> None:
         group = source.group

@@ -93,7 +93,6 @@ class SignalBoard:
 
     def __del__(self) -> None:
         self.close()
-        os.close(self._wake_fd)
 
     def attach(self, listener: Listener, shared: Signal | None = None) -> Signal:
         """Give `listener` a signal of its own, or a place at `shared`.
@@ -151,9 +150,13 @@ class SignalBoard:
                 self._others[fd].on_signal(1)
 
     def close(self) -> None:
-        """Give back every descriptor."""
+        """Give back every descriptor; nothing else is called after that."""
         with self._lock:
+            if self._epoll.closed:
+                return
             for fd in self._signals:
                 self._epoll.unregister(fd)
                 _descriptors.put(fd)
             self._signals.clear()
+            self._epoll.close()
+            os.close(self._wake_fd)

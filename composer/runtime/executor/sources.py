@@ -10,9 +10,11 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
+from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
 from composer.runtime.executor import rcl
+from composer.runtime.executor.missed import Missed
 from composer.runtime.executor.schedule import Group, Schedule
 from composer.runtime.executor.signals import UNKNOWN
 
@@ -94,6 +96,10 @@ class Source:
         """Hear of news."""
         self.desk.schedule.announce(self, count)
 
+    def missed(self) -> Missed:
+        """Return what the entity has missed since it is listened to."""
+        return Missed()
+
     def _is_async(self, callback: Any) -> bool:
         if callback is not self._callback:
             self._callback = callback
@@ -119,13 +125,39 @@ class Source:
 
 
 class SubscriptionSource(Source):
-    """A subscription."""
+    """A subscription.
 
-    __slots__ = ()
+    What the middleware announced and nobody can take has been pushed out of its queue by newer
+    messages. `_taken` counts a take from before it begins until it finds nothing, so that one
+    under way in another thread, as reentrant groups have them, is not held for a loss.
+    """
+
+    __slots__ = ('_announced', '_overruns', '_taken')
 
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
+        self._announced = 0
+        self._taken = 0
+        self._overruns = 0
         self._watch(rcl.watch_subscription, shared)
+
+    def on_signal(self, count: int) -> None:
+        """See the base class."""
+        if count < UNKNOWN:
+            self._announced += count
+        super().on_signal(count)
+
+    def missed(self) -> Missed:
+        """See the base class."""
+        profile = self.entity.qos_profile
+        if profile.history == HistoryPolicy.KEEP_LAST and profile.depth:
+            # A queue that never runs empty: the middleware holds no more than its depth.
+            self._note_overruns(self._announced - self._taken - profile.depth)
+        return Missed(overruns=self._overruns)
+
+    def _note_overruns(self, count: int) -> None:
+        # A message may be taken right before it is announced, and the count be too low for once.
+        self._overruns = max(self._overruns, count)
 
     def close(self) -> None:
         """See the base class."""
@@ -135,6 +167,8 @@ class SubscriptionSource(Source):
         """See the base class."""
         entity = self.entity
         stamp = self.stamp
+        announced = self._announced
+        self._taken += 1
         handle = entity.handle
         try:
             with handle:
@@ -142,6 +176,8 @@ class SubscriptionSource(Source):
         except InvalidHandle:
             return NOTHING
         if taken is None:
+            self._taken -= 1
+            self._note_overruns(announced - self._taken)
             self.desk.schedule.drained(self, stamp)
             return NOTHING
         callback = entity.callback

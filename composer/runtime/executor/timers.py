@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 
 from composer.runtime.executor import rcl
+from composer.runtime.executor.missed import LATE_LEAST_NS, LATE_SHARE, Missed
 from composer.runtime.executor.sources import NOTHING, Source
 
 if TYPE_CHECKING:
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
 class TimerSource(Source):
     """A timer: due at its deadline, or when its ROS clock gets there."""
 
-    __slots__ = ('_arming', '_watched_clock', 'deadline_ns')
+    __slots__ = ('_arming', '_late', '_skipped', '_watched_clock', 'deadline_ns')
 
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
         self._arming = threading.Lock()
+        self._late = 0
+        self._skipped = 0
         self.deadline_ns: int | None = None
         self._watched_clock: ClockWatch | None = None
         self.signal = self.desk.board.attach(self, shared)
@@ -77,9 +80,7 @@ class TimerSource(Source):
         try:
             handle = timer.handle
             with handle:
-                due = handle.is_timer_ready()
-                if due:
-                    handle.call_timer()
+                due = self._call(handle)
         except InvalidHandle:
             return NOTHING
         self.rearm()
@@ -88,3 +89,25 @@ class TimerSource(Source):
         callback = timer.callback
         result = callback()
         return result if self._is_async(callback) else None
+
+    def missed(self) -> Missed:
+        """See the base class."""
+        return Missed(late_ticks=self._late, skipped_ticks=self._skipped)
+
+    def _call(self, handle: Any) -> bool:
+        """Tell rcl that the tick begins, and count what was missed; False if it is not due."""
+        begin_ns = time.monotonic_ns()
+        until_ns = handle.time_until_next_call()
+        if until_ns is None or until_ns > 0:
+            return False
+        handle.call_timer()
+        next_until_ns = handle.time_until_next_call()
+        period_ns = handle.get_timer_period()
+        if next_until_ns is None or not period_ns:
+            return True
+        if -until_ns > LATE_LEAST_NS and -until_ns > LATE_SHARE * period_ns:
+            self._late += 1
+        # rcl sets the next tick to the next multiple of the period that has not passed.
+        advance_ns = next_until_ns - until_ns + time.monotonic_ns() - begin_ns
+        self._skipped += max(0, advance_ns // period_ns - 1)
+        return True

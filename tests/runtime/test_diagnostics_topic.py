@@ -1,0 +1,178 @@
+"""`/diagnostics`, as a plain rclpy node hears it from a running system."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from std_msgs.msg import Empty, Int32
+
+pytestmark = pytest.mark.ros
+
+BEHAVIOURS = """
+import threading
+
+may_go = threading.Event()
+
+def hear(node, message):
+    if message.data < 0:
+        raise ValueError(f'{message.data} is negative')
+
+def stick(node, message):
+    node.logger.info(f'got {message.data}')
+    if message.data == 0:
+        may_go.wait(60.0)
+
+def go(node, message):
+    may_go.set()
+
+def tick(node):
+    pass
+
+def fail(node):
+    raise RuntimeError('no luck')
+"""
+
+SYSTEM = """
+version: 1
+diagnostics: {period: 0.2}
+nodes:
+  ear:
+    namespace: robot
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int32, topic: /numbers, behaviour: parts:hear}
+  sticky:
+    subscriptions:
+      slow: {type: std_msgs/msg/Int32, behaviour: parts:stick, qos: 10}
+      release: {type: std_msgs/msg/Empty, behaviour: parts:go, group: other}
+    timers:
+      tick: {rate: 50, behaviour: parts:tick}
+"""
+
+
+class Listener:
+    """What was heard of each entity."""
+
+    def __init__(self, peer):
+        self.messages = peer.listen(DiagnosticArray, '/diagnostics', 100)
+
+    def statuses(self, name):
+        return [s for m in list(self.messages) for s in m.status if s.name == name]
+
+    def values(self, name):
+        statuses = self.statuses(name)
+        return {pair.key: pair.value for pair in statuses[-1].values} if statuses else {}
+
+
+@pytest.fixture
+def listener(peer):
+    return Listener(peer)
+
+
+def test_calls_and_errors_are_counted(compose, peer, listener, wait_for):
+    compose(SYSTEM, BEHAVIOURS).wait_until_ready()
+    publisher = peer.advertise(Int32, '/numbers')
+    name = '/robot/ear: subscription numbers'
+    for number in (1, 2, -3, 4, -5):
+        publisher.publish(Int32(data=number))
+    wait_for(lambda: listener.values(name).get('calls') == '5', 'five calls')
+    assert listener.values(name)['errors'] == '2'
+    wait_for(
+        lambda: any(
+            s.level == DiagnosticStatus.ERROR
+            and s.message.endswith('last: ValueError: -5 is negative')
+            for s in listener.statuses(name)
+        ),
+        'the errors',
+    )
+    wait_for(lambda: listener.statuses(name)[-1].level == DiagnosticStatus.OK, 'its recovery')
+    assert {s.hardware_id for s in listener.statuses(name)} == {'system'}
+
+
+def test_a_behaviour_that_hangs_is_told_of_with_all_that_it_holds_up(
+    compose, peer, listener, wait_for
+):
+    child = compose(SYSTEM, BEHAVIOURS)
+    child.wait_until_ready()
+    publisher = peer.advertise(Int32, '/slow', 200)
+    slow, tick = '/sticky: subscription slow', '/sticky: timer tick'
+    wait_for(lambda: listener.values(tick).get('calls', '0') != '0', 'a tick')
+    publisher.publish(Int32(data=0))
+    child.wait_for_line('got 0')
+    for number in range(1, 101):
+        publisher.publish(Int32(data=number))
+    wait_for(
+        lambda: 'a call has been running for' in listener.statuses(slow)[-1].message,
+        'what hangs',
+    )
+    status = listener.statuses(slow)[-1]
+    assert status.level == DiagnosticStatus.WARN
+    assert listener.values(slow)['calls'] == '0'
+    peer.advertise(Empty, '/release').publish(Empty())
+    wait_for(lambda: listener.values(slow)['calls'] == '11', 'those that were kept')
+    assert listener.values(slow)['queue overruns'] == '90'
+    wait_for(lambda: int(listener.values(tick)['skipped ticks']) >= 50, 'skipped ticks')
+    assert int(listener.values(tick)['late ticks']) >= 1
+    wait_for(
+        lambda: any(
+            s.level == DiagnosticStatus.WARN and 'skipped tick' in s.message
+            for s in listener.statuses(tick)
+        ),
+        'the warning',
+    )
+    assert child.stop() == 0
+
+
+def test_counts_survive_restarts_of_the_node(compose, listener, wait_for):
+    child = compose(
+        """
+        version: 1
+        nodes:
+          phoenix:
+            on_error: restart
+            timers: {burn: {period: 0.05, behaviour: parts:fail}}
+        """,
+        BEHAVIOURS,
+    )
+    child.wait_for_line("node 'phoenix' was restarted", times=2)
+    name = '/phoenix: timer burn'
+    wait_for(lambda: int(listener.values(name).get('errors', 0)) >= 3, 'three errors')
+    assert child.stop() == 0
+
+
+def test_it_can_be_turned_off(compose, peer, wait_for):
+    child = compose(SYSTEM.replace('{period: 0.2}', 'false'), BEHAVIOURS)
+    child.wait_until_ready()
+    wait_for(lambda: peer.node.count_publishers('/numbers') == 0 and seen(peer, 'sticky'), 'it')
+    peer.advertise(Int32, '/numbers').publish(Int32(data=-1))
+    child.wait_for_line('-1 is negative')
+    assert peer.node.count_publishers('/diagnostics') == 0
+    assert not seen(peer, '_composer_system')
+    assert child.stop() == 0
+
+
+def seen(peer, name):
+    return name in peer.node.get_node_names()
+
+
+@pytest.mark.parametrize(('written', 'period_sec'), [('{period: 0.1}', 0.1), ('true', 1.0)])
+def test_it_comes_as_often_as_declared(compose, peer, listener, wait_for, written, period_sec):
+    child = compose(SYSTEM.replace('{period: 0.2}', written), BEHAVIOURS)
+    child.wait_until_ready()
+    # Messages that the machine delayed do not shift those after them.
+    wait_for(lambda: len(listener.messages) > 5, 'six messages')
+    stamps = [m.header.stamp.sec + m.header.stamp.nanosec / 1e9 for m in listener.messages[:6]]
+    mean_sec = (stamps[-1] - stamps[0]) / 5
+    assert 0.5 * period_sec < mean_sec < 5 * period_sec
+    assert child.stop() == 0
+
+
+def test_its_node_is_hidden_and_has_nothing_but_the_topic(compose, peer, listener, wait_for):
+    child = compose(SYSTEM, BEHAVIOURS)
+    child.wait_until_ready()
+    wait_for(lambda: seen(peer, '_composer_system'), 'the node')
+    wait_for(lambda: listener.messages, 'a message')
+    (end,) = peer.node.get_publishers_info_by_topic('/diagnostics')
+    assert end.node_name == '_composer_system'
+    assert peer.node.get_service_names_and_types_by_node('_composer_system', '/') == []
+    assert child.stop() == 0

@@ -1,0 +1,150 @@
+"""What a system asks of its executor beyond rclpy's promises."""
+
+import threading
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.task import Future
+
+from composer.runtime.executor import ComposerExecutor
+from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
+from composer.runtime.system_executor import NoResponseError, SystemExecutor
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(60, method='thread')]
+DEADLINE_SEC = 20.0
+
+
+@pytest.fixture
+def system_executor(context, node):
+    logged = []
+    executor = SystemExecutor(context, 1, logged.append)
+    executor.logged = logged
+    node.executor.remove_node(node)
+    executor.add_node(node)
+    executor.start()
+    yield executor
+    assert executor.stop(DEADLINE_SEC)
+
+
+@pytest.mark.parametrize('kind', [GatedMutuallyExclusiveGroup, GatedReentrantGroup])
+def test_a_closed_gate_keeps_ticks_until_it_opens_and_the_executor_is_woken(
+    system_executor, node, wait_for, kind
+):
+    gate = Gate()
+    ticks, others = [], []
+    node.create_timer(0.01, lambda: ticks.append(1), callback_group=kind(gate))
+    node.create_timer(0.01, lambda: others.append(1))
+    wait_for(lambda: len(others) > 5, 'ticks of the timer without a gate')
+    assert not ticks
+
+    gate.open()
+    system_executor.wake()
+
+    wait_for(lambda: len(ticks) > 5, 'ticks behind the gate')
+
+
+def test_callbacks_of_a_gated_reentrant_group_run_beside_each_other(
+    context, node, wait_for, system_executor
+):
+    gate = Gate()
+    gate.open()
+    system_executor.stop(DEADLINE_SEC)
+    executor = SystemExecutor(context, None, print)
+    executor.add_node(node)
+    barrier = threading.Barrier(2)
+    met = []
+
+    def meet():
+        barrier.wait(DEADLINE_SEC)
+        met.append(1)
+
+    node.create_timer(0.01, meet, callback_group=GatedReentrantGroup(gate))
+    executor.start()
+
+    wait_for(lambda: len(met) >= 2, 'two ticks at the same time')
+    executor.stop(DEADLINE_SEC)
+
+
+def test_a_callback_that_waits_does_not_count_against_the_threads(system_executor, node, wait_for):
+    done, others = threading.Event(), []
+
+    def wait_for_others():
+        with system_executor.waiting():
+            assert done.wait(DEADLINE_SEC)
+        others.append('waited')
+
+    waiter = node.create_timer(
+        0.01, wait_for_others, callback_group=MutuallyExclusiveCallbackGroup()
+    )
+    node.create_timer(0.01, done.set, callback_group=MutuallyExclusiveCallbackGroup())
+
+    wait_for(lambda: others, 'the end of the wait')
+    waiter.cancel()
+
+
+def test_one_thread_runs_one_callback_at_a_time(system_executor, node, wait_for):
+    inside, most = [], []
+
+    def enter():
+        inside.append(1)
+        most.append(len(inside))
+        threading.Event().wait(0.005)
+        inside.pop()
+
+    for _ in range(3):
+        node.create_timer(0.001, enter, callback_group=MutuallyExclusiveCallbackGroup())
+
+    wait_for(lambda: len(most) > 20, 'callbacks')
+    assert max(most) == 1
+
+
+def test_a_call_later_comes_and_a_cancelled_one_does_not(system_executor, wait_for):
+    called = []
+    cancelled = system_executor.call_later(0.02, lambda: called.append('cancelled'))
+    cancelled.cancel()
+    system_executor.call_later(0.05, lambda: called.append('kept'))
+
+    wait_for(lambda: called, 'the call')
+    assert called == ['kept']
+
+
+def test_a_fault_is_logged_once_and_dispatching_goes_on(system_executor, node, wait_for):
+    ticks = []
+
+    def fail():
+        failing.cancel()
+        raise ValueError
+
+    failing = node.create_timer(0.01, fail)
+    node.create_timer(0.01, lambda: ticks.append(1))
+
+    wait_for(lambda: len(ticks) > 5, 'ticks after the fault')
+    assert len(system_executor.logged) == 1
+    assert system_executor.logged[0].endswith('ValueError')
+
+
+def test_a_missing_response_is_no_fault(system_executor):
+    def give_none():
+        reason = 'its behaviour raised'
+        raise NoResponseError(reason)
+
+    done = threading.Event()
+    system_executor.create_task(give_none).add_done_callback(lambda _: done.set())
+
+    assert done.wait(DEADLINE_SEC)
+    assert system_executor.logged == []
+
+
+def test_threads_end_with_their_executor(context):
+    before = set(threading.enumerate())
+    executor = ComposerExecutor(context=context)
+    future = Future()
+    executor.create_task(lambda: future.set_result(1))
+    executor.spin_until_future_complete(future, DEADLINE_SEC)
+
+    executor.shutdown()
+
+    assert set(threading.enumerate()) == before
