@@ -25,8 +25,9 @@ def create_subscriptions(node: LiveNode) -> None:
             owner,
             spec.path,
             _create_function(node, spec),
-            on_error=spec.on_error,
+            rules=spec,
             publish=spec.publish,
+            admits=node.gate.lets_events,
         )
         subscription = node.ros.create_subscription(
             import_interface(spec.type),
