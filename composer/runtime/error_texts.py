@@ -20,6 +20,15 @@ def summarize(error: BaseException) -> str:
     return _cut(f'{type(error).__name__}: {text}', _LONGEST_SUMMARY)
 
 
+def represent(error: BaseException) -> str:
+    """Return it as Python shows values, and never raise."""
+    try:
+        text = repr(error)
+    except BaseException:  # noqa: BLE001 - as above
+        text = f'{type(error).__name__}()'
+    return _cut(text, _LONGEST_SUMMARY)
+
+
 def place_of(error: BaseException) -> tuple[str, int | None]:
     """Return the file and line where it was raised."""
     trace = error.__traceback__
