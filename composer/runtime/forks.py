@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import traceback
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -21,6 +22,9 @@ in_child = False
 
 # What a child does at signals, by their numbers: what was done before the system took them.
 signal_handlers: dict[int, Any] = {}
+
+# The mask of signals of a thread that forks.
+_forking = threading.local()
 
 # The code of coroutines that run behaviours.
 coroutine_codes: set[CodeType] = set()
@@ -60,12 +64,24 @@ def _flush() -> None:
             stream.flush()
 
 
+def _prepare() -> None:
+    # What is in the buffers is the system's to write, not the child's again.
+    _flush()
+    # A signal that comes to the child before it has its own handlers must wait for them.
+    _forking.mask = signal.pthread_sigmask(signal.SIG_BLOCK, signal_handlers)
+
+
+def _go_on() -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, _forking.mask)
+
+
 def _begin_child() -> None:
     global in_child  # noqa: PLW0603 - it is a fact about the process
     in_child = True
     for number, handler in signal_handlers.items():
         with suppress(ValueError, TypeError):
             signal.signal(number, handler)
+    _go_on()
     frame: FrameType | None = sys._getframe()  # noqa: SLF001 - the only way
     while frame is not None and frame.f_code not in coroutine_codes:
         frame = frame.f_back
@@ -83,5 +99,4 @@ def _leave_at_end_of(coroutine: FrameType) -> None:
     sys.setprofile(look)
 
 
-# What is in the buffers is the system's to write, not the child's again.
-os.register_at_fork(before=_flush, after_in_child=_begin_child)
+os.register_at_fork(before=_prepare, after_in_parent=_go_on, after_in_child=_begin_child)
