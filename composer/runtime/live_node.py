@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
     from composer.runtime.health import EntityHealth, HealthBoard
+    from composer.runtime.matching import Endpoint
     from composer.runtime.service_clients import ServiceClient
     from composer.runtime.system_executor import SystemExecutor
     from composer.runtime.waiting import StopSignal
@@ -102,6 +103,7 @@ class LiveNode:
         background: A group that no behaviour is in: responses and the like are always taken.
         serving: The group of requests to action servers.
         at_destruction: What ends entities that rclpy's node does not end itself.
+        endpoints: Its publishers and subscriptions.
         at_stop: Behaviours that wait half-way, to be ended before `on_stop`.
         limits: How long behaviours may run, by their owners.
     """
@@ -120,6 +122,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
+    endpoints: list[Endpoint] = field(default_factory=list)
     at_stop: list[AtStop] = field(default_factory=list)
     limits: dict[str, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)

@@ -20,6 +20,7 @@ from composer.runtime.health import HealthBoard
 from composer.runtime.health_publisher import HealthPublisher
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
+from composer.runtime.matching import GraphWatch
 from composer.runtime.ownership import release, reserve
 from composer.runtime.stopping import stop_node, stop_nodes
 from composer.runtime.supervision import Supervisor
@@ -73,6 +74,7 @@ class System:
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._watch = HangWatch(lambda: list(self._nodes.values()), _limits(spec))
+        self._graph_watch = GraphWatch(lambda: list(self._nodes.values()))
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(
             context=self._context,
@@ -124,6 +126,7 @@ class System:
             self._publish_health()
             self._executor.start()
             self._watch.start()
+            self._graph_watch.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None
             self._executor.wake()
@@ -265,6 +268,7 @@ class System:
             self.request_stop(ExitCode.FAILED)
 
     def _tear_down(self) -> None:
+        self._graph_watch.stop()
         if self._health_publisher is not None:
             self._health_publisher.stop()
         for node in self._nodes.values():

@@ -67,7 +67,9 @@ def count_slowly(node, goal):
     return [1]
 """
 
-REPORT = re.compile(r"\[WARN\] \[bad\]: (.+) \(system.yaml:(\d+)\) has been running for (.+) s; it is at")
+REPORT = re.compile(
+    r'\[WARN\] \[bad\]: (.+) \(system.yaml:(\d+)\) has been running for (.+) s; it is at'
+)
 
 
 def stack_after(child, line):
@@ -252,13 +254,16 @@ nodes:
     timers: {{go: {{period: 0.02, behaviour: 'parts:go'}}}}
 """
 
-ACTION_CODE = CODE + """
+ACTION_CODE = (
+    CODE
+    + """
 def go(node):
     yield
     node.send_goal('count', {'order': 8}, timeout=30)
     yield
     return None
 """
+)
 
 
 def test_an_action_that_yields_feedback_is_not_reported(compose):

@@ -86,12 +86,30 @@ nodes:
 @pytest.mark.parametrize(
     ('behaviour', 'error'),
     [
-        ('destroy_node', 'the node belongs to the system, so a behaviour cannot call destroy_node()'),
-        ('destroy_node_async', 'the node belongs to the system, so a behaviour cannot call destroy_node()'),
-        ('shutdown_context', 'the context belongs to the system, so a behaviour cannot call shutdown()'),
-        ('shutdown_by_name', 'the context belongs to the system, so a behaviour cannot call shutdown()'),
-        ('try_shutdown_context', 'the context belongs to the system, so a behaviour cannot call try_shutdown()'),
-        ('shutdown_executor', 'the executor belongs to the system, so a behaviour cannot call shutdown()'),
+        (
+            'destroy_node',
+            'the node belongs to the system, so a behaviour cannot call destroy_node()',
+        ),
+        (
+            'destroy_node_async',
+            'the node belongs to the system, so a behaviour cannot call destroy_node()',
+        ),
+        (
+            'shutdown_context',
+            'the context belongs to the system, so a behaviour cannot call shutdown()',
+        ),
+        (
+            'shutdown_by_name',
+            'the context belongs to the system, so a behaviour cannot call shutdown()',
+        ),
+        (
+            'try_shutdown_context',
+            'the context belongs to the system, so a behaviour cannot call try_shutdown()',
+        ),
+        (
+            'shutdown_executor',
+            'the executor belongs to the system, so a behaviour cannot call shutdown()',
+        ),
     ],
 )
 def test_a_behaviour_cannot_end_what_belongs_to_the_system(compose, behaviour, error):

@@ -100,7 +100,9 @@ def test_a_timer_may_raise_anything_and_ticks_on(compose, kind):
     text = f"version: 1\nnodes:\n  bad:\n    timers:\n{timers}\n  good: {{timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}}}\n"
     child = compose(text, CODE)
     for name, error in ERRORS.items():
-        child.wait_for_line(f"[ERROR] [bad]: timer '{name}' (system.yaml:{5 + list(ERRORS).index(name)}) raised {error}")
+        child.wait_for_line(
+            f"[ERROR] [bad]: timer '{name}' (system.yaml:{5 + list(ERRORS).index(name)}) raised {error}"
+        )
         child.wait_for_line(f"timer '{name}'", times=2)
     alive = len(child.matching('alive'))
     child.wait_for_line('alive', times=alive + 3)
@@ -210,7 +212,9 @@ def test_on_start_and_on_stop_may_raise_anything(compose, kind):
     assert child.matching('[ERROR] [last]: on_start (system.yaml:10) raised SystemExit: 5')
     assert child.lines[-1] == "error: node 'last': on_start raised SystemExit(5)"
     for index, (name, error) in enumerate(ERRORS.items()):
-        assert child.matching(f'[ERROR] [{name}]: on_stop (system.yaml:{index + 3}) raised {error}')
+        assert child.matching(
+            f'[ERROR] [{name}]: on_stop (system.yaml:{index + 3}) raised {error}'
+        )
     assert not own_frames(child)
 
 
