@@ -1,7 +1,7 @@
 """Publishers and subscriptions that meet on a topic and cannot talk: told with both ends named.
 
-That the QoS of two ends differs is an event of ROS, which tells the policy but not the other end; the
-graph knows that one. That their types differ is no event of Fast DDS, and is seen in the graph alone.
+That the QoS of two ends differs is an event of ROS, which does not tell the other end; the graph
+does. That their types differ is no event of Fast DDS, and is seen in the graph alone.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Endpoint:
         here, there = self._profile, end.qos_profile
         offered, wanted = (here, there) if self._publishes else (there, here)
         compatibility, text = qos_check_compatible(offered, wanted)
-        if compatibility is not QoSCompatibility.ERROR:
+        if compatibility != QoSCompatibility.ERROR:
             return None
         for policy, conflict in _CONFLICTS.items():
             values = getattr(offered, policy), getattr(wanted, policy)
