@@ -82,11 +82,23 @@ def _begin_child() -> None:
         with suppress(ValueError, TypeError):
             signal.signal(number, handler)
     _go_on()
+    _become_main_thread()
     frame: FrameType | None = sys._getframe()  # noqa: SLF001 - the only way
     while frame is not None and frame.f_code not in coroutine_codes:
         frame = frame.f_back
     if frame is not None:
         _leave_at_end_of(frame)
+
+
+def _become_main_thread() -> None:
+    """Do what Python forgets for a thread that it did not start itself.
+
+    Without it `multiprocessing` ends its children with exit code 1
+    (https://github.com/python/cpython/issues/102512, mended in 3.12.3).
+    """
+    thread: Any = threading.main_thread()
+    if getattr(thread, '_tstate_lock', thread) is None:
+        thread._set_tstate_lock()  # noqa: SLF001 - as Python itself does since
 
 
 def _leave_at_end_of(coroutine: FrameType) -> None:
