@@ -23,6 +23,7 @@ _TYPE_WORDS = {
     'number': 'a number',
     'integer': 'an integer',
     'boolean': 'true or false',
+    'null': 'null',
 }
 _LONGEST_SHOWN = 40
 

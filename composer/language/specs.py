@@ -1,6 +1,7 @@
 """A system as the file declares it: frozen records, one per thing of the language.
 
 Every record carries the path of its data, under which a `SourceMap` knows where it was written.
+`warn_after_sec` is how long a behaviour may run before it is reported, `None` for ever.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
+DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
 
 
@@ -111,6 +113,7 @@ class SubscriptionSpec:
     group: str | None
     on_error: OnError
     external: bool
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -131,6 +134,7 @@ class TimerSpec:
     clock: ClockName
     group: str | None
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -149,6 +153,7 @@ class ServiceSpec:
     behaviour: BehaviourSpec
     group: str | None
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -183,6 +188,7 @@ class ActionSpec:
     accept: BehaviourSpec | None
     concurrency: Concurrency
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -229,6 +235,7 @@ class NodeSpec:
     type_description_service: bool
     logger_services: bool
     on_error: OnError
+    warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
     remap: tuple[tuple[str, str], ...]
