@@ -47,6 +47,7 @@ class ModuleFinder:
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
+        self._listed: dict[Path, list[str]] = {}
 
     def find(self, name: str) -> ModuleSource | MissingModule:
         """Return the module `package.module`, or what of its name is missing."""
@@ -68,7 +69,10 @@ class ModuleFinder:
         return read_module(file) if file else ModuleSource(None)
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
-        near = suggest(part, {name for folder in folders for name in _list_modules(folder)})
+        for folder in folders:
+            if folder not in self._listed:
+                self._listed[folder] = _list_modules(folder)
+        near = suggest(part, {name for folder in folders for name in self._listed[folder]})
         return '.'.join([*done, near]) if near else None
 
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from composer.python_source import FunctionSource
     from composer.python_uses import NodePass, NodeUse, UseKind
 
-_FEW = 8
+# Helpers of helpers are followed so far; those that call themselves go deeper.
+_DEEPEST = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +65,13 @@ class UseReader:
             return _UNKNOWN
         if name in module.imports:
             home, _, original = module.imports[name].rpartition('.')
-            if not home or len(callers) > _FEW:
+            if not home or len(callers) > _DEEPEST:
                 return _UNKNOWN
             callers = (*callers, name)
             return self._uses(self._modules.find(home), original, position, given, callers)
         source = module.functions.get(name)
         caller = f'{module.path}:{name}'
-        if source is None or caller in callers or len(callers) > _FEW:
+        if source is None or len(callers) > _DEEPEST:
             return _UNKNOWN
         key = (caller, position, given)
         if key not in self._read:
@@ -97,7 +98,8 @@ class UseReader:
             found += [_as_passed(each, passed, is_late=is_late) for each in inner.found]
             open_kinds |= inner.open_kinds
             reads_others |= inner.reads_others
-        return BehaviourUses(tuple(found), open_kinds, reads_others)
+        # Each once, or functions that call each other often would never be done.
+        return BehaviourUses(tuple(dict.fromkeys(found)), open_kinds, reads_others)
 
     def _is_coroutine(self, module: ModuleSource, name: str) -> bool:
         source = module.functions.get(name)

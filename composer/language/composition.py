@@ -11,6 +11,8 @@ from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
 
 # No system needs more; the bound keeps all later walks over the data safe from deep recursion.
 MAX_DEPTH = 100
+# Five times what a file of a thousand nodes with five thousand entities has.
+MAX_VALUES = 300_000
 
 # libyaml's parser is ten times faster; wheels of PyYAML bring it, source builds may not.
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
@@ -91,6 +93,7 @@ class _TreeBuilder:
         self._open: list[SequenceNode | MappingNode] = []
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
+        self._nodes = 0
 
     def take(self, event: Any) -> None:
         if isinstance(event, yaml.ScalarEvent):
@@ -117,6 +120,10 @@ class _TreeBuilder:
             self._stop(event, 'too-deep', f'the data nest more than {MAX_DEPTH} levels deep')
 
     def _add(self, node: TreeNode, anchor: str | None) -> None:
+        self._nodes += 1
+        if self._nodes > MAX_VALUES:
+            message = f'the file holds more than {MAX_VALUES:,} keys and values'
+            raise CompositionError(diagnostic_at(node.span, 'unreadable-file', message))
         if anchor is not None:
             self._anchors[anchor] = node
         if not self._open:

@@ -145,8 +145,11 @@ class EntityHealth:
 
     def note_error(self, error: BaseException) -> None:
         """Note that a call raised."""
-        self._last_error = f'{type(error).__name__}: {error}'
         self._errors += 1
+        try:
+            self._last_error = f'{type(error).__name__}: {error}'
+        except BaseException:  # noqa: BLE001 - it is the behaviour's code that runs here
+            self._last_error = type(error).__name__
 
     def follow(self, look: Callable[[], Missed]) -> None:
         """From now on, ask here for what it has missed: its node was built, or built anew."""

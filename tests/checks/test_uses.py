@@ -57,7 +57,8 @@ def test_helpers_are_followed_through_modules(check, tmp_path):
 
 
 def test_a_helper_that_calls_itself_ends(check):
-    code = 'def tell(node): tell(node)\n' + run('tell(node)')
+    lines = ["node.publish('out', 1)", *['tell(node)'] * 40]
+    code = run(*lines, head='def tell(node):') + run('tell(node)')
     assert check(NODE, code) == []
 
 

@@ -102,6 +102,17 @@ def test_a_report_tells_the_period_and_the_whole():
     assert (second.period_sec, second.running_sec) == (2.0, 7.0)
 
 
+def test_an_error_that_cannot_be_shown_counts_too():
+    class MuteError(Exception):
+        def __str__(self):
+            raise ValueError
+
+    health = EntityHealth()
+    health.note_error(MuteError())
+    report = health.report(1.0, 0.0)
+    assert (report.errors, report.last_error) == (1, 'MuteError')
+
+
 def test_counts_survive_that_the_node_is_built_anew():
     board = HealthBoard()
     old = board.entity('/a', "timer 'b'")
