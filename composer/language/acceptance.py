@@ -176,6 +176,7 @@ _TYPES: dict[str, Acceptor] = {
     'array': lambda data: isinstance(data, list),
     'string': lambda data: isinstance(data, str),
     'boolean': lambda data: isinstance(data, bool),
+    'null': lambda data: data is None,
     'number': _is_number,
     'integer': _is_integer,
 }

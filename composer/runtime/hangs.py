@@ -50,6 +50,11 @@ class HangLimit:
         self._unsaid: set[int] = set()
         self._reported: dict[int, int] = {}
 
+    def is_exceeded_by(self, call: RunningCall) -> bool:
+        """Return whether a call has been running for too long."""
+        ran_sec = (time.monotonic_ns() - call.since_ns) * 1e-9
+        return self.after_sec is not None and ran_sec >= self.after_sec
+
     def look_at(self, ledger: CallLedger, token: int, call: RunningCall) -> None:
         """Report a call that has been running for too long; each is reported once."""
         reported_ns = self._reported.get(token)

@@ -247,7 +247,7 @@ class System:
         board, period_sec = self._services.health, self._spec.diagnostics_period_sec
         if board is None or period_sec is None:
             return
-        publisher = HealthPublisher(self._spec.name, period_sec, board, self._running_calls)
+        publisher = HealthPublisher(self._spec.name, period_sec, board, self._overdue_calls)
         try:
             publisher.start(self._context, self._services.ros_arguments)
         except ImportError as error:
@@ -255,11 +255,12 @@ class System:
         else:
             self._health_publisher = publisher
 
-    def _running_calls(self) -> list[tuple[str, RunningCall]]:
+    def _overdue_calls(self) -> list[tuple[str, RunningCall]]:
         return [
             (node.full_name, call)
             for node in list(self._nodes.values())
             for call in node.ledger.running()
+            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
 
     def _on_lost(self) -> None:
