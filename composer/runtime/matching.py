@@ -79,7 +79,7 @@ class Endpoint:
 
     @property
     def is_due(self) -> bool:
-        """Whether an event told that there is somebody to be looked for."""
+        """Whether there must be somebody who has not been found."""
         return self._looks > 0
 
     def look(self) -> None:
@@ -96,9 +96,13 @@ class Endpoint:
                 self._tell(name, reason)
         self._looks = 0 if found else max(self._looks - 1, 0)
 
+    def expect(self) -> None:
+        """Look for somebody in the next moments, for there must be one."""
+        self._looks = _MOST_LOOKS
+
     def _default_incompatible_qos(self, _event: Any) -> None:
         # The executor looks seldom at handlers of such a name, as at those of rclpy itself.
-        self._looks = _MOST_LOOKS
+        self.expect()
 
     def _others(self) -> list[TopicEndpointInfo]:
         ros = self._node.ros
@@ -186,7 +190,9 @@ class GraphWatch:
             for end in node.endpoints:
                 if self._ended.is_set():
                     return
-                if end.is_due or end.topic in mixed:
+                if end.topic in mixed:
+                    end.expect()
+                if end.is_due:
                     end.look()
 
     def _newly_mixed_topics(self, nodes: list[LiveNode]) -> set[str]:

@@ -64,7 +64,7 @@ def test_each_end_is_told_of_once_and_those_that_fit_are_heard(compose, peer):
     assert len(child.matching('[WARN]')) == 2
 
 
-def test_two_nodes_of_one_system_are_both_told(compose):
+def test_two_nodes_that_meet_by_a_rule_of_the_command_line_are_both_told(compose):
     text = """
         version: 1
         nodes:
@@ -72,16 +72,16 @@ def test_two_nodes_of_one_system_are_both_told(compose):
             subscriptions:
               map: {type: std_msgs/msg/String, behaviour: 'parts:hear', qos: {durability: transient_local}}
           mouth:
-            publishers: {map: std_msgs/msg/String}
+            publishers: {words: std_msgs/msg/String}
     """
-    child = compose(text, CODE)
+    child = compose(text, CODE, '--ros-args', '-r', 'mouth:words:=map')
 
     child.wait_for_line(
         "[WARN] [ears]: subscription 'map' (system.yaml:6) gets nothing from '/mouth': "
         'durability is volatile there, and transient_local is wanted here; '
     )
     child.wait_for_line(
-        "[WARN] [mouth]: publisher 'map' (system.yaml:8) sends nothing to '/ears': "
+        "[WARN] [mouth]: publisher 'words' (system.yaml:8) sends nothing to '/ears': "
         'durability is volatile here, and transient_local is wanted there; '
     )
 

@@ -47,6 +47,7 @@ class Engine:
         desk = Desk(executor, self.schedule, self.polling.board, self.alarms)
         self.lane = Lane(desk, guard, sigint_guard, self)
         desk.look_again = self.lane.look_again
+        desk.peek = self.polling.peek
         self.registry = Registry(desk, self.lane)
         self.crew = Crew(Leader(self).lead)
         self._sessions = 0

@@ -42,6 +42,11 @@ class Desk:
         self.board = board
         self.alarms = alarms
         self.look_again: Callable[[Source], None] = _look_at_nothing
+        self.peek: Callable[[], bool] = bool
+
+    def has_more(self) -> bool:
+        """Look for signals; returns whether there were any, or there are tasks to run."""
+        return self.peek() or bool(self.schedule.count_runs())
 
 
 def _look_at_nothing(_: 'Source') -> None:
@@ -196,13 +201,18 @@ class SubscriptionSource(Source):
 
 
 class ClientSource(Source):
-    """A service client."""
+    """A service client.
+
+    Somebody who spins until the response is there stops then. So it lets go first what came
+    with it or before it, once: rclpy executes tasks and messages before responses.
+    """
 
     rank = 2
-    __slots__ = ()
+    __slots__ = ('_gave_way',)
 
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
+        self._gave_way = False
         self._watch(rcl.watch_client, shared)
 
     def close(self) -> None:
@@ -211,6 +221,10 @@ class ClientSource(Source):
 
     def run(self) -> Any:
         """See the base class."""
+        self._gave_way = not self._gave_way and self.desk.has_more()
+        if self._gave_way:
+            self.desk.schedule.announce(self, 1)
+            return NOTHING
         stamp = self.stamp
         try:
             handle = self.entity.handle

@@ -132,3 +132,23 @@ def test_what_a_service_has_a_task_publish_comes_before_its_response(
         future.add_done_callback(lambda _: heard.append('response'))
         wait_for(lambda: len(heard) == 2)
     assert heard == ['message', 'response']
+
+
+def test_a_response_waits_for_a_message_that_came_after_the_last_look(
+    node: Any, executor: Any
+) -> None:
+    heard: list[str] = []
+    client = node.create_client(Trigger, 'greet')
+    node.create_subscription(Int32, 'count', lambda _: heard.append('message'), 10)
+    publisher = node.create_publisher(Int32, 'count', 10)
+    node.create_service(Trigger, 'greet', lambda _, r: r)
+    executor.spin_once(timeout_sec=0)
+    assert client.wait_for_service(DEADLINE_SEC)
+    future = client.call_async(Trigger.Request())
+    future.add_done_callback(lambda _: heard.append('response'))
+    executor.spin_once(timeout_sec=5)
+    wait_for(executor._engine.polling.peek)
+    publisher.publish(Int32())
+    executor.spin_until_future_complete(future, timeout_sec=DEADLINE_SEC)
+    wait_for(lambda: executor.spin_once(timeout_sec=0) or 'response' in heard)
+    assert heard == ['message', 'response']

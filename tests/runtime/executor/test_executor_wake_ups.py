@@ -25,14 +25,14 @@ def engine(domain_id):
 
 
 def test_who_looks_in_passing_leaves_a_wake_up_to_those_who_wait(engine):
-    engine._pollers.add(A_THREAD_THAT_WAITS)
-    engine.wake_poll()
-    assert engine._peek()
-    assert engine._board.peek(), 'the leader would sleep on'
-    engine._pollers.clear()
+    engine.polling._pollers.add(A_THREAD_THAT_WAITS)
+    engine.polling.wake()
+    assert engine.polling.peek()
+    assert engine.polling.board.peek(), 'the leader would sleep on'
+    engine.polling._pollers.clear()
 
 
 def test_who_looks_while_nobody_waits_uses_the_wake_up_up(engine):
-    engine._board.wake()
-    assert engine._peek()
-    assert not engine._board.peek(), 'the leader would never sleep'
+    engine.polling.board.wake()
+    assert engine.polling.peek()
+    assert not engine.polling.board.peek(), 'the leader would never sleep'
