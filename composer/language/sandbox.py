@@ -109,7 +109,10 @@ class Sandbox(SandboxedEnvironment):
             TemplateError: It is none.
         """
         expression = self._parse_once(code)
-        found = {each.name for each in expression.find_all(nodes.Name)}
+        try:
+            found = {each.name for each in expression.find_all(nodes.Name)}
+        except RecursionError:
+            raise _too_deep() from None
         return found | ({expression.name} if isinstance(expression, nodes.Name) else set())
 
     def measure(self, text: str) -> int:
