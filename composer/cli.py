@@ -149,8 +149,10 @@ def cli() -> None:
     context_settings={'ignore_unknown_options': True, 'help_option_names': []},
     options_metavar='[OPTIONS]',
 )
-@click.argument('file', type=click.Path(path_type=Path), required=False)
-@click.argument('arguments', nargs=-1, type=click.UNPROCESSED, metavar='[NAME:=VALUE]...')
+@click.argument(
+    'words', nargs=-1, type=click.UNPROCESSED, metavar='FILE [LAYER]... [NAME:=VALUE]...'
+)
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
 @click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
 )
@@ -165,32 +167,35 @@ def cli() -> None:
 @click.pass_context
 def up_command(
     context: click.Context,
-    file: Path | None,
-    arguments: tuple[str, ...],
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
     log_levels: tuple[str, ...],
     *,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run the system that it declares until it is stopped.
 
-    The file's own arguments are given by name, NAME:=VALUE, or as values in their order. What
-    follows --ros-args (up to the end, or a --) goes to every node.
+    LAYERs are files (.yaml, .yml) that change what those before them say. The file's own
+    arguments are given by name, NAME:=VALUE, or as values in their order. What follows --ros-args
+    (up to the end, or a --) goes to every node.
     """
     from composer.commands.up import describe_file_arguments, up
 
     if wants_help:
         click.echo(context.get_help())
-        if file is not None:
-            click.echo(f'\n{file}: {describe_file_arguments(file)}')
+        if words:
+            paths, _ = split_words(words)
+            click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
-    if file is None:
+    if not words:
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
+    paths, arguments = split_words(words)
     for argument in arguments:
         # A minus before a digit or a dot belongs to a number.
         if re.match(r'-[^\W\d]|--', argument):
             raise click.NoSuchOption(argument, ctx=context)
-    return up(file, arguments, context.obj, log_levels)
+    return up(paths, arguments, context.obj, log_levels, settings)
 
 
 @cli.command('check')

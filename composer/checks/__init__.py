@@ -62,7 +62,7 @@ def create_context(
     if system.spec is None:
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
-    modules = ModuleFinder(project_search_path(system.path))
+    modules = ModuleFinder(project_search_path(system.files))
     uses = UseReader(modules)
     return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
@@ -84,7 +84,7 @@ def check_system(
         more = further(context, found)
         found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias, or a file included twice, is wrong once.
-    every = [*system.diagnostics, *declared, *(_with_includes(each, system) for each in found)]
+    every = [*system.diagnostics, *declared, *found]
     once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
     unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
     unchecked |= set() if further else {'import'}
@@ -117,12 +117,6 @@ def _applications(
         # What is left out this time may be there the next.
         other = replace(context, spec=context.system.unused)
         yield from ((rule, other) for rule in NODE_RULES)
-
-
-def _with_includes(finding: Diagnostic, system: LoadedSystem) -> Diagnostic:
-    """Return a finding in an included file with the places where that is included."""
-    chain = system.chains.get(finding.span.source, ()) if finding.span else ()
-    return finding.with_related(chain) if chain else finding
 
 
 def _by_line(spans: Iterable[Span]) -> dict[tuple[SourceFile, int], list[Span]]:

@@ -324,6 +324,11 @@ class NodeSpec:
     path: DataPath
 
     @property
+    def key(self) -> str:
+        """What the file calls it: its name, or its full name."""
+        return str(self.path[-1])
+
+    @property
     def full_name(self) -> str:
         """Its name in its namespace, as in `/robot/arm`."""
         return join_names(self.namespace, self.name)

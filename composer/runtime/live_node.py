@@ -189,7 +189,7 @@ class LiveNode:
             if health is not None:
                 health.note_error(error)
             self.errors.report(owner, place, error)
-            self.services.act_on_error(self.spec.name, own.on_error)
+            self.services.act_on_error(self.spec.key, own.on_error)
 
         return BehaviourCall(
             owner,

@@ -50,7 +50,7 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
             return responses[0]
         if node.gate.serves:
             failures.note(full_name)
-        message = f'{owner} of {node.spec.name} has no response'
+        message = f'{owner} of {node.spec.key} has no response'
         raise NoResponseError(message)
 
     if kind_of(behaviour) is FunctionKind.COROUTINE:

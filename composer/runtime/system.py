@@ -173,9 +173,9 @@ class System:
         try:
             node = create_live_node(spec, self._services)
         except Exception as error:
-            message = f"node '{spec.name}' cannot be created: {error}"
+            message = f"node '{spec.key}' cannot be created: {error}"
             raise StartError(message) from error
-        self._nodes[spec.name] = node
+        self._nodes[spec.key] = node
         create_entities(node)
         return node
 
@@ -196,7 +196,7 @@ class System:
         if failures:
             # What has not begun has nothing to stop.
             node.has_begun = False
-            message = f"node '{node.spec.name}': on_start raised {represent(failures[0])}"
+            message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]
         node.gate.serves = not self.stop_requested
         self._executor.wake()
