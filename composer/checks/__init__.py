@@ -11,6 +11,7 @@ from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_names
 from composer.checks.node_uses import UseReader
+from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.processes import check_environment, check_processes, check_waits
 from composer.checks.references import check_publish, check_qos, check_types
@@ -35,6 +36,7 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_types,
     check_messages,
     check_parameters,
+    check_parameter_files,
     check_behaviour_sources,
     check_processes,
     check_waits,
@@ -89,7 +91,9 @@ def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(
-        span.line == place.line and span.column <= place.column < span.column + span.length
+        span.source is place.source
+        and span.line == place.line
+        and span.column <= place.column < span.column + span.length
         for span in system.sampled
     )
 

@@ -128,10 +128,13 @@ class _Reader:
         # Mappings of names that were entered since the last value.
         self._opened = 0
 
-    def read_nodes(self, node: TreeNode, prefix: str, *, is_last: bool = True) -> None:
+    def read_nodes(
+        self, node: TreeNode, prefix: str, place: Span | None = None, *, is_last: bool = True
+    ) -> None:
         """Read a mapping of names of nodes, or of what belongs to them.
 
         Args:
+            place: That of the last name before it.
             is_last: Whether nothing follows in the mappings around it, the outermost excepted.
         """
         if not isinstance(node, MappingNode):
@@ -143,7 +146,8 @@ class _Reader:
                 continue
             if key.startswith(PARAMETERS_KEY):
                 pair = key_node, value_node
-                self._read_parameters_of(prefix, key, pair, is_alone=len(node.pairs) == 1)
+                is_alone = len(node.pairs) == 1
+                self._read_parameters_of(prefix, place, pair, is_alone=is_alone)
                 continue
             ends = is_last and (not prefix or index + 1 == len(node.pairs))
             if '/' in key and prefix and not ends:
@@ -162,20 +166,26 @@ class _Reader:
                     f"did you mean '{PARAMETERS_KEY}'?",
                 )
                 continue
-            self.read_nodes(value_node, _join(prefix, key), is_last=ends)
+            self.read_nodes(value_node, _join(prefix, key), key_node.span, is_last=ends)
 
     def _read_parameters_of(
-        self, pattern: str, key: str, pair: tuple[TreeNode, TreeNode], *, is_alone: bool
+        self,
+        pattern: str,
+        place: Span | None,
+        pair: tuple[TreeNode, TreeNode],
+        *,
+        is_alone: bool,
     ) -> None:
         key_node, node = pair
+        key = self._key(key_node)
         if key != PARAMETERS_KEY:
             message = f"'{key}' is taken as '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
-        if not pattern:
+        if place is None:
             message = f"'{PARAMETERS_KEY}' stands below the name of a node"
             self._fault(key_node.span, message, _SHAPE_HELP)
         elif fault := find_pattern_fault(pattern):
-            self._fault(key_node.span, f"'{pattern}': {fault}")
+            self._fault(place, f"'{pattern}': {fault}")
         elif not is_alone:
             message = f"'{PARAMETERS_KEY}' stands alone: ROS misreads the names beside it"
             self._fault(key_node.span, message, 'write each node in full, as in /robot/arm')
@@ -184,8 +194,8 @@ class _Reader:
             help_text = _help_for(node) or 'write {} if there are none'
             self._fault(node.span, message, help_text)
         else:
-            self.patterns.append((pattern, key_node.span))
-            self._read_parameters(node, pattern, key_node.span, (), is_last=True)
+            self.patterns.append((pattern, place))
+            self._read_parameters(node, pattern, place, (), is_last=True)
 
     def _read_parameters(
         self,

@@ -1,6 +1,7 @@
 """The types that rcl gives to the scalars of a parameter file, which are not those of YAML 1.2.
 
-Source: `get_value` in rcl (`rcl_yaml_param_parser/src/parse.c`), which leans on `strtol` and `strtod` of the C library.
+Source: `get_value` in rcl (`rcl_yaml_param_parser/src/parse.c`), which leans on `strtol` and
+`strtod` of the C library.
 """
 
 from __future__ import annotations
