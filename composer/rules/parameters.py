@@ -56,8 +56,7 @@ PARAMETERS = Family(
         ),
         Rule(
             'overridden-parameter',
-            'A value in a parameter file never counts, and neither a later file nor a special name is '
-            'why.',
+            'A value never counts, and neither a later file nor a more special name is why.',
             'ROS lets the last name that matches a node win, however special the others are, and '
             'of two values with two types the one whose type comes first.',
             _FILES,
