@@ -1,7 +1,7 @@
 """ROS's own parameter files, as rcl reads them, with the place of each value.
 
 What rcl refuses is a finding, and so is what it takes as something else than is written: names
-beside `ros__parameters`, empty mappings, lists in lists.
+that follow `ros__parameters`, empty mappings, lists in lists.
 Source: `parse_key` and `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c`).
 """
 
@@ -146,8 +146,8 @@ class _Reader:
                 continue
             if key.startswith(PARAMETERS_KEY):
                 pair = key_node, value_node
-                is_alone = len(node.pairs) == 1
-                self._read_parameters_of(prefix, place, pair, is_alone=is_alone)
+                is_last_key = index + 1 == len(node.pairs)
+                self._read_parameters_of(prefix, place, pair, is_last_key=is_last_key)
                 continue
             ends = is_last and (not prefix or index + 1 == len(node.pairs))
             if '/' in key and prefix and not ends:
@@ -174,7 +174,7 @@ class _Reader:
         place: Span | None,
         pair: tuple[TreeNode, TreeNode],
         *,
-        is_alone: bool,
+        is_last_key: bool,
     ) -> None:
         key_node, node = pair
         key = self._key(key_node)
@@ -186,9 +186,9 @@ class _Reader:
             self._fault(key_node.span, message, _SHAPE_HELP)
         elif fault := find_pattern_fault(pattern):
             self._fault(place, f"'{pattern}': {fault}")
-        elif not is_alone:
-            message = f"'{PARAMETERS_KEY}' stands alone: ROS misreads the names beside it"
-            self._fault(key_node.span, message, 'write each node in full, as in /robot/arm')
+        elif not is_last_key:
+            message = f"ROS misreads the names that follow '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, 'write it last, or each node at the top')
         elif not isinstance(node, MappingNode):
             message = f"'{PARAMETERS_KEY}' is a mapping of parameters"
             help_text = _help_for(node) or 'write {} if there are none'
