@@ -45,6 +45,10 @@ robot:
   "*":
     ros__parameters: {gains: [.5, inf], mode: slow}
 """
+OTHERS = """
+/**: {ros__parameters: {use_sim_time: false}}
+robot/arm: {ros__parameters: {wheels: 4}}
+"""
 NAMES = ['speed', 'mode', 'gains', 'names', 'sub.deep', 'wheels', 'kept', 'use_sim_time']
 
 
@@ -77,9 +81,7 @@ def test_a_node_takes_the_values_that_its_files_give_it(compose, peer, tmp_path)
 
 
 def test_the_command_line_wins_over_files_and_files_over_keys_of_the_node(compose, peer, tmp_path):
-    write(
-        tmp_path, site=SITE, own='robot/arm: {ros__parameters: {use_sim_time: false, wheels: 4}}'
-    )
+    write(tmp_path, site=SITE, own=OTHERS)
     system = SYSTEM.replace('namespace: robot', 'namespace: robot\n    use_sim_time: true')
     child = compose(
         system, '', '--ros-args', '-p', 'wheels:=5', '-p', 'speed:=4.0', '-p', 'kept:="7"'
