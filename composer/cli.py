@@ -306,6 +306,12 @@ def schema_command(*, path_only: bool) -> int:
 )
 @click.option('--origin', is_flag=True, help='Say of each value where it comes from.')
 @click.option('--args', 'wants_arguments', is_flag=True, help='List the arguments of FILE.')
+@click.option(
+    '--params',
+    'wants_parameters',
+    is_flag=True,
+    help="Write all parameters of all nodes, in ROS's own format.",
+)
 def show_command(
     words: tuple[str, ...],
     settings: tuple[str, ...],
@@ -313,16 +319,20 @@ def show_command(
     *,
     origin: bool,
     wants_arguments: bool,
+    wants_parameters: bool,
 ) -> int:
     """Print the system that FILE declares: all included, and with nothing left to evaluate.
 
     Several FILEs are layers, each over those before it. `composer up` accepts what is printed.
     """
     from composer.commands.show import show, show_arguments
+    from composer.commands.show_parameters import show_parameters
 
     paths, arguments = split_words(words)
     if wants_arguments:
         return show_arguments(paths)
+    if wants_parameters:
+        return show_parameters(paths, arguments, settings)
     return show(paths, arguments, settings, output_format=output_format, origins=origin)
 
 

@@ -13,6 +13,7 @@ from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
+from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.processes import check_environment, check_processes, check_waits
 from composer.checks.references import check_publish, check_qos, check_types
@@ -45,6 +46,7 @@ NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
 )
 SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_full_names,
+    check_parameter_files,
     check_waits,
     check_environment,
     check_wiring,
