@@ -35,11 +35,13 @@ class BehaviourUses:
     Attributes:
         open_kinds: Of what it may use more.
         reads_others: Whether it may read parameters of other nodes.
+        reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
     """
 
     found: tuple[FoundUse, ...] = ()
     open_kinds: frozenset[UseKind] = ALL_KINDS
     reads_others: bool = True
+    reaches_ros: bool = True
 
 
 _UNKNOWN = BehaviourUses()
@@ -92,14 +94,16 @@ class UseReader:
             FoundUse(use, Span(file, use.line, use.column, len(use.name))) for use in own.uses
         ]
         open_kinds, reads_others = own.open_kinds, own.reads_others
+        reaches_ros = own.reaches_ros
         for passed in own.passes:
             inner = self._uses(module, passed.function, passed.position, 0, callers)
             is_late = self._is_coroutine(module, passed.function) and not passed.is_awaited
             found += [_as_passed(each, passed, is_late=is_late) for each in inner.found]
             open_kinds |= inner.open_kinds
             reads_others |= inner.reads_others
+            reaches_ros |= inner.reaches_ros
         # Each once, or functions that call each other often would never be done.
-        return BehaviourUses(tuple(dict.fromkeys(found)), open_kinds, reads_others)
+        return BehaviourUses(tuple(dict.fromkeys(found)), open_kinds, reads_others, reaches_ros)
 
     def _is_coroutine(self, module: ModuleSource, name: str) -> bool:
         source = module.functions.get(name)

@@ -113,6 +113,8 @@ class HangWatch:
     def stop(self) -> None:
         """Look no more."""
         self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join(_LONGEST_PAUSE_SEC)
 
     def _run(self) -> None:
         while not self._ended.wait(self._pause_sec):

@@ -42,6 +42,12 @@ def test_a_behaviour_that_copes_without_is_right(check, line):
     assert check(NODE, run(USES_ALL, line)) == []
 
 
+def test_a_parameter_may_be_declared_with_rclpy(check):
+    lines = ["node.ros.declare_parameter('mode', 0)", 'print(node.parameters.mode)']
+    assert check(NODE, run(USES_ALL, *lines)) == []
+    assert check(NODE, run(USES_ALL, lines[1])) == [(6, 'unknown-parameter')]
+
+
 def test_what_an_argument_decides_is_left_to_it(check):
     nodes = NODE.replace('parts:run', '{behaviour: parts:run, with: {kind: out}}')
     code = run(
