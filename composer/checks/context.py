@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, Severity, Span, diagnostic_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
