@@ -143,6 +143,10 @@ class LiveNode:
         """Return a behaviour as a function of its positional arguments."""
         return self.services.functions[behaviour.name]
 
+    def bind(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
+        """Return the function of a behaviour with the node and its constant arguments given."""
+        return partial(self.function(behaviour), self.face.for_entity(), **behaviour.arguments)
+
     def health(self, owner: str) -> EntityHealth | None:
         """Return the health of an entity in words, `None` if it is not measured."""
         board = self.services.health
