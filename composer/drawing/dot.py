@@ -32,7 +32,7 @@ _LINES = {
     'service': 'color="#8250df"',
     'action': 'color="#1a7f37"',
     'external': 'color="#8c959f", style=dashed',
-    'wait': 'color="#8c959f", style=dotted, constraint=false',
+    'wait': 'color="#8c959f", style=dotted',
 }
 _MARKS = {
     'error': 'color="#d1242f", penwidth=2.5',
@@ -110,6 +110,8 @@ def _font(line: str, colour: str) -> str:
 
 
 def _text(text: str) -> str:
+    # A backslash begins an escape in these labels, too.
+    text = text.replace('\\', '\\\\')
     return html.escape(_NOT_XML.sub('\N{REPLACEMENT CHARACTER}', text))
 
 

@@ -120,8 +120,9 @@ function describe(token) {
   if (part.near.length) {
     const list = make('ul');
     for (const near of part.near) {
-      const {kind, name} = parts.get(near);
-      list.append(makeLink(near, `${kind} ${name}`));
+      // From a node past its publisher, say, to the topic.
+      const far = near[0] === 'e' ? parts.get(near).near.find((each) => each !== token) : near;
+      list.append(makeLink(far, `${parts.get(near).kind} ${parts.get(far).name}`));
     }
     details.append(make('h2', 'Connected'), list);
   }
