@@ -354,6 +354,15 @@ def graph_command(
     return graph(paths, arguments, settings, format_name=format_name, output=output)
 
 
+@cli.command('new')
+@click.argument('name')
+def new_command(name: str) -> int:
+    """Create the folder NAME with a project that works: a system, behaviours, tests, CI."""
+    from composer.commands.new import create_project
+
+    return create_project(name)
+
+
 @cli.group('interfaces')
 def interfaces_group() -> None:
     """Build, list and show interface packages."""

@@ -106,7 +106,7 @@ def plan_picture(picture: Picture) -> Plan:
         lines.append(line)
     for index, wait in enumerate(picture.waits):
         ends = tokens[wait.target], tokens[wait.box]
-        lines.append(Line(f'w{index}', '', 'wait', *ends, details=('waits for it',)))
+        lines.append(Line(f'w{index}', '', 'wait', *ends, details=('before',)))
     return Plan(root, tuple(lines))
 
 

@@ -49,7 +49,7 @@ def test_mermaid(draw):
         '  n1 --> c1',
         '  n2 --> c2',
         '  c1 -.-> xc1u',
-        '  n1 -.->|"waits for it"| n2',
+        '  n1 -.->|"before"| n2',
         '  linkStyle 0 stroke:#d1242f,stroke-width:3px,color:#d1242f',
         '  linkStyle 1 stroke:#d1242f,stroke-width:3px,color:#d1242f',
         '  classDef node stroke-width:2px',
