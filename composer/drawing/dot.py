@@ -6,7 +6,6 @@ Source: https://graphviz.org/doc/info/lang.html, https://graphviz.org/doc/info/s
 from __future__ import annotations
 
 import html
-import re
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -40,8 +39,6 @@ _MARKS = {
 }
 _MARK_COLOURS = {'error': '#d1242f', 'warning': '#9a6700'}
 _SMALL, _GREY = 9, '#57606a'
-# XML 1.0 has no way to write these.
-_NOT_XML = re.compile('[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
 
 
 def render_picture(picture: Picture) -> str:
@@ -68,7 +65,7 @@ def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
         number = next(numbers)
         yield f'{indent}subgraph cluster_{number} {{'
         yield (
-            f'{indent}  graph [label=<{_text(inner.namespace)}>, id="g{number}", '
+            f'{indent}  graph [label=<{_text(inner.title)}>, id="g{number}", '
             f'class="namespace", labeljust=l, style="rounded,dashed", color="#8c959f"]'
         )
         yield from _region(inner, depth + 1, numbers)
@@ -112,7 +109,7 @@ def _font(line: str, colour: str) -> str:
 def _text(text: str) -> str:
     # A backslash begins an escape in these labels, too.
     text = text.replace('\\', '\\\\')
-    return html.escape(_NOT_XML.sub('\N{REPLACEMENT CHARACTER}', text))
+    return html.escape(text)
 
 
 def _quote(text: str) -> str:

@@ -56,7 +56,7 @@ def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
     for shape in region.shapes:
         yield f'{indent}{_shape(shape)}'
     for inner in region.inner.values():
-        yield f'{indent}subgraph s{next(numbers)}["{_escape(inner.namespace)}"]'
+        yield f'{indent}subgraph s{next(numbers)}["{_escape(inner.title)}"]'
         yield from _region(inner, depth + 1, numbers)
         yield f'{indent}end'
 

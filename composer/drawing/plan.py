@@ -25,7 +25,7 @@ _MOST_REMARKS = 2
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Something drawn at one place.
+    """Something drawn at one place; its texts have nothing in them that cannot be printed.
 
     Attributes:
         id: Of what it shows; that of its channel if it stands for ends elsewhere.
@@ -73,6 +73,11 @@ class Region:
     namespace: str
     shapes: list[Shape] = field(default_factory=list)
     inner: dict[str, Region] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """The namespace as it is shown."""
+        return escape(self.namespace)
 
     def within(self, namespace: str) -> Region:
         """Return the region of a namespace below this one, which is made if need be."""

@@ -1,3 +1,5 @@
+import importlib.util
+import shutil
 import textwrap
 
 import pytest
@@ -13,9 +15,13 @@ def draw(tmp_path, monkeypatch):
     """Return a function that makes a picture of the text of a file."""
     monkeypatch.chdir(tmp_path)
 
-    def draw(text, *settings):
-        (tmp_path / 'robot.yaml').write_text(textwrap.dedent(text).lstrip())
-        system = load_system(tmp_path / 'robot.yaml', settings=settings)
+    def draw(text, *settings, name='robot', layer=None):
+        path = tmp_path / f'{name}.yaml'
+        path.write_text(textwrap.dedent(text).lstrip())
+        layers = [tmp_path / 'site.yaml'] if layer else []
+        for each in layers:
+            each.write_text(layer)
+        system = load_system(path, layers=layers, settings=settings)
         catalogue = InterfaceCatalogue()
         findings = check_system(system, catalogue)
         return build_picture(create_context(system, catalogue)[0], findings)
@@ -25,4 +31,5 @@ def draw(tmp_path, monkeypatch):
 
 @pytest.fixture
 def needs_graphviz():
-    pytest.importorskip('pygraphviz', reason='the extra graph is not installed')
+    if not (shutil.which('dot') or importlib.util.find_spec('pygraphviz')):
+        pytest.skip('neither Graphviz nor the extra graph is installed')

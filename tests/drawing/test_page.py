@@ -28,6 +28,7 @@ SYSTEM = f"""
           words:
             type: std_msgs/msg/String
             publish: echo
+
         publishers: {{echo: {{type: std_msgs/msg/String, external: true}}, other: std_msgs/msg/String}}
       {json.dumps(EVIL)}: {{}}
 """
@@ -130,6 +131,7 @@ def test_a_node_has_its_lines(data):
         '      words:',
         '        type: std_msgs/msg/String',
         '        publish: echo',
+        '',
         '    publishers: {echo: {type: std_msgs/msg/String, external: true}, other: std_msgs/msg/String}',
     ]
 
@@ -161,13 +163,29 @@ def test_findings_know_what_they_are_about(data):
     assert data['parts']['e1']['findings'] == [index]
 
 
-def test_lines_that_another_file_adds_are_shown_too(draw, needs_graphviz):
+def data_of(page):
+    return json.loads(Reader(page).texts['<script type="application/json" id="system">'])
+
+
+def test_lines_that_a_setting_or_another_file_adds_are_shown_too(draw, needs_graphviz):
     setting = 'nodes.ear.log_level=debug'
-    reader = Reader(render_picture(draw(SYSTEM, setting), 'html'))
-    data = json.loads(reader.texts['<script type="application/json" id="system">'])
-    _, added = data['parts']['n1']['excerpts']
-    assert added['file'] == f'--set {setting}'
-    assert added['lines'] == [setting]
+    # In a line with the number of one of those in the first file.
+    layer = '#\n' * 13 + 'nodes: {ear: {use_sim_time: true}}\n'
+    data = data_of(render_picture(draw(SYSTEM, setting, layer=layer), 'html'))
+    first, *added = data['parts']['n1']['excerpts']
+    assert first['file'] == 'robot.yaml'
+    assert sorted((each['file'], each['first'], each['lines']) for each in added) == [
+        (f'--set {setting}', 1, [setting]),
+        ('site.yaml', 14, ['nodes: {ear: {use_sim_time: true}}']),
+    ]
+
+
+def test_the_name_of_a_file_is_no_markup(draw, needs_graphviz):
+    name = '<script>&"'
+    reader = Reader(render_picture(draw(SYSTEM, name=name), 'html'))
+    assert reader.count('script') == 2
+    assert reader.texts['<title>'].startswith(f'{name}node')
+    assert reader.texts['<h1>'] == name
 
 
 def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):

@@ -292,8 +292,14 @@ def test_ends_elsewhere_of_either_side(draw):
     }
 
 
+def test_qos_that_says_the_default_does_not_differ(draw):
+    qos = '{reliability: reliable, depth: 10, deadline: infinite}'
+    edges = describe_picture(draw(TALKER.replace('sensor_data', qos)))['edges']
+    assert edges[0]['qos'] == {}
+
+
 def test_what_a_setting_says_lies_in_no_file(draw):
-    setting = 'nodes.ear.publishers={late: {type: std_msgs/msg/String, external: true}}'
+    setting = 'nodes.ear.publishers={late: {type: std_msgs/msg/String, external: true}}  # a//b'
     edges = by_id(describe_picture(draw(TALKER, setting)), 'edges')
     assert edges['publisher:/ear:late']['file'] == f'--set {setting}'
 

@@ -76,6 +76,30 @@ def test_dot(draw):
     assert 'class="topic warning"' in lines[5]
 
 
+def test_clients_and_servers_elsewhere_stand_on_their_side(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: {type: std_msgs/msg/String, external: true}}
+            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
+            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
+    """
+    lines = render_picture(draw(text), 'mermaid').splitlines()
+    assert [line.strip() for line in lines if '-.->' in line] == [
+        'c0 -.-> xc0u',
+        'xc1p -.-> c1',
+        'c2 -.-> xc2p',
+    ]
+
+
+def test_of_many_findings_the_rest_is_counted(draw):
+    text = 'version: 1\nnodes: {n: {a: 1, b: 2, c: 3, d: 4}}\n'
+    label = render_picture(draw(text), 'mermaid').splitlines()[1]
+    assert label.count('error:') == 2
+    assert label.endswith('<br/>and 2 more"]):::error')
+
+
 def with_name(text):
     """Return a system with a node, a process, a description and a type of this text."""
     data = {
@@ -117,10 +141,8 @@ def test_any_name_stays_text_in_dot_and_mermaid(draw, text):
             ET.fromstring(f'<label>{label}</label>')
 
 
-def test_the_name_of_a_file_is_text_in_dot(draw, tmp_path):
-    picture = draw(SYSTEM)
-    object.__setattr__(picture, 'name', 'a"b\\')
-    assert render_picture(picture, 'dot').startswith('digraph "a\\"b\\\\" {\n')
+def test_the_name_of_a_file_is_text_in_dot(draw):
+    assert render_picture(draw(SYSTEM, name='a"b\\'), 'dot').startswith('digraph "a\\"b\\\\" {\n')
 
 
 def test_svg_is_xml_with_the_names_as_they_are(draw, needs_graphviz):
@@ -167,7 +189,9 @@ def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
     from composer.drawing.layout import DrawingError, lay_out
 
     program = tmp_path / 'dot'
-    program.write_text('#!/bin/sh\necho "Warning: no" >&2; echo "out of paper" >&2; exit 3\n')
+    program.write_text(
+        '#!/bin/sh\necho "<svg></svg>"; echo "Warning: no" >&2; echo "out of paper" >&2; exit 3\n'
+    )
     program.chmod(0o755)
     monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
     with pytest.raises(DrawingError, match='Graphviz failed with code 3: out of paper'):
