@@ -44,7 +44,7 @@ def run_system(
         UsageError: The ROS arguments are wrong.
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
-        system = System(spec, positions, functions, ros_arguments)
+        system = System(spec, positions, functions, ros_arguments, log_level_requests)
         with _stopped_by_signals(system):
             system.start()
             system.wait()
@@ -63,6 +63,7 @@ def _stopped_by_signals(system: System) -> Iterator[None]:
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
         if system.stop_requested:
+            system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
 

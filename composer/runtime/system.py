@@ -17,6 +17,8 @@ from composer.runtime.health import HealthBoard
 from composer.runtime.health_publisher import HealthPublisher
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
+from composer.runtime.processes import Processes
+from composer.runtime.readiness import Readiness, describe_parts, list_waiters
 from composer.runtime.stopping import stop_nodes
 from composer.runtime.supervision import Supervisor
 from composer.runtime.system_executor import SystemExecutor
@@ -40,6 +42,7 @@ class System:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
+        log_levels: What the command line says of these, for foreign processes.
     """
 
     def __init__(
@@ -48,6 +51,7 @@ class System:
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str] = (),
+        log_levels: Sequence[str] = (),
     ) -> None:
         self._spec = spec
         self._begun = time.monotonic()
@@ -77,6 +81,13 @@ class System:
             health=None if spec.diagnostics_period_sec is None else HealthBoard(),
         )
         self._health_publisher: HealthPublisher | None = None
+        self._processes = Processes(
+            spec.processes.values(),
+            self._end,
+            spec.shutdown_timeout_sec,
+            ros_arguments,
+            log_levels,
+        )
 
     @property
     def stop_requested(self) -> bool:
@@ -94,8 +105,15 @@ class System:
         self._stop_signal.set()
         self._wake_ups.put(None)
 
+    def abandon(self) -> None:
+        """Kill all foreign processes; a signal handler may call it before it ends this one."""
+        self._processes.abandon()
+
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
+
+        Foreign processes come before any `on_start`; what waits for something comes after all
+        that does not, whose behaviours run by then.
 
         Raises:
             StartError: One of them failed; all has been torn down again.
@@ -108,20 +126,22 @@ class System:
             self._publish_health()
             self._executor.start()
             for node in self._nodes.values():
-                node.gate.serves = node.spec.on_start is None
+                node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
-            for node in list(self._nodes.values()):
-                self._run_on_start(node)
+            prompt = self._start_all()
         except BaseException:
+            if any(node.gate.is_open for node in self._nodes.values()):
+                # They have not waited for the others.
+                stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+            self._processes.stop()
             self._tear_down()
             raise
         if self.stop_requested:
             return
-        count = len(self._nodes)
-        nodes = '1 node' if count == 1 else f'{count} nodes'
         elapsed = time.monotonic() - self._begun
-        system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
-        self._open(list(self._nodes.values()))
+        parts = describe_parts(self._nodes, self._processes.by_name)
+        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        self._open(prompt)
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -140,11 +160,42 @@ class System:
         self._supervisor.stop()
         with self._rebuilding:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+        # An `on_stop` may have needed them.
+        if not self._processes.stop() and self._exit_code == ExitCode.DONE:
+            self._exit_code = ExitCode.FAILED
         if not ended and self._exit_code == ExitCode.DONE:
             self._exit_code = ExitCode.FAILED
         if ended:
             self._tear_down()
         return self._exit_code, ended
+
+    def _start_all(self) -> list[LiveNode]:
+        """Start all processes and nodes; return those nodes whose gates are yet to be opened."""
+        for process in self._processes.by_name.values():
+            if not process.spec.wait_for:
+                self._processes.start(process)
+        prompt = [node for node in self._nodes.values() if not node.spec.wait_for]
+        for node in prompt:
+            self._run_on_start(node)
+        waiters = list_waiters(self._nodes, self._processes, self._start_late)
+        if not waiters or self.stop_requested:
+            return prompt
+        self._open(prompt)
+        readiness = Readiness(
+            self._context, self._nodes, self._processes.by_name, self._services.positions
+        )
+        readiness.start_all(waiters, self._stop_signal)
+        return []
+
+    def _start_late(self, node: LiveNode) -> None:
+        self._run_on_start(node)
+        if not self.stop_requested:
+            self._open([node])
+
+    def _end(self, code: int) -> None:
+        """End the system because of a process, unless it ends already."""
+        if not self.stop_requested:
+            self.request_stop(code)
 
     def _create(self, spec: NodeSpec) -> LiveNode:
         try:
