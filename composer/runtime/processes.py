@@ -238,19 +238,17 @@ class Processes:
         end = f"process '{name}' {describe_end(code)}"
         if self._stopping.is_set():
             asked = (0, -signal.Signals[process.spec.stop_signal])
-            say = system_logger.info if code in asked or run.was_killed else system_logger.warn
-            say(end)
+            _tell(end, is_fault=code not in asked and not run.was_killed)
             return
-        say = system_logger.info if code == 0 else system_logger.error
         if not _is_restarted(process, code):
             process.is_done = True
-            say(end + _describe_limit(process, code))
+            _tell(end + _describe_limit(process, code), is_fault=code != 0)
             if process.spec.required:
                 system_logger.error(f"process '{name}' is required: the system ends")
                 self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
             return
         delay_sec = _next_delay_sec(process, time.monotonic() - run.begun)
-        say(f'{end}; it is started again in {delay_sec:g} s')
+        _tell(f'{end}; it is started again in {delay_sec:g} s', is_fault=code != 0)
         if not self._stopping.wait(delay_sec):
             self._restart(process)
 
@@ -299,6 +297,14 @@ def describe_end(code: int) -> str:
         return f'was ended by {signal.Signals(-code).name}'
     except ValueError:
         return f'was ended by signal {-code}'
+
+
+def _tell(text: str, *, is_fault: bool) -> None:
+    # A logger of rclpy wants one level for each line of code that calls it.
+    if is_fault:
+        system_logger.error(text)
+    else:
+        system_logger.info(text)
 
 
 def _is_restarted(process: LiveProcess, code: int) -> bool:

@@ -203,7 +203,7 @@ class System:
         except Exception as error:
             message = f"node '{spec.name}' cannot be created: {error}"
             raise StartError(message) from error
-        self._nodes[spec.name] = node
+        self._nodes[spec.full_name] = node
         create_entities(node)
         return node
 
@@ -234,10 +234,11 @@ class System:
                 timer.reset()
         self._executor.wake()
 
-    def _restart(self, name: str) -> None:
+    def _restart(self, full_name: str) -> None:
         """Rebuild a node: its entities, parameters and state are as at the start again."""
         with self._rebuilding:
-            old = self._nodes[name]
+            old = self._nodes[full_name]
+            name = old.spec.name
             if self.stop_requested:
                 return
             old.gate.close()
@@ -259,7 +260,7 @@ class System:
                 self._run_on_start(node)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
-                self._supervisor.act(name, 'restart')
+                self._supervisor.act(full_name, 'restart')
                 return
             self._open([node])
         system_logger.warn(f"node '{name}' was restarted")
