@@ -130,7 +130,7 @@ class Readiness:
                 ready.append(waiter)
             for condition in missing:
                 if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
-                    raise self._error(waiter, condition, graph, waited_sec)
+                    raise self._error(waiter, condition, graph)
         for waiter in ready:
             if not stop.is_set:
                 waiter.start()
@@ -150,15 +150,14 @@ class Readiness:
         closed = [node for node in list(self._nodes.values()) if not node.gate.is_open]
         return frozenset(node.full_name for node in closed)
 
-    def _error(
-        self, waiter: Waiter, condition: ConditionSpec, graph: _Graph, waited_sec: float
-    ) -> StartError:
+    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: _Graph) -> StartError:
         span = self._positions.value(condition.path)
         who = f'{waiter.label} ({span.source.name}:{span.line})'
-        waited = f'waited {waited_sec:.3g} s for the {condition.kind}'
+        waited = f'waited {condition.timeout_sec:g} s for the {condition.kind}'
         if condition.kind == 'process':
-            state = self._processes[condition.name].state
-            return StartError(f"{who} {waited} '{condition.name}': {state}")
+            process = self._processes[condition.name]
+            waited = 'waits for the process' if process.is_done else waited
+            return StartError(f"{who} {waited} '{condition.name}': {process.state}")
         name = waiter.resolve(condition)
         late = [
             node.spec.name
@@ -339,4 +338,5 @@ def _describe_graph(kind: ConditionKind, name: str, graph: _Graph) -> str:
         if not (each in _COMMON_TOPICS or '/_' in each or each.endswith(_COMMON_SERVICES))
     ]
     nearest = did_you_mean(name, names, _INTRODUCTIONS[kind])
-    return nearest or f'there is no {kind} at all'
+    every = ' but those that every node has' if kind in ('topic', 'service') else ' at all'
+    return nearest or f'there is no {kind}{every}'
