@@ -264,9 +264,10 @@ def _watch(guardian: int, mark: str) -> None:
     """Be the second guardian: wait for the end of the first one, and clean up after it."""
     # If that has died before, somebody else is the parent.
     with contextlib.suppress(ProcessLookupError):
-        ended = os.pidfd_open(guardian)
+        ended = select.poll()
+        ended.register(os.pidfd_open(guardian), select.POLLIN)
         if os.getppid() == guardian:
-            select.select([ended], [], [])
+            ended.poll()
     kill_marked(mark)
 
 

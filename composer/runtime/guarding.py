@@ -90,8 +90,9 @@ class GuardianConnection:
         """Do the same in a signal handler, where no lock may be waited for."""
         self._hang_up()
         with suppress(OSError):
-            ended = os.pidfd_open(self._process.pid)
-            select.select([ended], [], [], _END_SEC)
+            ended = select.poll()
+            ended.register(os.pidfd_open(self._process.pid), select.POLLIN)
+            ended.poll(_END_SEC * 1000)
 
     def _hang_up(self) -> None:
         self._is_closing = True

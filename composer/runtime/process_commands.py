@@ -34,8 +34,8 @@ class CommandWriter:
         self, folder: Path, ros_arguments: Sequence[str], log_levels: Sequence[str]
     ) -> None:
         self._folder = folder
-        self._ros_arguments = ros_arguments
-        self._log_levels = log_levels
+        self._ros_arguments = _with_absolute_files(ros_arguments)
+        self._log_levels = [_level_for_rcl(each) for each in log_levels]
 
     def write(self, spec: ProcessSpec, environment: Mapping[str, str]) -> list[str]:
         """Return the whole command.
@@ -94,6 +94,21 @@ def render_parameters(parameters: Mapping[str, Any]) -> str:
     """Return a parameter file for all nodes of a process; rcl reads the types that were meant."""
     values = {name: _converted(value) for name, value in parameters.items() if value is not None}
     return yaml.dump({'/**': {'ros__parameters': values}}, Dumper=_Dumper, allow_unicode=True)
+
+
+def _with_absolute_files(ros_arguments: Sequence[str]) -> list[str]:
+    """Return arguments that hold in any folder."""
+    before = ['', *ros_arguments[:-1]]
+    return [
+        str(Path(each).absolute()) if option == '--params-file' else each
+        for option, each in zip(before, ros_arguments, strict=False)
+    ]
+
+
+def _level_for_rcl(request: str) -> str:
+    """Return `robot.talker:=debug` for `/robot/talker:=debug`."""
+    name, separator, level = request.rpartition(':=')
+    return f'{name.strip("/").replace("/", ".")}{separator}{level}'
 
 
 class _Dumper(yaml.SafeDumper):

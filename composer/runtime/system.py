@@ -172,7 +172,7 @@ class System:
     def _start_all(self) -> list[LiveNode]:
         """Start all processes and nodes; return those nodes whose gates are yet to be opened."""
         for process in self._processes.by_name.values():
-            if not process.spec.wait_for:
+            if not (process.spec.wait_for or self.stop_requested):
                 self._processes.start(process)
         prompt = [node for node in self._nodes.values() if not node.spec.wait_for]
         for node in prompt:

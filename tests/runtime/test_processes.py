@@ -618,17 +618,19 @@ def test_the_command_line_wins_over_the_file(compose, peer, package):
     driver = {
         'package': 'vendor',
         'executable': 'driver',
+        'cwd': '/',
         'log_level': 'error',
         'parameters': {'count': 1, 'label': 'file'},
         'remap': {'chatter': 'file'},
     }
     path = compose.write(system({'driver': driver}))
-    words = ['--log-level', 'debug', '--ros-args', '-p', 'count:=2', '-r', 'chatter:=line']
-    child = compose.run(path.name, *words)
+    (compose.folder / 'more.yaml').write_text('/**: {ros__parameters: {ratio: 0.5}}')
+    words = ['-p', 'count:=2', '-r', 'chatter:=line', '--params-file', 'more.yaml']
+    child = compose.run(path.name, '--log-level', '/own_name:=debug', '--ros-args', *words)
 
     assert child.wait_for_line('[driver] level') == '[driver] level DEBUG'
     values = parameters_of(peer, '/own_name')
-    assert (values['count'], values['label']) == (2, 'file')
+    assert (values['count'], values['label'], values['ratio']) == (2, 'file', 0.5)
     assert '/line' in dict(peer.node.get_publisher_names_and_types_by_node('own_name', '/'))
 
 
