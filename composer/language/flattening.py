@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
+from composer.language.processes import takes_ros_arguments, with_defaults, with_waits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,8 +31,15 @@ def push_defaults(instance: Instance) -> None:
         nodes[name] = _with_defaults(instance, name, nodes[name], defaults, shared)
     processes = instance.data.get('processes', {})
     for name, process in processes.items():
-        if namespace := _join(outer, process.get('namespace', '')):
-            processes[name] = process | {'namespace': namespace}
+        processes[name] = _in_namespace(outer, with_defaults(process, defaults))
+
+
+def _in_namespace(outer: str, process: dict[str, Any]) -> dict[str, Any]:
+    """Return a process that lies in a namespace; if it is none of ROS, what it waits for does."""
+    if not takes_ros_arguments(process):
+        return with_waits(process, {}, outer)
+    namespace = _join(outer, process.get('namespace', ''))
+    return process | {'namespace': namespace} if namespace else process
 
 
 def _with_defaults(
@@ -123,21 +131,31 @@ class Flattening:
         part = inclusion.part
         push_defaults(part)
         renaming = self._add_profiles(inclusion)
+        processes = self._process_names(inclusion)
         for name, node in part.data.get('nodes', {}).items():
             inner, simple = _split(name, node)
             full = _join(inclusion.namespace, inner)
             key = self._node_key(simple, full)
             if key is not None:
-                self._add_entry(inclusion, ('nodes', name), key, renaming.in_node(node), full)
+                entry = with_waits(renaming.in_node(node), processes)
+                self._add_entry(inclusion, ('nodes', name), key, entry, full)
             elif ('nodes', name) not in part.left_out:
                 self._report_duplicate(inclusion, name, _full_name(full, simple))
         for name, process in part.data.get('processes', {}).items():
-            full = _join(inclusion.namespace, process.get('namespace', ''))
-            taken = name in self._whole.data.get('processes', {})
-            key = f'{inclusion.label}_{name}' if taken else name
-            self._add_entry(inclusion, ('processes', name), key, process, full)
+            entry = with_waits(_in_namespace(inclusion.namespace, process), processes)
+            namespace = entry.get('namespace', '')
+            self._add_entry(inclusion, ('processes', name), processes[name], entry, namespace)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
+
+    def _process_names(self, inclusion: Inclusion) -> dict[str, str]:
+        """Return what the processes of a file are called in the whole."""
+        own = self._whole.data.get('processes', {})
+        names = inclusion.part.data.get('processes', {})
+        return {
+            name: _free_name(f'{inclusion.label}_{name}', {*own, *names}) if name in own else name
+            for name in names
+        }
 
     def _node_key(self, simple: str, namespace: str) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
@@ -171,7 +189,7 @@ class Flattening:
         if namespace and not key.startswith('/'):
             plain = {'namespace': namespace} | plain
             self._note_namespace((*new, 'namespace'), (*inclusion.at, 'namespace'))
-        if inclusion.remap:
+        if inclusion.remap and (section == 'nodes' or takes_ros_arguments(entry)):
             # The first rule that fits wins: those from outside do, as in ROS launch.
             plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
             for rule in inclusion.remap:
