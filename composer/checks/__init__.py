@@ -15,7 +15,12 @@ from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
-from composer.checks.processes import check_environment, check_processes, check_waits
+from composer.checks.processes import (
+    check_environment,
+    check_executables,
+    check_processes,
+    check_waits,
+)
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
@@ -47,6 +52,7 @@ NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
 SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_full_names,
     check_parameter_files,
+    check_executables,
     check_waits,
     check_environment,
     check_wiring,
