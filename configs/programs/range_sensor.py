@@ -5,6 +5,7 @@ Parameters:
 """
 
 import math
+from contextlib import suppress
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -34,11 +35,10 @@ class RangeSensor(Node):
 
 def main() -> None:
     """Measure until a signal comes."""
-    try:
-        with rclpy.init():
-            rclpy.spin(RangeSensor())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(RangeSensor())
+    rclpy.try_shutdown()
 
 
 if __name__ == '__main__':
