@@ -19,15 +19,18 @@ AROUND = {'unknown-publisher', 'unused-publisher', 'no-publisher', 'no-subscript
 def examples():
     for name in MODULES:
         module = importlib.import_module(name)
-        functions = inspect.getmembers(module, inspect.isfunction)
-        for each in (module, *(function for _, function in functions)):
-            if each.__name__.startswith('_') or inspect.getmodule(each) is not module:
-                continue
-            (example,) = re.findall(r'```yaml\n(.*?)```', inspect.getdoc(each), re.DOTALL)
-            yield pytest.param(example, id=f'{name}.{each.__name__}')
+        functions = [
+            function
+            for key, function in inspect.getmembers(module, inspect.isfunction)
+            if not key.startswith('_') and inspect.getmodule(function) is module
+        ]
+        for each in (module, *functions):
+            found = re.findall(r'```yaml\n(.*?)```', inspect.getdoc(each), re.DOTALL)
+            assert found or each is module, f'{name}.{each.__name__} shows no use'
+            yield from (pytest.param(one, id=f'{name}.{each.__name__}') for one in found)
 
 
-@pytest.mark.parametrize('example', examples())
+@pytest.mark.parametrize('example', list(examples()))
 def test_it_is_right_but_for_what_it_leaves_out(example):
     text = example if example.startswith('nodes:') else f'nodes:\n  n:\n{indent(example, "    ")}'
     system = load_system_text(f'version: 1\n{text}')
