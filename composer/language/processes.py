@@ -20,6 +20,15 @@ if TYPE_CHECKING:
 _CONDITION_KINDS: tuple[ConditionKind, ...] = ('topic', 'service', 'action', 'node', 'process')
 
 
+# What makes a process one of ROS.
+_FOR_ROS = ('package', 'name', 'namespace', 'parameters', 'parameter_files', 'remap', 'log_level')
+
+
+def is_ros_process(data: dict[str, Any]) -> bool:
+    """Return whether a process takes arguments for ROS: a bare command may be any program."""
+    return any(key in data for key in _FOR_ROS)
+
+
 def parse_process(
     outer_namespace: str | None, name: str, data: dict[str, Any], path: DataPath
 ) -> ProcessSpec:
@@ -83,5 +92,4 @@ def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
 def _parse_namespace(outer: str | None, data: dict[str, Any]) -> str | None:
     if 'namespace' in data:
         return expand_namespace(data['namespace'], outer or '/')
-    # A command may be no program of ROS at all.
-    return outer if 'package' in data else None
+    return outer if is_ros_process(data) else None

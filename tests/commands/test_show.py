@@ -40,8 +40,6 @@ def test_it_prints_the_final_system(robot, capsys):
     assert capsys.readouterr().out == textwrap.dedent(
         f"""\
         version: 1
-        x-anchors:
-          depth: 5
         nodes:
           brain:
             description: "left brain"
