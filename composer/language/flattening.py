@@ -135,10 +135,15 @@ class Inclusion:
 
 
 class Flattening:
-    """Adds what included files declare to the instance of the file that includes them."""
+    """Adds what included files declare to the instance of the file that includes them.
 
-    def __init__(self, instance: Instance) -> None:
+    Args:
+        chain: Where that file is included itself, innermost first.
+    """
+
+    def __init__(self, instance: Instance, chain: tuple[Related, ...] = ()) -> None:
         self._whole = instance
+        self._chain = chain
         self._full_names = {
             _full_name(*_split(name, node))
             for name, node in instance.data.get('nodes', {}).items()
@@ -194,14 +199,15 @@ class Flattening:
         return keys
 
     def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
-        place = self._whole.positions.value((*inclusion.at, 'file'))
+        here = Related('included here', self._whole.positions.value((*inclusion.at, 'file')))
+        inner = inclusion.part.chains.get(('nodes', name), ())
         self._whole.diagnostics.append(
             diagnostic_at(
                 inclusion.part.positions.key(('nodes', name)),
                 'duplicate-node',
                 f"there is a node '{full}' already",
                 help="give the include a 'namespace'",
-                related=[Related('included here', place)],
+                related=[*inner, here, *self._chain],
             )
         )
 

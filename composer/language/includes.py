@@ -55,7 +55,7 @@ class Includer:
         if not entries:
             return instance
         _settle(instance)
-        flattening = Flattening(instance)
+        flattening = Flattening(instance, chain)
         stack = (path.resolve(), *(Path(each.span.source.name).resolve() for each in chain))
         for name, entry in entries.items():
             at = ('include', name)
