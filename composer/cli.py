@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.reports import FORMATS
 
@@ -334,6 +335,47 @@ def show_command(
     if wants_parameters:
         return show_parameters(paths, arguments, settings)
     return show(paths, arguments, settings, output_format=output_format, origins=origin)
+
+
+@cli.command('graph', options_metavar='[OPTIONS]')
+@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(list(PICTURE_FORMATS)),
+    help='What to draw; by the ending of --output, or mermaid, if not given.',
+)
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    help='Write the drawing to this file.',
+)
+def graph_command(
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
+    *,
+    format_name: str | None,
+    output: Path | None,
+) -> int:
+    """Draw the system that FILE declares: who publishes, hears, serves and calls what.
+
+    Types, QoS that differs from the default, and what `composer check` finds are in it. svg and
+    html need Graphviz: the program, or the extra 'graph'. Several FILEs are layers.
+    """
+    from composer.commands.graph import graph
+
+    paths, arguments = split_words(words)
+    return graph(paths, arguments, settings, format_name=format_name, output=output)
+
+
+@cli.command('new')
+@click.argument('name')
+def new_command(name: str) -> int:
+    """Create the folder NAME with a project that works: a system, behaviours, tests, CI."""
+    from composer.commands.new import create_project
+
+    return create_project(name)
 
 
 @cli.group('interfaces')

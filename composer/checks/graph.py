@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from composer.language.specs import (
         ActionClientSpec,
         ActionSpec,
+        ProcessSpec,
         PublisherSpec,
         QosSpec,
         ServiceClientSpec,
@@ -161,12 +162,13 @@ def _channels_left_out(context: CheckContext) -> Iterator[tuple[ChannelKind, str
                 yield kind, full_name(node, kind, getattr(entity, kind))
 
 
-def full_name(node: NodeSpec, kind: ChannelKind, name: str) -> str:
-    """Return the name of a node's topic, service or action as others see it."""
-    full = expand_name(name, node.name, node.namespace)
+def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
+    """Return the name of a topic, service or action of a node or process as others see it."""
+    namespace = node.namespace or '/'
+    full = expand_name(name, node.name, namespace)
     if not node.remap or kind not in _SCHEMES:
         return full
-    return remap_name(full, node.remap, node.name, node.namespace, _SCHEMES[kind])
+    return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
 
 
 def _services_of_ros(node: NodeSpec) -> Iterator[str]:

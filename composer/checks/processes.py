@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.ament import ament_prefixes, list_executables, list_packages
+from composer.checks.graph import full_name
 from composer.names import (
     did_you_mean,
     expand_name,
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from composer.checks.context import CheckContext
+    from composer.checks.graph import ChannelKind
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
 
@@ -157,35 +159,31 @@ class _Providers:
 
     def __init__(self, context: CheckContext) -> None:
         self._spec = context.spec
-        self._topics: dict[str, list[tuple[str | int, ...]]] = {}
-        self._services: dict[str, list[tuple[str | int, ...]]] = {}
-        self._actions: dict[str, list[tuple[str | int, ...]]] = {}
         self._nodes = {node.full_name: node.path for node in context.spec.nodes.values()}
+        self._channels: dict[tuple[str, str], list[tuple[str | int, ...]]] = {}
         for node in context.spec.nodes.values():
             for publisher in node.publishers.values():
-                self._add(self._topics, node, publisher.topic)
+                self._add(node, 'topic', publisher.topic)
             for service in node.services.values():
-                self._add(self._services, node, service.service)
+                self._add(node, 'service', service.service)
             for action in node.actions.values():
-                self._add(self._actions, node, action.action)
+                self._add(node, 'action', action.action)
 
     def of(
         self, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
     ) -> list[tuple[str | int, ...]]:
         """Return the paths of all who bring what a condition asks for, if it is only one."""
-        if condition.kind == 'process':
+        kind = condition.kind
+        if kind == 'process':
             process = self._spec.processes.get(condition.name)
             return [process.path] if process else []
-        name = expand_name(condition.name, waiter.name, waiter.namespace or '/')
-        if condition.kind == 'node':
+        if kind == 'node':
+            name = expand_name(condition.name, waiter.name, waiter.namespace or '/')
             path = self._nodes.get(name)
             return [path] if path else []
-        known = {'topic': self._topics, 'service': self._services, 'action': self._actions}
-        found = known[condition.kind].get(name, [])
+        found = self._channels.get((kind, full_name(waiter, kind, condition.name)), [])
         # Of several, any one will do.
         return found if len(found) == 1 else []
 
-    def _add(
-        self, table: dict[str, list[tuple[str | int, ...]]], node: NodeSpec, name: str
-    ) -> None:
-        table.setdefault(expand_name(name, node.name, node.namespace), []).append(node.path)
+    def _add(self, node: NodeSpec, kind: ChannelKind, name: str) -> None:
+        self._channels.setdefault((kind, full_name(node, kind, name)), []).append(node.path)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import SystemSpec
 
 _NO_ROS_HELP = (
     "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
@@ -60,6 +61,21 @@ def up(
     if importlib.util.find_spec('rclpy') is None:
         message = 'there is no rclpy in this Python, so nothing can run'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
+    from composer.runtime.environment import check_middleware, environment_set
+
+    # Before anything of ROS is imported, which reads it.
+    with environment_set(system.spec.environment):
+        check_middleware(system.spec.environment)
+        return _run(system, system.spec, catalogue, ros_arguments, log_levels)
+
+
+def _run(
+    system: LoadedSystem,
+    spec: SystemSpec,
+    catalogue: InterfaceCatalogue,
+    ros_arguments: Sequence[str],
+    log_levels: Sequence[str],
+) -> int:
     from composer.runtime.behaviours import project_on_path
     from composer.runtime.run import run_system
 
@@ -69,7 +85,7 @@ def up(
         if _report(findings):
             return ExitCode.FAILED
         return run_system(
-            system.spec,
+            spec,
             system.positions,
             functions,
             ros_arguments=ros_arguments,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.processes import is_ros_process
+from composer.language.processes import takes_ros_arguments, with_defaults, with_waits
 from composer.language.profiles import (
     ProfileRenaming,
     free_name,
@@ -59,9 +59,18 @@ class _Pushing:
         return full
 
     def in_process(self, name: str, process: dict[str, Any]) -> dict[str, Any]:
-        if not is_ros_process(process):
-            return process
-        return process | self._namespace(('processes', name), process)
+        if not takes_ros_arguments(process):
+            return with_waits(process, {}, self._defaults.get('namespace', ''))
+        at = ('processes', name)
+        full = with_defaults(process, self._defaults)
+        if 'log_level' in full and 'log_level' not in process:
+            self._graft((*at, 'log_level'), 'log_level')
+        if (
+            'use_sim_time'
+            in full.get('parameters', {}).keys() - process.get('parameters', {}).keys()
+        ):
+            self._graft((*at, 'parameters', 'use_sim_time'), 'use_sim_time')
+        return full | self._namespace(at, process)
 
     def _namespace(self, at: DataPath, entry: dict[str, Any]) -> dict[str, str]:
         outer, inner = self._defaults.get('namespace', ''), entry.get('namespace', '')
@@ -161,7 +170,7 @@ class Flattening:
             is_left_out = ('nodes', name) in part.left_out
             key = self._node_key(simple, full, is_left_out=is_left_out)
             if key is not None:
-                entry = _with_waits(renaming.in_node(node), keys)
+                entry = with_waits(renaming.in_node(node), keys)
                 if key.startswith('/'):
                     # Includes around this one must still find a relative namespace as such.
                     self._whole.inner_names[key] = full, simple
@@ -169,7 +178,9 @@ class Flattening:
             elif not is_left_out:
                 self._report_duplicate(inclusion, name, _full_name(full, simple))
         for name, process in part.data.get('processes', {}).items():
-            entry = _with_waits(process, keys)
+            entry = with_waits(process, keys)
+            if not takes_ros_arguments(process):
+                entry = with_waits(entry, {}, inclusion.namespace)
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
@@ -220,7 +231,7 @@ class Flattening:
         whole.positions.graft(new, part.branches(section)[name])
         for path, note in part.notes_by_entry().get(old, ()):
             whole.notes[new + path] = note
-        if section == 'nodes' or is_ros_process(entry):
+        if section == 'nodes' or takes_ros_arguments(entry):
             entry = self._with_outer(inclusion, new, entry)
         whole.data.setdefault(section, {})[key] = entry
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
@@ -283,21 +294,6 @@ class Flattening:
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:
     return {old: new for old, new in (inner or {}).items() if old not in outer}
-
-
-def _with_waits(entry: dict[str, Any], keys: dict[str, str]) -> dict[str, Any]:
-    """Return an entry that waits for processes by their names in the whole system."""
-    waits = entry.get('wait_for')
-    if waits is None:
-        return entry
-    conditions = waits if isinstance(waits, list) else [waits]
-    renamed = [
-        each | {'process': keys.get(each['process'], each['process'])}
-        if 'process' in each
-        else each
-        for each in conditions
-    ]
-    return entry | {'wait_for': renamed if isinstance(waits, list) else renamed[0]}
 
 
 def _split(name: str, node: dict[str, Any]) -> tuple[str, str]:

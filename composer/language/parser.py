@@ -66,7 +66,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
             {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
         processes=_parse_entries(
-            data, (), 'processes', partial(parse_process, defaults.given_namespace)
+            data, (), 'processes', partial(parse_process, defaults.given_namespace, defaults.node)
         ),
     )
 

@@ -14,29 +14,83 @@ from composer.language.specs import (
 from composer.names import expand_namespace
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.language.positions import DataPath
     from composer.language.specs import ConditionKind
 
+# What only a program of ROS is given; executables of packages are such programs.
+_ROS_KEYS = (
+    'package',
+    'name',
+    'namespace',
+    'parameters',
+    'parameter_files',
+    'remap',
+    'log_level',
+)
 _CONDITION_KINDS: tuple[ConditionKind, ...] = ('topic', 'service', 'action', 'node', 'process')
 
 
-# What makes a process one of ROS.
-_FOR_ROS = ('package', 'name', 'namespace', 'parameters', 'parameter_files', 'remap', 'log_level')
+def takes_ros_arguments(data: dict[str, Any]) -> bool:
+    """Return whether a process is a program of ROS; a command may be no such thing."""
+    return any(key in data for key in _ROS_KEYS)
 
 
-def is_ros_process(data: dict[str, Any]) -> bool:
-    """Return whether a process takes arguments for ROS: a bare command may be any program."""
-    return any(key in data for key in _FOR_ROS)
+def with_defaults(process: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
+    """Return a process with what the defaults of its file say, apart from the namespace."""
+    if not takes_ros_arguments(process):
+        return process
+    full = dict(process)
+    if 'log_level' in defaults:
+        full.setdefault('log_level', defaults['log_level'])
+    if defaults.get('use_sim_time'):
+        full['parameters'] = {'use_sim_time': True} | process.get('parameters', {})
+    return full
+
+
+def with_waits(
+    entry: dict[str, Any], processes: Mapping[str, str], namespace: str = ''
+) -> dict[str, Any]:
+    """Return a node or process that waits for the same, by other names.
+
+    Args:
+        processes: New names of processes.
+        namespace: Where relative names of all else lie.
+    """
+    written = entry.get('wait_for')
+    if not written:
+        return entry
+
+    def renamed(condition: dict[str, Any]) -> dict[str, Any]:
+        kind = _kind_of(condition)
+        name = condition[kind]
+        if kind == 'process':
+            return condition | {kind: processes.get(name, name)}
+        is_relative = namespace and not name.startswith(('/', '~'))
+        return condition | {kind: f'{namespace.rstrip("/")}/{name}'} if is_relative else condition
+
+    if isinstance(written, dict):
+        return entry | {'wait_for': renamed(written)}
+    return entry | {'wait_for': [renamed(each) for each in written]}
 
 
 def parse_process(
-    outer_namespace: str | None, name: str, data: dict[str, Any], path: DataPath
+    outer_namespace: str | None,
+    defaults: dict[str, Any],
+    name: str,
+    data: dict[str, Any],
+    path: DataPath,
 ) -> ProcessSpec:
     """Return a process.
 
     Args:
         outer_namespace: That of the file's defaults, `None` if they have none.
+        defaults: The rest of them.
     """
+    data = with_defaults(data, defaults)
+    if not takes_ros_arguments(data):
+        data = with_waits(data, {}, outer_namespace or '')
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
     return ProcessSpec(
@@ -84,12 +138,16 @@ def write_scalar(value: Any) -> str:
 
 
 def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
-    kind = next(each for each in _CONDITION_KINDS if each in data)
+    kind = _kind_of(data)
     timeout_sec = float(data.get('timeout', DEFAULT_WAIT_SEC))
     return ConditionSpec(kind, data[kind], timeout_sec, (*path, kind))
+
+
+def _kind_of(condition: dict[str, Any]) -> ConditionKind:
+    return next(each for each in _CONDITION_KINDS if each in condition)
 
 
 def _parse_namespace(outer: str | None, data: dict[str, Any]) -> str | None:
     if 'namespace' in data:
         return expand_namespace(data['namespace'], outer or '/')
-    return outer if is_ros_process(data) else None
+    return outer if takes_ros_arguments(data) else None

@@ -49,7 +49,7 @@ class SystemServices:
     Attributes:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
-        act_on_error: Takes a node's name and what to do after an error in it.
+        act_on_error: Takes a node's full name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
         executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
@@ -189,7 +189,7 @@ class LiveNode:
             if health is not None:
                 health.note_error(error)
             self.errors.report(owner, place, error)
-            self.services.act_on_error(self.spec.key, own.on_error)
+            self.services.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
             owner,

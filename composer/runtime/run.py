@@ -46,7 +46,7 @@ def run_system(
         UsageError: The ROS arguments are wrong.
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
-        system = System(spec, positions, functions, ros_arguments)
+        system = System(spec, positions, functions, ros_arguments, log_level_requests)
         with _stopped_by_signals(system, spec):
             try:
                 system.start()
@@ -74,6 +74,7 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
         if system.stop_requested:
+            system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
         last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
