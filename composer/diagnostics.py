@@ -11,6 +11,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
+# Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
+MAX_FINDINGS = 1000
+_LONGEST = 2000
+
+
 class Severity(Enum):
     """How much a finding weighs: an error stops `composer up`, a warning does not."""
 
@@ -132,8 +137,20 @@ def diagnostic_at(
     severity: Severity = Severity.ERROR,
     related: Iterable[Related] = (),
 ) -> Diagnostic:
-    """Return a finding whose file is that of its span."""
+    """Return a finding whose file is that of its span.
+
+    What it quotes of the file may be enormous, or no text that a terminal can show.
+    """
+    message, help = _printable(message), help and _printable(help)  # noqa: A001
     return Diagnostic(rule, message, span.source.name, span, severity, help, tuple(related))
+
+
+def _printable(text: str) -> str:
+    if len(text) > _LONGEST:
+        text = f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
+    if text.isprintable():
+        return text
+    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:

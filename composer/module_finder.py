@@ -7,9 +7,13 @@ import sys
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.names import suggest
 from composer.python_source import ModuleSource, read_module
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 _PROJECT_MARKS = ('pyproject.toml', '.git')
 
@@ -27,17 +31,22 @@ class MissingModule:
     nearest: str | None
 
 
-def project_search_path(config: Path) -> list[Path]:
-    """Return where a file's behaviours are sought before the installed packages.
+def project_search_path(configs: Iterable[Path]) -> list[Path]:
+    """Return where the behaviours of files are sought before the installed packages.
 
-    That is the folder the command runs in, then the file's folder and its parents up to the one
+    That is the folder the command runs in, then each file's folder and its parents up to the one
     with a `pyproject.toml` or `.git`; without such a one, the file's folder alone.
     """
-    folder = config.resolve().parent
+    folders = dict.fromkeys(config.resolve().parent for config in configs)
+    chains = (each for folder in folders for each in _lineage(folder))
+    return list(dict.fromkeys([Path.cwd(), *chains]))
+
+
+def _lineage(folder: Path) -> list[Path]:
+    """Return a folder and its parents up to the project's."""
     lineage = [folder, *folder.parents]
     roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in _PROJECT_MARKS)]
-    chain = lineage[: roots[0] + 1] if roots else [folder]
-    return list(dict.fromkeys([Path.cwd(), *chain]))
+    return lineage[: roots[0] + 1] if roots else [folder]
 
 
 class ModuleFinder:
@@ -47,6 +56,7 @@ class ModuleFinder:
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
+        self._listed: dict[Path, list[str]] = {}
 
     def find(self, name: str) -> ModuleSource | MissingModule:
         """Return the module `package.module`, or what of its name is missing."""
@@ -68,7 +78,10 @@ class ModuleFinder:
         return read_module(file) if file else ModuleSource(None)
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
-        near = suggest(part, {name for folder in folders for name in _list_modules(folder)})
+        for folder in folders:
+            if folder not in self._listed:
+                self._listed[folder] = _list_modules(folder)
+        near = suggest(part, {name for folder in folders for name in self._listed[folder]})
         return '.'.join([*done, near]) if near else None
 
 

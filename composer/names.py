@@ -7,7 +7,9 @@ Sources: https://design.ros2.org/articles/topic_and_service_names.html and the v
 from __future__ import annotations
 
 import difflib
+import heapq
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,6 +20,11 @@ MAX_NODE_NAME = 255
 MAX_NAMESPACE = 245
 MAX_TOPIC_NAME = 247
 
+# With more options, or longer ones, the search for the nearest would take seconds.
+_MOST_OPTIONS = 2000
+_LONGEST_WORD = 255
+_PRESELECTED = 100
+
 _NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
 _TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
 _FULL_CHARACTERS = re.compile(r'[A-Za-z0-9_/]*')
@@ -26,13 +33,47 @@ _SUBSTITUTIONS = ('node', 'ns', 'namespace')
 
 
 def suggest(word: str, options: Iterable[str]) -> str | None:
-    """Return the option that `word` was most likely meant to be, or `None`."""
-    choices = sorted(set(options))
-    lowered = {choice.lower(): choice for choice in reversed(choices)}
-    if word.lower() in lowered:
-        return lowered[word.lower()]
-    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    """Return the option that `word` was most likely meant to be, or `None`.
+
+    Among more than two thousand options, and for words longer than any name of ROS, none is
+    sought.
+    """
+    choices = tuple(options)
+    if len(choices) > _MOST_OPTIONS or len(word) > _LONGEST_WORD:
+        return None
+    return _find_nearest(word.lower(), tuple(sorted(set(choices))))
+
+
+@lru_cache(maxsize=4096)
+def _find_nearest(word: str, choices: tuple[str, ...]) -> str | None:
+    lowered = _lower(choices)
+    if word in lowered:
+        return lowered[word]
+    close = difflib.get_close_matches(word, _preselect(word, lowered), n=1, cutoff=0.6)
     return lowered[close[0]] if close else None
+
+
+@lru_cache(maxsize=64)
+def _lower(choices: tuple[str, ...]) -> dict[str, str]:
+    return {choice.lower(): choice for choice in reversed(choices)}
+
+
+def _preselect(word: str, options: Iterable[str]) -> list[str]:
+    """Return the options worth a close look: of many, those with most pairs of letters of it."""
+    short = [option for option in options if len(option) <= _LONGEST_WORD]
+    if len(short) <= _PRESELECTED:
+        return short
+    pairs = _pairs(word)
+    return heapq.nlargest(
+        _PRESELECTED,
+        short,
+        key=lambda option: len(pairs & _pairs(option)) / (len(word) + len(option)),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _pairs(word: str) -> frozenset[str]:
+    return frozenset(f' {word}'[i : i + 2] for i in range(len(word)))
 
 
 def did_you_mean(word: str, options: Iterable[str], what: str = 'there') -> str | None:
@@ -41,13 +82,13 @@ def did_you_mean(word: str, options: Iterable[str], what: str = 'there') -> str 
     Args:
         what: How the options are introduced if none is near: `<what>: a, b, c`.
     """
-    choices = sorted(set(options))
+    choices = frozenset(options)
     near = suggest(word, choices)
     if near is not None:
         return f"did you mean '{near}'?"
     if not choices:
         return None
-    shown = ', '.join(choices[:_FEW])
+    shown = ', '.join(heapq.nsmallest(_FEW, choices))
     return f'{what}: {shown}' + (', …' if len(choices) > _FEW else '')
 
 

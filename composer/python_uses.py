@@ -96,12 +96,14 @@ class NodeUses:
     Attributes:
         open_kinds: Of what it may use more than `uses` says.
         reads_others: Whether it reads parameters of other nodes.
+        reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
     """
 
     uses: tuple[NodeUse, ...] = ()
     passes: tuple[NodePass, ...] = ()
     open_kinds: frozenset[UseKind] = ALL_KINDS
     reads_others: bool = False
+    reaches_ros: bool = False
 
 
 def read_node_uses(function: FunctionNode, node_name: str, given: Iterable[str]) -> NodeUses:
@@ -124,6 +126,7 @@ def read_node_uses(function: FunctionNode, node_name: str, given: Iterable[str])
         tuple(reader.passes),
         frozenset(reader.open_kinds),
         reader.reads_others,
+        reader.reaches_ros,
     )
 
 
@@ -216,6 +219,7 @@ class _UseReader(ast.NodeVisitor):
         self.passes: list[NodePass] = []
         self.open_kinds: set[UseKind] = set()
         self.reads_others = False
+        self.reaches_ros = False
         self._node = node_name
         self._local = local
         self._chosen = chosen
@@ -242,6 +246,7 @@ class _UseReader(ast.NodeVisitor):
             self.open_kinds.add(_METHODS[node.attr])
         elif node.attr in ('parameters', 'ros'):
             self.open_kinds.add('parameter')
+            self.reaches_ros |= node.attr == 'ros'
         elif node.attr == 'get_parameters':
             self.reads_others = True
         elif node.attr not in _HARMLESS:

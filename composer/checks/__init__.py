@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from composer.checks.annotations import check_annotations
@@ -12,21 +13,23 @@ from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
 from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
+from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.processes import check_environment, check_processes, check_waits
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
+from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
 from composer.language import LoadedSystem, load_system
 from composer.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.rules.record import Need
 
 NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
@@ -43,10 +46,12 @@ NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
 )
 SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_full_names,
+    check_parameter_files,
     check_waits,
     check_environment,
     check_wiring,
 )
+_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 
 
 def create_context(
@@ -59,7 +64,7 @@ def create_context(
     if system.spec is None:
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
-    modules = ModuleFinder(project_search_path(system.path))
+    modules = ModuleFinder(project_search_path(system.files))
     uses = UseReader(modules)
     return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
@@ -75,14 +80,11 @@ def check_system(
         further: What else is to be checked; it is given what was found so far.
     """
     context, declared = create_context(system, catalogue)
-    found = _apply_rules(context) if context else []
+    found = list(_apply_rules(context)) if context else []
+    samples = _by_line(system.sampled)
     if context and further:
-        found += further(context, found)
-    found = [
-        _with_includes(finding, system)
-        for finding in found
-        if not _hangs_on_samples(finding, system)
-    ]
+        more = further(context, found)
+        found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias, or a file included twice, is wrong once.
     every = [*system.diagnostics, *declared, *found]
     once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
@@ -91,30 +93,49 @@ def check_system(
     heard = apply_ignore_comments(
         once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
-    return sorted(heard, key=lambda finding: finding.sort_key)
+    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
 
 
-def _apply_rules(context: CheckContext) -> list[Diagnostic]:
-    found = [finding for rule in (*NODE_RULES, *SYSTEM_RULES) for finding in rule(context)]
+def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
+    if len(findings) <= MAX_FINDINGS:
+        return findings
+    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
+    return [*findings[: MAX_FINDINGS - 1], last]
+
+
+def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
+    samples = _by_line(context.system.sampled)
+    for rule, each_context in _applications(context):
+        findings = (each for each in rule(each_context) if not _hangs_on_samples(each, samples))
+        # One more, as a sign that there are more.
+        yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _applications(
+    context: CheckContext,
+) -> Iterator[tuple[Callable[[CheckContext], Iterable[Diagnostic]], CheckContext]]:
+    yield from ((rule, context) for rule in (*NODE_RULES, *SYSTEM_RULES))
     if context.system.unused is not None:
         # What is left out this time may be there the next.
         other = replace(context, spec=context.system.unused)
-        found += [finding for rule in NODE_RULES for finding in rule(other)]
-    return found
+        yield from ((rule, other) for rule in NODE_RULES)
 
 
-def _with_includes(finding: Diagnostic, system: LoadedSystem) -> Diagnostic:
-    """Return a finding in an included file with the places where that is included."""
-    chain = system.chains.get(finding.span.source, ()) if finding.span else ()
-    return finding.with_related(chain) if chain else finding
+def _by_line(spans: Iterable[Span]) -> dict[tuple[SourceFile, int], list[Span]]:
+    lines: dict[tuple[SourceFile, int], list[Span]] = {}
+    for span in spans:
+        lines.setdefault((span.source, span.line), []).append(span)
+    return lines
 
 
-def _hangs_on_samples(finding: Diagnostic, system: LoadedSystem) -> bool:
+def _hangs_on_samples(
+    finding: Diagnostic, samples: Mapping[tuple[SourceFile, int], list[Span]]
+) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(
-        span.line == place.line and span.column <= place.column < span.column + span.length
-        for span in system.sampled
+        span.column <= place.column < span.column + span.length
+        for span in samples.get((place.source, place.line), ())
     )
 
 

@@ -113,7 +113,7 @@ def _check_signature(
 ) -> Iterator[Diagnostic]:
     behaviour = binding.behaviour
     by_keyword = _keyword_parameters(signature)
-    taken = list(signature.parameters)[: len(binding.parameters)]
+    taken = _positional_parameters(signature)[: len(binding.parameters)]
     free = [name for name in by_keyword or () if name not in taken]
     # What is given, with misspelt names as they were meant: their finding is enough.
     was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
@@ -141,6 +141,11 @@ def _check_signature(
             f'{behaviour.function}{shown} is called as {binding.call}: {error}',
             part=behaviour.function,
         )
+
+
+def _positional_parameters(signature: inspect.Signature) -> list[str]:
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return [each.name for each in signature.parameters.values() if each.kind in kinds]
 
 
 def _keyword_parameters(signature: inspect.Signature) -> list[str] | None:

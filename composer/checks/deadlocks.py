@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from composer.language.positions import DataPath
     from composer.language.specs import NodeSpec
 
+# Of a chain of calls, how many are named.
+_MOST_SHOWN = 8
+
 # A callback group: the node's name and the group's own.
 Group = tuple[str, str]
 
@@ -56,8 +59,7 @@ class _Wait:
 
     @property
     def answering_group(self) -> Group | None:
-        group = getattr(self.server.entity, 'group', None)
-        return None if group == REENTRANT else (self.server.node.name, group or '')
+        return _group_of(self.server.node, getattr(self.server.entity, 'group', None))
 
     def __str__(self) -> str:
         return f"{self.binding.owner} of node '{self.node.name}'"
@@ -98,12 +100,15 @@ def _find_waits(context: CheckContext, graph: Graph) -> Iterator[_Wait]:
 
 def _groups_by_path(node: NodeSpec) -> dict[DataPath, Group]:
     """Return the mutually exclusive group of each behaviour that runs in one."""
-    entities = (*node.triggers, *node.services.values())
-    return {
-        (*entity.path, 'behaviour'): (node.name, entity.group or '')
-        for entity in entities
-        if entity.group != REENTRANT
+    groups = {
+        (*entity.path, 'behaviour'): _group_of(node, entity.group)
+        for entity in (*node.triggers, *node.services.values())
     }
+    return {path: group for path, group in groups.items() if group}
+
+
+def _group_of(node: NodeSpec, name: str | None) -> Group | None:
+    return None if name == REENTRANT else (node.name, name or '')
 
 
 def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
@@ -187,7 +192,10 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
             'neither can go on'
         )
     else:
-        way = ' → '.join(f"'{wait.service}'" for wait in chain)
+        names = [f"'{wait.service}'" for wait in chain]
+        if len(names) > _MOST_SHOWN:
+            names[_MOST_SHOWN - 1 : -1] = ['…']
+        way = ' → '.join(names)
         message = (
             f'{first} waits for a chain of services that comes back to its own callback group, '
             f'so that none can go on: {way}'
@@ -199,7 +207,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         part=first.binding.behaviour.function,
         help=f"give {last.server.noun} '{last.server.entity.name}' a group of its own, "
         "or 'group: reentrant'",
-        related=[_served_here(context, wait) for wait in chain],
+        related=[_served_here(context, wait) for wait in chain[:_MOST_SHOWN]],
     )
 
 

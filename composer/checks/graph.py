@@ -6,10 +6,11 @@ Jazzy does not remap the names of actions, only those of the topics and services
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from composer.names import expand_name, join_names, remap_name
+from composer.language.specs import NodeSpec
+from composer.names import expand_name, remap_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from composer.language.specs import (
         ActionClientSpec,
         ActionSpec,
-        NodeSpec,
         ProcessSpec,
         PublisherSpec,
         QosSpec,
@@ -50,6 +50,19 @@ _SECTIONS: dict[str, tuple[ChannelKind, str]] = {
 }
 _PROVIDING = ('publishers', 'services', 'actions')
 _SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
+# By the keys of a node that switch them on (rclpy's `ParameterService` and the like).
+_SERVICES_OF_ROS = {
+    'parameter_services': (
+        'describe_parameters',
+        'get_parameter_types',
+        'get_parameters',
+        'list_parameters',
+        'set_parameters',
+        'set_parameters_atomically',
+    ),
+    'type_description_service': ('get_type_description',),
+    'logger_services': ('get_logger_levels', 'set_logger_levels'),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,14 +117,14 @@ class Graph:
     """All channels of a system.
 
     Attributes:
-        nodes: The full names of the nodes.
+        of_ros: The full names of the services that ROS itself gives to the nodes.
         unsure: The kinds of channels that may have further ends: a name hangs on an argument
             that is not given yet, or is missing for a fault of its own.
         left_out: What nodes have that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
-    nodes: frozenset[str]
+    of_ros: frozenset[str]
     unsure: frozenset[ChannelKind]
     left_out: frozenset[tuple[ChannelKind, str]]
 
@@ -135,9 +148,9 @@ def build_graph(context: CheckContext) -> Graph:
                 channel = channels.setdefault((kind, name), Channel(kind, name))
                 ends = channel.providers if section in _PROVIDING else channel.users
                 ends.append(Endpoint(node, entity, noun))
-    nodes = (join_names(node.namespace, node.name) for node in context.spec.nodes.values())
+    of_ros = (name for node in context.spec.nodes.values() for name in _services_of_ros(node))
     return Graph(
-        channels, frozenset(nodes), frozenset(unsure), frozenset(_channels_left_out(context))
+        channels, frozenset(of_ros), frozenset(unsure), frozenset(_channels_left_out(context))
     )
 
 
@@ -156,6 +169,12 @@ def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str
     if not node.remap or kind not in _SCHEMES:
         return full
     return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
+
+
+def _services_of_ros(node: NodeSpec) -> Iterator[str]:
+    for key, names in _SERVICES_OF_ROS.items():
+        if getattr(node, key):
+            yield from (expand_name(f'~/{name}', node.name, node.namespace) for name in names)
 
 
 class _Doubts:
@@ -199,17 +218,10 @@ class _Doubts:
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4
-_WITHOUT_CHANNELS = {
-    'description',
-    'log_level',
-    'on_error',
-    'on_parameters',
-    'on_start',
-    'on_stop',
-    'parameters',
-    'state',
-    'timers',
-    'use_sim_time',
+_WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
+    *_SECTIONS,
+    'namespace',
+    'remap',
 }
 
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from composer.python_source import FunctionSource
     from composer.python_uses import NodePass, NodeUse, UseKind
 
-_FEW = 8
+# Helpers of helpers are followed so far; those that call themselves go deeper.
+_DEEPEST = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,13 @@ class BehaviourUses:
     Attributes:
         open_kinds: Of what it may use more.
         reads_others: Whether it may read parameters of other nodes.
+        reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
     """
 
     found: tuple[FoundUse, ...] = ()
     open_kinds: frozenset[UseKind] = ALL_KINDS
     reads_others: bool = True
+    reaches_ros: bool = True
 
 
 _UNKNOWN = BehaviourUses()
@@ -64,13 +67,13 @@ class UseReader:
             return _UNKNOWN
         if name in module.imports:
             home, _, original = module.imports[name].rpartition('.')
-            if not home or len(callers) > _FEW:
+            if not home or len(callers) > _DEEPEST:
                 return _UNKNOWN
             callers = (*callers, name)
             return self._uses(self._modules.find(home), original, position, given, callers)
         source = module.functions.get(name)
         caller = f'{module.path}:{name}'
-        if source is None or caller in callers or len(callers) > _FEW:
+        if source is None or len(callers) > _DEEPEST:
             return _UNKNOWN
         key = (caller, position, given)
         if key not in self._read:
@@ -91,13 +94,16 @@ class UseReader:
             FoundUse(use, Span(file, use.line, use.column, len(use.name))) for use in own.uses
         ]
         open_kinds, reads_others = own.open_kinds, own.reads_others
+        reaches_ros = own.reaches_ros
         for passed in own.passes:
             inner = self._uses(module, passed.function, passed.position, 0, callers)
             is_late = self._is_coroutine(module, passed.function) and not passed.is_awaited
             found += [_as_passed(each, passed, is_late=is_late) for each in inner.found]
             open_kinds |= inner.open_kinds
             reads_others |= inner.reads_others
-        return BehaviourUses(tuple(found), open_kinds, reads_others)
+            reaches_ros |= inner.reaches_ros
+        # Each once, or functions that call each other often would never be done.
+        return BehaviourUses(tuple(dict.fromkeys(found)), open_kinds, reads_others, reaches_ros)
 
     def _is_coroutine(self, module: ModuleSource, name: str) -> bool:
         source = module.functions.get(name)

@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 _RULE = 'bad-parameter'
 _NUMERIC = ('integer', 'double')
+_LIMITS = ('minimum', 'maximum', 'step')
 _HAS_CHOICES = (*_NUMERIC, 'string')
 
 # Parameters that each node of rclpy declares itself, and what to say of them.
-_OF_EVERY_NODE = {
+OF_EVERY_NODE = {
     'use_sim_time': (
         'a key of the node, not one of its parameters',
         "move it out of 'parameters:'",
@@ -53,8 +54,8 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
     path = _value_path(context, parameter)
-    if parameter.name in _OF_EVERY_NODE:
-        what, help_text = _OF_EVERY_NODE[parameter.name]
+    if parameter.name in OF_EVERY_NODE:
+        what, help_text = OF_EVERY_NODE[parameter.name]
         message = f"'{parameter.name}' is {what}"
         yield context.at_key(parameter.path, _RULE, message, help=help_text)
         return
@@ -87,10 +88,18 @@ def _value_path(context: CheckContext, parameter: ParameterSpec) -> DataPath:
 
 def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
     assert parameter.type is not None  # noqa: S101 - told by the caller, for the type checker
-    for key in ('minimum', 'maximum', 'step'):
+    limits = [key for key in _LIMITS if getattr(parameter, key) is not None]
+    inferred = (*parameter.path, 'type') not in context.system.positions.values
+    if limits and inferred and parameter.type not in _NUMERIC:
+        yield context.at_value(
+            (*parameter.path, 'default'),
+            _RULE,
+            f"parameter '{parameter.name}': expected an integer or a double, "
+            f"which '{limits[0]}' is for, got {parameter.value!r}",
+        )
+        return
+    for key in limits:
         limit = getattr(parameter, key)
-        if limit is None:
-            continue
         path = (*parameter.path, key)
         if parameter.type not in _NUMERIC:
             message = f"'{key}' is for integers and doubles, and this is a {parameter.type}"
@@ -115,10 +124,19 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
         message = f'choices are for integers, doubles and strings, and this is a {parameter.type}'
         yield context.at_key(path, _RULE, message)
         return
-    for index, choice in enumerate(parameter.choices):
-        fault = find_type_fault(choice, parameter.type)
-        if fault:
-            yield context.at_value((*path, index), _RULE, f'choice {index}: {fault}')
+    faults = {
+        index: fault
+        for index, choice in enumerate(parameter.choices)
+        if (fault := find_type_fault(choice, parameter.type))
+    }
+    if len(faults) == len(parameter.choices) and parameter.value is not None:
+        # None is of the type of the value, so it is the value that is odd.
+        refusal = find_refusal(parameter, parameter.value)
+        at = (*parameter.path, 'default')
+        yield context.at_value(at, _RULE, f"parameter '{parameter.name}': {refusal}")
+        return
+    for index, fault in faults.items():
+        yield context.at_value((*path, index), _RULE, f'choice {index}: {fault}')
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:

@@ -103,18 +103,13 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     catalogue = context.catalogue
     if not catalogue.available:
         return
-    known: dict[tuple[str, str], frozenset[str]] = {}
     for node in context.spec.nodes.values():
         for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
-            package, kind, _ = entity.type.split('/')
+            package = entity.type.partition('/')[0]
             dropped = context.was_dropped(('interfaces', package))
             unreadable = dropped or package in context.unreadable
-            if unreadable or context.was_dropped((*entity.path, 'type')):
-                continue
-            if (kind, package) not in known:
-                names = catalogue.names(cast('InterfaceKind', kind), package)
-                known[kind, package] = frozenset(names)
-            if entity.type in known[kind, package]:
+            stands_in = context.was_dropped((*entity.path, 'type'))
+            if unreadable or stands_in or catalogue.has(entity.type):
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path

@@ -28,16 +28,6 @@ _OF_ROS = {
     '/tf',
     '/tf_static',
 }
-# Each node of rclpy serves these (`ParameterService`, `TypeDescriptionService`).
-_OF_EVERY_NODE = {
-    'describe_parameters',
-    'get_parameter_types',
-    'get_parameters',
-    'get_type_description',
-    'list_parameters',
-    'set_parameters',
-    'set_parameters_atomically',
-}
 # Topics and services that actions consist of.
 _OF_ACTIONS = '/_action/'
 # Names are compared one by one; a file that wants more suggestions is checked without the rest.
@@ -71,15 +61,10 @@ def _is_alone(graph: Graph, channel: Channel) -> bool:
         return False
     if (channel.kind, channel.name) in graph.left_out:
         return False
-    if channel.kind in graph.unsure or channel.name in _OF_ROS or _OF_ACTIONS in channel.name:
+    if channel.kind in graph.unsure or channel.name in _OF_ROS or channel.name in graph.of_ros:
         return False
-    if find_topic_name_fault(channel.name):
-        # That is a finding of its own.
-        return False
-    owner, _, last = channel.name.rpartition('/')
-    if channel.kind != 'service' or last not in _OF_EVERY_NODE:
-        return True
-    return owner not in graph.nodes
+    # A name with a fault is a finding of its own.
+    return _OF_ACTIONS not in channel.name and find_topic_name_fault(channel.name) is None
 
 
 def _explain(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Related, Severity
@@ -58,14 +58,22 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         for name, node in context.spec.nodes.items()
     }
     for name, node in context.spec.nodes.items():
+        # Parameters may be declared with rclpy, too.
+        is_open = any(found.reaches_ros for _, found in uses[name])
         for binding, found in uses[name]:
-            yield from _check_names(context, node, binding, found, lost.get(name, []))
+            told = _without_parameters(found) if is_open else found
+            yield from _check_names(context, node, binding, told, lost.get(name, []))
     whole = [
         (node, [found for _, found in uses[name]])
         for name, node in context.spec.nodes.items()
         if not any(_may_hide_a_use(path) for path in lost.get(name, []))
     ]
     yield from _check_unused(context, whole)
+
+
+def _without_parameters(uses: BehaviourUses) -> BehaviourUses:
+    kept = tuple(each for each in uses.found if each.use.kind != 'parameter')
+    return replace(uses, found=kept)
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:

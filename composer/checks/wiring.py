@@ -38,6 +38,12 @@ def _check_types(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
 def _explain_types(
     context: CheckContext, channel: Channel, ends: list[Endpoint]
 ) -> Iterator[Diagnostic]:
+    catalogue = context.catalogue
+    if catalogue.available:
+        # Of a type that there is not, that has been said.
+        ends = [end for end in ends if catalogue.has(end.entity.type)]
+    if not ends:
+        return
     # Among equals the type of the publisher or server counts, which comes first.
     (usual, _), *_ = Counter(end.entity.type for end in ends).most_common()
     example = next(end for end in ends if end.entity.type == usual)

@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, cast
 
 from composer.interfaces.descriptions import InterfaceDescription
 from composer.interfaces.type_descriptions import (
@@ -49,7 +49,7 @@ class InterfaceCatalogue:
         self._documents: dict[str, dict[str, Any] | None] = {}
         self._descriptions: dict[str, InterfaceDescription | None] = {}
         self._packages: dict[str, Path] | None = None
-        self._indices: dict[tuple[str, InterfaceKind], frozenset[str]] = {}
+        self._entries: dict[tuple[str, InterfaceKind], frozenset[str]] = {}
 
     @property
     def available(self) -> bool:
@@ -73,6 +73,13 @@ class InterfaceCatalogue:
             if added_kind == kind and package in {None, owner}:
                 found.add(name)
         return sorted(found)
+
+    def has(self, full_name: str) -> bool:
+        """Whether there is an interface of this name, `std_msgs/msg/String` say."""
+        package, kind, _ = full_name.split('/')
+        return full_name in self._added or full_name in self._indexed(
+            package, cast('InterfaceKind', kind)
+        )
 
     def describe(self, full_name: str) -> InterfaceDescription | None:
         """Describe an interface, such as `std_msgs/msg/String`.
@@ -145,9 +152,9 @@ class InterfaceCatalogue:
         return self._packages
 
     def _indexed(self, package: str, kind: InterfaceKind) -> frozenset[str]:
-        if (package, kind) not in self._indices:
-            self._indices[package, kind] = frozenset(self._read_index(package, kind))
-        return self._indices[package, kind]
+        if (package, kind) not in self._entries:
+            self._entries[package, kind] = frozenset(self._read_index(package, kind))
+        return self._entries[package, kind]
 
     def _read_index(self, package: str, kind: InterfaceKind) -> Iterator[str]:
         prefix = self._prefix_of(package)

@@ -39,7 +39,8 @@ class LoadedSystem:
             need not hold for the real ones.
         data: The whole system as plain data, all included, with nothing left to evaluate.
         values: What the arguments are.
-        chains: Where the files are included that are part of it, innermost first.
+        included: The files that are part of it.
+        chains: Where entries come from by includes, innermost first, by their paths.
         notes: Where the values that the expressions of a scalar use come from, by its path.
         unused: As `spec`, of the nodes whose `when` does not hold.
     """
@@ -53,9 +54,15 @@ class LoadedSystem:
     sampled: tuple[Span, ...] = ()
     data: Mapping[str, Any] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
-    chains: Mapping[SourceFile, tuple[Related, ...]] = field(default_factory=dict)
+    included: tuple[SourceFile, ...] = ()
+    chains: Mapping[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     notes: Mapping[DataPath, str] = field(default_factory=dict)
     unused: SystemSpec | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The file and those that are included in it."""
+        return [self.path, *(Path(source.name) for source in self.included)]
 
 
 def load_system(
@@ -119,6 +126,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
         tuple(whole.sampled_spans),
         used,
         whole.values,
+        tuple(whole.included),
         whole.chains,
         whole.notes,
         parse_system(unused, path.stem) if unused else None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.composition import (
     MAX_DEPTH,
+    MAX_VALUES,
     CompositionError,
     MappingNode,
     ScalarNode,
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.language.positions import DataPath, SourceMap
 
-# A file of the largest size has fewer values than this; only aliases in aliases reach it.
-MAX_VALUES = 1_000_000
-
 _MERGE_KEY = '<<'
 
 
@@ -38,7 +36,7 @@ def construct_data(
     """Return the data of a tree and what was wrong with it; fill in its positions.
 
     Raises:
-        CompositionError: Aliases expand to more than a million values or 100 levels.
+        CompositionError: Aliases expand to more than 300,000 values or 100 levels.
     """
     constructor = _Constructor(positions)
     data = None if root is None else constructor.construct(root, ())
@@ -54,7 +52,7 @@ class _Constructor:
         self._merging = 0
 
     def construct(self, node: TreeNode, path: DataPath) -> Any:
-        self._count_one(node, path)
+        self._count_up(node, path)
         self._values[path] = node.span
         if isinstance(node, ScalarNode):
             return self._scalar(node)
@@ -67,8 +65,8 @@ class _Constructor:
             return [self.construct(item, (*path, index)) for index, item in enumerate(node.items)]
         return self._mapping(node, path)
 
-    def _count_one(self, node: TreeNode, path: DataPath) -> None:
-        self._count += 1
+    def _count_up(self, node: TreeNode, path: DataPath, values: int = 1) -> None:
+        self._count += values
         if self._count > MAX_VALUES:
             entry = self._keys.get(path[:1], node.span)
             self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
@@ -84,22 +82,25 @@ class _Constructor:
 
     def _mapping(self, node: MappingNode, path: DataPath) -> dict[str, Any]:
         data: dict[str, Any] = {}
-        merges: list[TreeNode] = []
+        merge: tuple[TreeNode, TreeNode] | None = None
         for key_node, value_node in node.pairs:
             if isinstance(key_node, ScalarNode) and key_node.plain and key_node.text == _MERGE_KEY:
-                merges.append(value_node)
+                if merge is None:
+                    merge = key_node, value_node
+                else:
+                    self._duplicate(_MERGE_KEY, key_node, merge[0].span)
                 continue
             key = self._key(key_node)
             if key is None:
                 continue
             key_path = (*path, key)
             if key in data:
-                self._duplicate(key, key_node, key_path)
+                self._duplicate(key, key_node, self._keys[key_path])
                 continue
             self._keys[key_path] = key_node.span
             data[key] = self.construct(value_node, key_path)
-        for merged in merges:
-            self._merge(merged, data, path)
+        if merge:
+            self._merge(merge[1], data, path)
         return data
 
     def _key(self, node: TreeNode) -> str | None:
@@ -124,14 +125,16 @@ class _Constructor:
         )
         return node.text
 
-    def _duplicate(self, key: str, node: TreeNode, path: DataPath) -> None:
-        first = Related('it stands here first', self._keys[path])
+    def _duplicate(self, key: str, node: TreeNode, span: Span) -> None:
+        first = Related('it stands here first', span)
         self.faults.append(
             diagnostic_at(
                 node.span,
                 'duplicate-key',
                 f"the key '{key}' stands twice in one mapping",
-                help=f'keep one; the first is in line {first.span.line}',
+                help='merge several with <<: [*one, *two]'
+                if key == _MERGE_KEY
+                else f'keep one; the first is in line {first.span.line}',
                 related=[first],
             )
         )
@@ -143,12 +146,12 @@ class _Constructor:
             self._stop(node.span, 'too-deep', f'merges nest more than {MAX_DEPTH} levels deep')
         parts = node.items if isinstance(node, SequenceNode) else [node]
         for part in parts:
-            self._count_one(part, path)
             if not isinstance(part, MappingNode):
                 self._fault(
                     part, 'bad-merge', 'the merge key << takes a mapping, or a list of them'
                 )
                 continue
+            self._count_up(part, path, len(part.pairs))
             merged = MappingNode(None, part.span)
             for key_node, value_node in part.pairs:
                 known = isinstance(key_node, ScalarNode) and key_node.text in data

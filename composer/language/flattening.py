@@ -199,6 +199,8 @@ class Flattening:
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         for path, note in part.notes_by_entry().get(old, ()):
             whole.notes[new + path] = note
+        here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
+        whole.chains[new] = (*part.chains.get(old, ()), here)
         if old in part.left_out:
             whole.left_out.add(new)
 

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from composer.language.positions import DataPath
 
 
+_HERE = 'included here'
+
+
 class Includer:
     """Reads the files that a file includes, and what these include, each file once.
 
@@ -74,10 +77,10 @@ class Includer:
                 diagnostic_at(place, 'missing-include', str(error), help=error.help)
             )
             return None
-        here = Related('included here', place)
+        here = Related(_HERE, place)
         if path.resolve() in stack:
             message = f"'{entry['file']}' includes itself"
-            related = [Related('included here', each.span) for each in chain]
+            related = [Related(_HERE, each.span) for each in chain]
             instance.diagnostics.append(
                 diagnostic_at(place, 'include-cycle', message, related=related)
             )
@@ -96,10 +99,7 @@ class Includer:
         part.diagnostics = []
         part = self.include(part, path, inner_chain)
         instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
-        instance.chains[part.positions.source] = inner_chain
-        instance.chains |= {
-            source: chain for source, chain in part.chains.items() if source not in instance.chains
-        }
+        instance.included |= {part.positions.source: None} | part.included
         return part
 
     def _document(self, path: Path) -> Document:

@@ -45,7 +45,8 @@ class Instance:
         values: What they are in this instance.
         sampled_spans: Where values stand that hang on samples of arguments.
         notes: Where the values that the expressions of a scalar use come from, by its path.
-        chains: Where the files are included that are part of it, innermost first.
+        included: The files that are part of it.
+        chains: Where entries come from by includes, innermost first, by their paths.
     """
 
     data: dict[str, Any]
@@ -57,7 +58,8 @@ class Instance:
     values: Mapping[str, Any] = field(default_factory=dict)
     sampled_spans: list[Span] = field(default_factory=list)
     notes: dict[DataPath, str] = field(default_factory=dict)
-    chains: dict[SourceFile, tuple[Related, ...]] = field(default_factory=dict)
+    included: dict[SourceFile, None] = field(default_factory=dict)
+    chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)
     _notes: dict[DataPath, list[tuple[DataPath, str]]] | None = None
 

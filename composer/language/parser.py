@@ -13,6 +13,7 @@ from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
+    DEFAULT_WARN_AFTER_SEC,
     ActionClientSpec,
     ActionSpec,
     BehaviourSpec,
@@ -75,6 +76,7 @@ _INHERITED = frozenset(
         'log_level',
         'use_sim_time',
         'on_error',
+        'warn_after',
         'parameter_services',
         'rosout',
         'type_description_service',
@@ -132,6 +134,7 @@ class _NodeParser:
             type_description_service=data.get('type_description_service', False),
             logger_services=data.get('logger_services', False),
             on_error=self._on_error,
+            warn_after_sec=self._warn_after_sec({}),
             parameters=_parse_entries(data, path, 'parameters', _parse_parameter),
             state=MappingProxyType(data.get('state', {})),
             remap=tuple(data.get('remap', {}).items()),
@@ -182,6 +185,7 @@ class _NodeParser:
             group=data.get('group'),
             on_error=data.get('on_error', self._on_error),
             external=data.get('external', False),
+            warn_after_sec=self._warn_after_sec(data),
             path=path,
         )
 
@@ -195,6 +199,7 @@ class _NodeParser:
             clock=data.get('clock', 'ros'),
             group=data.get('group'),
             on_error=data.get('on_error', self._on_error),
+            warn_after_sec=self._warn_after_sec(data),
             path=path,
         )
 
@@ -207,6 +212,7 @@ class _NodeParser:
             behaviour=_behaviour_at(data, path, 'behaviour'),
             group=data.get('group'),
             on_error=data.get('on_error', self._on_error),
+            warn_after_sec=self._warn_after_sec(data),
             path=path,
         )
 
@@ -233,8 +239,14 @@ class _NodeParser:
             accept=_behaviour_at(data, path, 'accept') if 'accept' in data else None,
             concurrency=data.get('concurrency', 'parallel'),
             on_error=data.get('on_error', self._on_error),
+            warn_after_sec=self._warn_after_sec(data),
             path=path,
         )
+
+    def _warn_after_sec(self, data: Data) -> float | None:
+        inherited = self._data.get('warn_after', DEFAULT_WARN_AFTER_SEC)
+        value = data.get('warn_after', inherited)
+        return None if value is None else float(value)
 
     def _parse_entity_qos(self, data: Data, path: DataPath) -> QosSpec:
         return _parse_qos(data['qos'], (*path, 'qos')) if 'qos' in data else self._defaults.qos

@@ -31,6 +31,8 @@ class SourceMap:
     source: SourceFile
     keys: dict[DataPath, Span] = field(default_factory=dict)
     values: dict[DataPath, Span] = field(default_factory=dict)
+    _inner: dict[DataPath, list[DataPath]] = field(default_factory=dict, init=False, repr=False)
+    _indexed: int = field(default=0, init=False, repr=False)
 
     def key(self, path: DataPath) -> Span:
         """Return the span of the key at `path`, or of the nearest thing around it."""
@@ -46,10 +48,27 @@ class SourceMap:
 
     def move(self, old: DataPath, new: DataPath) -> None:
         """Let what was at `old`, and all below it, be found at `new`."""
+        if self._indexed != len(self.keys) + len(self.values):
+            self._index()
         depth = len(old)
-        for spans in (self.keys, self.values):
-            for path in [path for path in spans if path[:depth] == old]:
-                spans[new + path[depth:]] = spans.pop(path)
+        pending = [old]
+        while pending:
+            path = pending.pop()
+            moved = new + path[depth:]
+            for spans in (self.keys, self.values):
+                if path in spans:
+                    spans[moved] = spans.pop(path)
+            inner = self._inner.pop(path, ())
+            pending += inner
+            self._inner.setdefault(moved, []).extend(new + each[depth:] for each in inner)
+        self._inner.setdefault(new[:-1], []).append(new)
+        self._indexed = len(self.keys) + len(self.values)
+
+    def _index(self) -> None:
+        """Note what lies directly below each path, so that moves pass over all else."""
+        self._inner.clear()
+        for path in dict.fromkeys([*self.keys, *self.values]):
+            self._inner.setdefault(path[:-1], []).append(path)
 
     def branches(self, path: DataPath) -> dict[Key, Branch]:
         """Return the positions of all entries of the mapping at `path`, by their keys."""
@@ -75,6 +94,7 @@ class SourceMap:
 
     def remove(self, path: DataPath) -> None:
         """Forget what is at `path` and below it."""
+        self._indexed = -1
         depth = len(path)
         for spans in (self.keys, self.values):
             for at in [at for at in spans if at[:depth] == path]:
@@ -87,6 +107,7 @@ class SourceMap:
 
     def graft(self, path: DataPath, branch: Branch) -> None:
         """Let the positions of a branch be found at `path` as well."""
+        self._indexed = -1
         self.keys.update((path + rest, span) for rest, span in branch.keys)
         self.values.update((path + rest, span) for rest, span in branch.values)
 

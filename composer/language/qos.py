@@ -51,6 +51,9 @@ BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     },
 }
 
+# Nobody writes more; the bound keeps thousands of profiles from being followed thousands of times.
+_LONGEST_CHAIN = 50
+
 
 class QosError(ComposerError):
     """A profile that does not exist, or that leads back to itself.
@@ -83,6 +86,9 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
         following = profiles[chain[-1].profile]
         if following in chain:
             message = f"the QoS profile '{chain[-1].profile}' leads back to itself"
+            raise QosError(message, chain[-1])
+        if len(chain) > _LONGEST_CHAIN:
+            message = f'more than {_LONGEST_CHAIN} QoS profiles start from each other'
             raise QosError(message, chain[-1])
         chain.append(following)
     base = BUILTIN_PROFILES.get(chain[-1].profile)

@@ -6,22 +6,21 @@ The schema (JSON Schema 2020-12) is the one description of the structure, for ed
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from functools import cache
-from itertools import takewhile
+from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import ValidationError
-from jsonschema.validators import extend
-
+from composer.diagnostics import MAX_FINDINGS
+from composer.language.acceptance import Acceptor, SchemaCompiler
 from composer.language.schema_faults import StructureFault, explain
 from composer.language.schema_file import schema_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath, SourceMap
+    from composer.language.positions import DataPath, Key, SourceMap
 
 # What editors accept in place of a number, a word and the like. Here, the values are in place.
 _TEMPLATE = {'$ref': '#/$defs/template'}
@@ -42,46 +41,67 @@ def check_structure(
     it is checked in the same run; `positions` follow it.
 
     Args:
+        data: They are changed.
         failed: The paths of expressions that could not be evaluated; they are left out.
         sampled: The paths of values that only stand for others; what is wrong with them is left
             out as well, and not reported.
 
     Returns:
-        The data without what was wrong, the paths that were dropped for it, and the findings.
+        The data without what was wrong, the paths that were dropped for it, and the findings. Of
+        data with more than a thousand faults nothing is left.
     """
-    findings: list[Diagnostic] = []
     failed = [_entry_of(path) for path in failed]
-    dropped: set[DataPath] = set(failed)
-    for path in failed:
-        data = _without(data, path)
-    faults = _find_faults(data)
-    while misspelt := [fault for fault in faults if _can_be_mended(fault, data)]:
-        for fault in misspelt:
-            if _can_be_mended(fault, data):
-                findings.append(fault.diagnostic(positions))
-                data = _with_key_renamed(data, fault.path, str(fault.meant))
-                positions.move(fault.path, (*fault.path[:-1], str(fault.meant)))
-        faults = _find_faults(data)
+    _remove_entries(data, failed)
+    findings = _mend_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
-    findings += [
-        fault.diagnostic(positions)
-        for fault in faults
-        if not (
-            fault.path in sampled or (fault.rule == 'missing-key' and fault.path in incomplete)
-        )
-    ]
+    passed_over = set(sampled)
+    faults = _find_faults(data)
+    missing = {fault.path for fault in faults if fault.rule == 'missing-key'}
+    for fault in faults:
+        # What one key needs beside it is missing once, also if its entry needs it anyway.
+        known = fault.path in incomplete or (fault.path and fault.path[:-1] in missing)
+        if fault.path not in passed_over and not (fault.rule == 'missing-key' and known):
+            findings.append(fault.diagnostic(positions))
+    if len(findings) >= MAX_FINDINGS:
+        return dict(_REQUIRED), frozenset(), findings
+    return data, frozenset([*failed, *_drop_faulty(data, faults)]), findings
+
+
+def _mend_keys(data: dict[str, Any], positions: SourceMap) -> list[Diagnostic]:
+    """Give misspelt keys their right names; return the findings for them."""
+    findings: list[Diagnostic] = []
+    while len(findings) < MAX_FINDINGS:
+        names: dict[DataPath, dict[Key, str]] = {}
+        for fault in _find_faults(data):
+            if fault.meant is None:
+                continue
+            parent, key = fault.path[:-1], fault.path[-1]
+            renamed = names.setdefault(parent, {})
+            if fault.meant not in _value_at(data, parent) and fault.meant not in renamed.values():
+                renamed[key] = fault.meant
+                findings.append(fault.diagnostic(positions))
+                positions.move(fault.path, (*parent, fault.meant))
+        if not any(names.values()):
+            break
+        for path, renamed in names.items():
+            _rename_keys(_value_at(data, path), renamed)
+    return findings
+
+
+def _drop_faulty(data: dict[str, Any], faults: list[StructureFault]) -> Iterator[DataPath]:
+    """Remove what is wrong, or put something in its place; yield the paths of it."""
     while faults:
+        entries = [fault.drop for fault in faults if not fault.stand_in]
         for fault in faults:
             if fault.stand_in:
-                path = (*fault.path, fault.stand_in[0])
-                data = _with_entry(data, path, fault.stand_in[1])
-            else:
-                path = fault.drop
-                data = _without(data, path) if path else data
-            dropped.add(path)
-        data = _REQUIRED | data
+                key, value = fault.stand_in
+                _value_at(data, fault.path)[key] = value
+                yield (*fault.path, key)
+        yield from entries
+        _remove_entries(data, entries)
+        for key, value in _REQUIRED.items():
+            data.setdefault(key, value)
         faults = _find_faults(data)
-    return data, frozenset(dropped), findings
 
 
 def is_sound(part: dict[str, Any]) -> bool:
@@ -106,31 +126,23 @@ def without_templates(schema: Any) -> Any:
 
 
 def _find_faults(data: dict[str, Any]) -> list[StructureFault]:
-    return [fault for error in _validator().iter_errors(data) for fault in explain(error)]
+    """Return the faults of the structure, a thousand at most."""
+    if _schema().accepts(data):
+        return []
+    faults = (fault for error in _validator().iter_errors(data) for fault in explain(error))
+    return list(islice(faults, MAX_FINDINGS))
 
 
-def _can_be_mended(fault: StructureFault, data: dict[str, Any]) -> bool:
-    """Return whether a fault is a misspelt key whose right spelling is not there as well."""
-    if fault.meant is None:
-        return False
-    mapping: Any = data
-    for key in fault.path[:-1]:
-        mapping = mapping[key]
-    return fault.path[-1] in mapping and fault.meant not in mapping
+def _value_at(data: Any, path: Sequence[Key]) -> Any:
+    for key in path:
+        data = data[key]
+    return data
 
 
-def _with_key_renamed(data: Any, path: DataPath, key: str) -> Any:
-    head, *rest = path
-    if not rest:
-        return {key if name == head else name: value for name, value in data.items()}
-    if isinstance(data, list):
-        index = int(head)
-        return [
-            *data[:index],
-            _with_key_renamed(data[index], tuple(rest), key),
-            *data[index + 1 :],
-        ]
-    return data | {head: _with_key_renamed(data[head], tuple(rest), key)}
+def _rename_keys(mapping: dict[Key, Any], names: dict[Key, str]) -> None:
+    entries = list(mapping.items())
+    mapping.clear()
+    mapping.update((names.get(key, key), value) for key, value in entries)
 
 
 def _entry_of(path: DataPath) -> DataPath:
@@ -138,34 +150,33 @@ def _entry_of(path: DataPath) -> DataPath:
     return tuple(takewhile(lambda key: isinstance(key, str), path))
 
 
-def _with_entry(data: Any, path: DataPath, value: Any) -> Any:
-    """Return a copy of nested mappings with an entry more, if there is a mapping for it."""
-    head, *rest = path
-    if not isinstance(data, dict) or (rest and head not in data):
-        return data
-    return data | {head: _with_entry(data[head], tuple(rest), value) if rest else value}
+def _remove_entries(data: Any, paths: Iterable[DataPath]) -> None:
+    """Remove entries of nested mappings, if they are there."""
+    for path in paths:
+        mapping = data
+        for key in path[:-1]:
+            mapping = mapping.get(key) if isinstance(mapping, dict) else None
+        if path and isinstance(mapping, dict):
+            mapping.pop(path[-1], None)
 
 
-def _without(data: Any, path: DataPath) -> Any:
-    """Return a copy of nested mappings without the entry at `path`, if it is there."""
-    head, *rest = path
-    if not isinstance(data, dict) or head not in data:
-        return data
-    if not rest:
-        return {key: value for key, value in data.items() if key != head}
-    return data | {head: _without(data[head], tuple(rest))}
+@dataclass(frozen=True, slots=True)
+class _Schema:
+    document: dict[str, Any]
+    compiler: SchemaCompiler
+    accepts: Acceptor
+
+
+@cache
+def _schema() -> _Schema:
+    document = without_templates(json.loads(schema_path().read_text(encoding='utf-8')))
+    compiler = SchemaCompiler(document['$defs'])
+    return _Schema(document, compiler, compiler.compile(document))
 
 
 @cache
 def _validator() -> Any:
-    schema = json.loads(schema_path().read_text(encoding='utf-8'))
-    strict = extend(Draft202012Validator, {'maximum': _check_maximum})
-    return strict(without_templates(schema))
+    # Importing it takes a fifth of a check's time, and most files have no faults.
+    from composer.language.validation import create_validator
 
-
-def _check_maximum(
-    validator: Any, maximum: float, instance: object, _schema: object
-) -> Iterator[ValidationError]:
-    """As in JSON Schema, but a NaN is beyond every maximum (JSON has none, YAML has)."""
-    if validator.is_type(instance, 'number') and not instance <= maximum:  # type: ignore[operator]
-        yield ValidationError(f'{instance!r} is greater than the maximum of {maximum!r}')
+    return create_validator(_schema().document, _schema().compiler)

@@ -23,6 +23,7 @@ _TYPE_WORDS = {
     'number': 'a number',
     'integer': 'an integer',
     'boolean': 'true or false',
+    'null': 'null',
 }
 _LONGEST_SHOWN = 40
 
@@ -66,10 +67,10 @@ class StructureFault:
         return diagnostic_at(span, self.rule, self.message, help=self.help)
 
 
-def explain(error: ValidationError) -> list[StructureFault]:
-    """Return the faults behind an error; several for several unknown keys of one mapping."""
+def explain(error: ValidationError) -> Iterator[StructureFault]:
+    """Yield the faults behind an error; several for several unknown keys of one mapping."""
     explanation = _EXPLANATIONS.get(str(error.validator), _explain_otherwise)
-    return list(explanation(error))
+    return explanation(error)
 
 
 def _explain_unknown_keys(error: ValidationError) -> Iterator[StructureFault]:

@@ -1,6 +1,7 @@
 """A system as the file declares it: frozen records, one per thing of the language.
 
 Every record carries the path of its data, under which a `SourceMap` knows where it was written.
+`warn_after_sec` is how long a behaviour may run before it is reported, `None` for ever.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_WAIT_SEC = 30.0
 DEFAULT_RESTART_DELAY_SEC = 1.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
+DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
 
 
@@ -116,6 +118,7 @@ class SubscriptionSpec:
     group: str | None
     on_error: OnError
     external: bool
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -136,6 +139,7 @@ class TimerSpec:
     clock: ClockName
     group: str | None
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -154,6 +158,7 @@ class ServiceSpec:
     behaviour: BehaviourSpec
     group: str | None
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -188,6 +193,7 @@ class ActionSpec:
     accept: BehaviourSpec | None
     concurrency: Concurrency
     on_error: OnError
+    warn_after_sec: float | None
     path: DataPath
 
 
@@ -299,6 +305,7 @@ class NodeSpec:
     type_description_service: bool
     logger_services: bool
     on_error: OnError
+    warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
     state: Mapping[str, Any]
     remap: tuple[tuple[str, str], ...]
@@ -315,6 +322,11 @@ class NodeSpec:
     wait_for: tuple[ConditionSpec, ...]
     parameter_files: tuple[str, ...]
     path: DataPath
+
+    @property
+    def key(self) -> str:
+        """What the file calls it: its name, or its full name."""
+        return str(self.path[-1])
 
     @property
     def full_name(self) -> str:

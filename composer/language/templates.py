@@ -17,7 +17,6 @@ from jinja2 import (
     TemplateRuntimeError,
     TemplateSyntaxError,
     UndefinedError,
-    meta,
 )
 from jinja2.exceptions import SecurityError
 
@@ -34,6 +33,9 @@ if TYPE_CHECKING:
 _OPEN = '{{'
 _CLOSE = '}}'
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
+# Farther on, an undefined name is not sought: its finding shows the whole scalar.
+_LONGEST_SEARCHED = 1000
+_MOST_LINES_SEARCHED = 100
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
 
@@ -142,17 +144,15 @@ class Filler:
         return ''.join([*parts, text[start:]])
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
-        code = _code(text, expression)
-        compiled = self._sandbox.compile_expression(code, undefined_to_none=False)
-        return _as_data(compiled({'here': str(span.source.folder.resolve()), **self._values}))
+        scope = {'here': str(span.source.folder.resolve()), **self._values}
+        return _as_data(self._sandbox.evaluate(_code(text, expression), scope))
 
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
         for expression in expressions:
             # What is wrong with it is said when it is evaluated.
-            with suppress(TemplateSyntaxError):
-                parsed = self._sandbox.parse(text[expression])
-                names |= meta.find_undeclared_variables(parsed)
+            with suppress(TemplateError):
+                names |= self._sandbox.names_in(_code(text, expression))
         return frozenset(names)
 
     def _note(self, names: frozenset[str]) -> str:
@@ -204,11 +204,12 @@ def _locate(name: str, span: Span) -> Span:
     """Return where a name stands in an expression of a scalar, which may go over several lines."""
     pattern = re.compile(rf'\{{\{{(?:(?!\}}\}}).)*?(?<![\w.])({re.escape(name)})(?!\w)')
     if _OPEN in span.text:
-        found = pattern.search(span.text)
+        found = pattern.search(span.text[:_LONGEST_SEARCHED])
         start = span.column + found.start(1) if found else 0
         return Span(span.source, span.line, start, len(name)) if found else span
-    for number, line in enumerate(span.source.lines[span.line - 1 :], start=span.line):
-        if found := pattern.search(line):
+    lines = span.source.lines[span.line - 1 : span.line - 1 + _MOST_LINES_SEARCHED]
+    for number, line in enumerate(lines, start=span.line):
+        if found := pattern.search(line[:_LONGEST_SEARCHED]):
             return Span(span.source, number, found.start(1) + 1, len(name))
     return span
 

@@ -97,6 +97,11 @@ def _text(value: str) -> str:
     if '{{' in value:
         # Braces must not look like an expression, except for the one that gives them.
         value = f'{{{{ {value!r} }}}}'
+    return quote_text(value)
+
+
+def quote_text(value: str) -> str:
+    """Return a text in double quotes, as every reader of YAML takes it."""
     # JSON's strings are those of YAML in double quotes.
     quoted = json.dumps(value, ensure_ascii=False)
     return ''.join(each if each.isprintable() else f'\\U{ord(each):08x}' for each in quoted)

@@ -262,7 +262,10 @@ class _Hearing:
             return
         function = node.function(behaviour)
         call = node.call(
-            owner, behaviour.path, partial(function, node.face, **behaviour.arguments)
+            owner,
+            behaviour.path,
+            partial(function, node.face, **behaviour.arguments),
+            admits=node.gate.lets_events,
         )
         kind = kind_of(function)
         self._callback = call.as_callback(kind)

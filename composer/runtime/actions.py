@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import threading
 import time
 from contextlib import aclosing, closing
@@ -16,13 +15,14 @@ from rclpy.qos import QoSProfile
 from composer.interfaces.classes import import_interface
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
+from composer.runtime.calls import Pace
 from composer.runtime.goal_queue import GoalQueue, goal_key
 from composer.runtime.payloads import converter_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.language.specs import ActionSpec
+    from composer.language.specs import ActionSpec, BehaviourSpec
     from composer.runtime.live_node import LiveNode
 
 _POLL_SEC = 0.005
@@ -51,9 +51,7 @@ class _Server(ActionServer):
         self._execution = _Execution(node, spec, self._queue)
         self._live = node
         self._owner = f"action '{spec.name}'"
-        self._place = node.place(spec.path)
-        self._accept = node.function(spec.accept) if spec.accept else None
-        self._arguments = spec.accept.arguments if spec.accept else {}
+        self._spec = spec
         self._tokens: dict[bytes, int] = {}
         super().__init__(
             node.ros,
@@ -114,20 +112,34 @@ class _Server(ActionServer):
     async def _decide(self, goal: Any) -> GoalResponse:
         if self._execution.is_ending() or not self._queue.has_room():
             return GoalResponse.REJECT
-        if self._accept is None:
+        accept = self._spec.accept
+        if accept is None:
             return GoalResponse.ACCEPT
-        try:
-            answer = self._accept(self._live.face, goal, **self._arguments)
-            if inspect.isawaitable(answer):
-                answer = await answer
-        except BaseException as error:  # noqa: BLE001 - a behaviour never takes the server down
-            self._live.errors.report(f'{self._owner} (accept)', self._place, error)
+        answers: list[Any] = []
+        await self._ask(accept, goal, answers)
+        if not answers:
+            # It raised.
             return GoalResponse.REJECT
+        answer = answers[0]
         if answer is False or isinstance(answer, str):
             reason = f': {answer}' if answer else ''
             self._live.face.logger.info(f'{self._owner} refused a goal{reason}')
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
+
+    async def _ask(self, accept: BehaviourSpec, goal: Any, answers: list[Any]) -> None:
+        function = self._live.function(accept)
+        call = self._live.call(
+            f'{self._owner} (accept)',
+            accept.path,
+            partial(function, self._live.face, **accept.arguments),
+            rules=self._spec,
+            admits=self._live.gate.lets_requests,
+        ).delivering(answers.append)
+        if kind_of(function) is FunctionKind.COROUTINE:
+            await call.as_callback(FunctionKind.COROUTINE)(goal)
+        else:
+            call.run(goal)
 
     def _cancel(self, goal: Any) -> CancelResponse:
         if self._queue.take_out(goal):
@@ -174,7 +186,7 @@ class _Execution:
             f"action '{spec.name}'",
             spec.path,
             drives.get(self._kind, self._call),
-            on_error=spec.on_error,
+            rules=spec,
         )
         self.callback: Callable[[Any], Any] = (
             self._execute_async if self.is_async else self._execute
@@ -184,7 +196,8 @@ class _Execution:
         results: list[Any] = []
         try:
             if not self._end_early(goal):
-                self._goal_call.delivering(results.append).run(goal)
+                pace = Pace()
+                self._goal_call.delivering(results.append, pace).run(goal, pace)
             return self._result_of(goal, results)
         finally:
             self._queue.finished(goal)
@@ -193,8 +206,9 @@ class _Execution:
         results: list[Any] = []
         try:
             if not self._end_early(goal):
-                call = self._goal_call.delivering(results.append)
-                await call.as_callback(FunctionKind.COROUTINE)(goal)
+                pace = Pace()
+                call = self._goal_call.delivering(results.append, pace)
+                await call.as_callback(FunctionKind.COROUTINE)(goal, pace)
             return self._result_of(goal, results)
         finally:
             self._queue.finished(goal)
@@ -205,13 +219,13 @@ class _Execution:
             goal.abort()
         return results[0] if results else self._result_class()
 
-    def _call(self, goal: Any) -> Any:
+    def _call(self, goal: Any, _pace: Pace) -> Any:
         return self._succeed(goal, self._begin(goal.request))
 
-    async def _call_async(self, goal: Any) -> Any:
+    async def _call_async(self, goal: Any, _pace: Pace) -> Any:
         return self._succeed(goal, await self._begin(goal.request))
 
-    def _drive(self, goal: Any) -> Any:
+    def _drive(self, goal: Any, pace: Pace) -> Any:
         with closing(self._begin(goal.request)) as generator:
             while True:
                 try:
@@ -221,10 +235,11 @@ class _Execution:
                 if self._must_end(goal):
                     break
                 self._publish(goal, feedback)
+                pace.resumed()
         self._end_early(goal)
         return self._result_class()
 
-    async def _drive_async(self, goal: Any) -> Any:
+    async def _drive_async(self, goal: Any, pace: Pace) -> Any:
         # An async generator cannot return a value: what it yields last is the result.
         held: list[Any] = []
         async with aclosing(self._begin(goal.request)) as generator:
@@ -234,6 +249,7 @@ class _Execution:
                 for feedback in held:
                     self._publish(goal, feedback)
                 held = [item]
+                pace.resumed()
             else:
                 return self._succeed(goal, held[0] if held else None)
         self._end_early(goal)

@@ -47,6 +47,14 @@ class Gate:
         """Return whether the callback of an entity may begin."""
         return self.is_open or (self.serves and isinstance(entity, (Service, ActionServer)))
 
+    def lets_events(self) -> bool:
+        """Return whether behaviours that answer nobody may begin."""
+        return self.is_open
+
+    def lets_requests(self) -> bool:
+        """Return whether behaviours that answer requests may begin."""
+        return self.serves
+
 
 class _GatedGroup(CallbackGroup):
     """Asks its gate before it asks the kind of group that it is mixed with.

@@ -100,7 +100,7 @@ class EntityReport:
         errors: How many calls raised in the period.
         last_error: The last of these errors, empty if there was none.
         missed: In the period.
-        running_sec: How long the oldest call has been running that has not ended.
+        overdue_sec: How long a call has been running that runs longer than it may; 0 if none does.
         all_calls: Since the start, as the next two.
     """
 
@@ -109,7 +109,7 @@ class EntityReport:
     errors: int
     last_error: str
     missed: Missed
-    running_sec: float
+    overdue_sec: float
     all_calls: int
     all_errors: int
     all_missed: Missed
@@ -145,8 +145,11 @@ class EntityHealth:
 
     def note_error(self, error: BaseException) -> None:
         """Note that a call raised."""
-        self._last_error = f'{type(error).__name__}: {error}'
         self._errors += 1
+        try:
+            self._last_error = f'{type(error).__name__}: {error}'
+        except BaseException:  # noqa: BLE001 - it is the behaviour's code that runs here
+            self._last_error = type(error).__name__
 
     def follow(self, look: Callable[[], Missed]) -> None:
         """From now on, ask here for what it has missed: its node was built, or built anew."""
@@ -154,12 +157,12 @@ class EntityHealth:
         self._past, self._missed = self._all_missed, _NOTHING
         self._look = look
 
-    def report(self, period_sec: float, running_sec: float) -> EntityReport:
+    def report(self, period_sec: float, overdue_sec: float) -> EntityReport:
         """Return how it fared, and begin a new period.
 
         Args:
             period_sec: How long the one that ends was.
-            running_sec: How long the oldest call has been running that has not ended.
+            overdue_sec: How long a call has been running that runs longer than it may.
         """
         times = self.times.take()
         self._calls += times.calls()
@@ -173,7 +176,7 @@ class EntityHealth:
             errors=errors - said_errors,
             last_error=self._last_error if errors > said_errors else '',
             missed=_NOTHING if missed is said_missed else missed - said_missed,
-            running_sec=running_sec,
+            overdue_sec=overdue_sec,
             all_calls=self._calls,
             all_errors=errors,
             all_missed=missed,
@@ -203,19 +206,19 @@ class HealthBoard:
         return self._entities.setdefault((node, owner), EntityHealth())
 
     def reports(
-        self, period_sec: float, running: Iterable[tuple[str, RunningCall]], now_ns: int
+        self, period_sec: float, overdue: Iterable[tuple[str, RunningCall]], now_ns: int
     ) -> dict[tuple[str, str], EntityReport]:
         """Return how all entities fared, by node and entity in words, and begin a new period.
 
         Args:
             period_sec: How long the one that ends was.
-            running: The calls that have not ended, with the full names of their nodes.
+            overdue: The calls that run longer than they may, with the full names of their nodes.
             now_ns: The present time of `time.monotonic_ns`.
         """
         longest: dict[tuple[str, str], float] = {}
-        for node, call in running:
+        for node, call in overdue:
             key = node, call.owner
-            longest[key] = max(longest.get(key, 0.0), (now_ns - call.begun_ns) / 1e9)
+            longest[key] = max(longest.get(key, 0.0), (now_ns - call.since_ns) / 1e9)
         return {
             key: entity.report(period_sec, longest.get(key, 0.0))
             for key, entity in list(self._entities.items())

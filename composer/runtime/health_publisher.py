@@ -41,7 +41,7 @@ class HealthPublisher:
     Args:
         system: The system's name.
         period_sec: Seconds between two messages.
-        running: Returns the calls that have not ended, with the full names of their nodes.
+        overdue: Returns the calls that run longer than they may, with their nodes' full names.
     """
 
     def __init__(
@@ -49,12 +49,12 @@ class HealthPublisher:
         system: str,
         period_sec: float,
         board: HealthBoard,
-        running: Callable[[], Iterable[tuple[str, RunningCall]]],
+        overdue: Callable[[], Iterable[tuple[str, RunningCall]]],
     ) -> None:
         self._system = system
         self._period_sec = period_sec
         self._board = board
-        self._running = running
+        self._overdue = overdue
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._publish_on, name='diagnostics', daemon=True)
 
@@ -99,7 +99,7 @@ class HealthPublisher:
         due = begun + self._period_sec
         while not self._ended.wait(max(0.0, due - time.monotonic())):
             now = time.monotonic()
-            reports = self._board.reports(now - begun, self._running(), time.monotonic_ns())
+            reports = self._board.reports(now - begun, self._overdue(), time.monotonic_ns())
             begun = now
             due = max(due, now) + self._period_sec
             if not self._publisher.get_subscription_count():

@@ -13,8 +13,6 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 if TYPE_CHECKING:
     from composer.runtime.health import EntityReport
 
-# A call that runs for so long hangs, unless it is a goal of an action, which may take any time.
-_HANG_SEC = 5.0
 _P99 = 0.99
 
 
@@ -30,7 +28,6 @@ class StatusWriter:
     def __init__(self, node: str, owner: str, system: str) -> None:
         self._is_timer = owner.startswith('timer ')
         self._is_subscription = owner.startswith('subscription ')
-        self._may_take_long = owner.startswith('action ')
         self._values: dict[str, KeyValue] = {}
         task = owner.replace("'", '')
         self._status = DiagnosticStatus(name=f'{node}: {task}', hardware_id=system)
@@ -55,10 +52,10 @@ class StatusWriter:
         return status
 
     def _judge(self, report: EntityReport) -> tuple[bytes, str]:
-        missed, hangs = report.missed, self._hangs(report)
+        missed, overdue_sec = report.missed, report.overdue_sec
         concerns = [
             _count(report.errors, 'error', f', last: {report.last_error}'),
-            f'a call has been running for {report.running_sec:.1f} s' if hangs else '',
+            f'a call has been running for {overdue_sec:.1f} s' if overdue_sec else '',
             _count(missed.overruns, 'message', ' dropped from the full queue'),
             _count(missed.late_ticks, 'late tick'),
             _count(missed.skipped_ticks, 'skipped tick'),
@@ -69,9 +66,6 @@ class StatusWriter:
         if text:
             return DiagnosticStatus.WARN, text
         return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
-
-    def _hangs(self, report: EntityReport) -> bool:
-        return report.running_sec > _HANG_SEC and not self._may_take_long
 
     def _set(self, key: str, value: str) -> None:
         pair = self._values.get(key)

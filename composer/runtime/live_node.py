@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import copy
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import InvalidHandle
 
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
 from composer.runtime.calls import BehaviourCall, CallLedger
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
+from composer.runtime.hangs import HangLimit
 from composer.runtime.node import Node, Publish
+from composer.runtime.ownership import release, reserve
 from composer.runtime.remote_parameters import RemoteParameters
 from composer.runtime.ros_node import ComposedRosNode
 from composer.runtime.supervision import ErrorReporter
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     from composer.runtime.action_clients import ActionClient
     from composer.runtime.failures import ServiceFailures
     from composer.runtime.health import EntityHealth, HealthBoard
+    from composer.runtime.matching import Endpoint
     from composer.runtime.service_clients import ServiceClient
     from composer.runtime.system_executor import SystemExecutor
     from composer.runtime.waiting import StopSignal
@@ -67,6 +72,25 @@ class SystemServices:
     health: HealthBoard | None
 
 
+class AtStop(Protocol):
+    """A behaviour that has begun, and waits half-way for its next turn."""
+
+    def close(self, timeout_sec: float) -> None:
+        """Let it end; what it raises is reported."""
+
+
+class Rules(Protocol):
+    """What the file says about the behaviours of an entity, or of a node."""
+
+    @property
+    def on_error(self) -> OnError:
+        """What is done when one raises."""
+
+    @property
+    def warn_after_sec(self) -> float | None:
+        """How long one may run before that is reported."""
+
+
 @dataclass(slots=True)
 class LiveNode:
     """A node with what its entities share.
@@ -79,6 +103,9 @@ class LiveNode:
         background: A group that no behaviour is in: responses and the like are always taken.
         serving: The group of requests to action servers.
         at_destruction: What ends entities that rclpy's node does not end itself.
+        endpoints: Its publishers and subscriptions.
+        at_stop: Behaviours that wait half-way, to be ended before `on_stop`.
+        limits: How long behaviours may run, by their owners.
     """
 
     spec: NodeSpec
@@ -95,10 +122,14 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
+    endpoints: list[Endpoint] = field(default_factory=list)
+    at_stop: list[AtStop] = field(default_factory=list)
+    limits: dict[str, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
     ledger: CallLedger = field(default_factory=CallLedger)
     has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
+    _is_destroyed: bool = False
 
     def group(self, name: str | None) -> CallbackGroup:
         """Return the callback group of this name; `None` is the node's own."""
@@ -134,17 +165,22 @@ class LiveNode:
         path: DataPath,
         function: Callable[..., Any],
         *,
-        on_error: OnError | None = None,
+        rules: Rules | None = None,
         publish: str | None = None,
+        admits: Callable[[], bool] | None = None,
     ) -> BehaviourCall:
         """Return the wrapped call of a function that an entity is bound to.
 
         Args:
             owner: The entity in words.
             path: Its place in the file.
+            rules: Those of the entity, if it has its own.
             publish: The publisher that takes what the function returns.
+            admits: See `BehaviourCall`.
         """
         place = self.place(path)
+        own = rules or self.spec
+        self._limit(owner, place, own)
         health = self.health(owner)
 
         def failed(owner: str, error: BaseException) -> None:
@@ -153,7 +189,7 @@ class LiveNode:
             if health is not None:
                 health.note_error(error)
             self.errors.report(owner, place, error)
-            self.services.act_on_error(self.spec.full_name, on_error or self.spec.on_error)
+            self.services.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
             owner,
@@ -162,6 +198,7 @@ class LiveNode:
             deliver=self._delivery(publish),
             failed=failed,
             times=None if health is None else health.times,
+            admits=admits,
         )
 
     def hook(
@@ -176,7 +213,18 @@ class LiveNode:
             failed: Takes what it raised, after that has been reported.
         """
         function = partial(self.function(behaviour), **behaviour.arguments)
-        place = self.place(behaviour.path)
+        return self.last_call(owner, behaviour.path, function, failed)
+
+    def last_call(
+        self,
+        owner: str,
+        path: DataPath,
+        function: Callable[..., Any],
+        failed: Callable[[BaseException], None] | None = None,
+    ) -> BehaviourCall:
+        """Return the wrapped call of what is not answered by `on_error` when it raises."""
+        place = self.place(path)
+        self._limit(owner, place, self.spec)
 
         def report(owner: str, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
@@ -193,11 +241,22 @@ class LiveNode:
         return f'{span.source.name}:{span.line}'
 
     def destroy(self) -> None:
-        """Remove the node and all its entities from the graph."""
+        """Remove the node and all its entities from the graph; a second time does nothing."""
+        if self._is_destroyed:
+            return
+        self._is_destroyed = True
         self.errors.flush()
         for end in self.at_destruction:
-            end()
+            with suppress(InvalidHandle):
+                # A behaviour may have destroyed it.
+                end()
+        release(self.ros)
         self.ros.destroy_node()
+
+    def _limit(self, owner: str, place: str, rules: Rules) -> None:
+        if owner not in self.limits:
+            warn = self.ros.get_logger().warning
+            self.limits[owner] = HangLimit(owner, place, rules.warn_after_sec, warn)
 
     def _delivery(self, publish: str | None) -> Callable[[Any], None]:
         if publish is None:
@@ -214,6 +273,7 @@ class LiveNode:
 def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
     """Create a node without entities."""
     ros = ComposedRosNode(spec, services.context, services.ros_arguments)
+    reserve(ros, 'the node', 'destroy_node')
     publishers: dict[str, Publish] = {}
     service_clients: dict[str, ServiceClient] = {}
     action_clients: dict[str, ActionClient] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
+from composer.runtime.matching import Endpoint
 from composer.runtime.payloads import converter_for
 from composer.runtime.qos import create_qos_profile
 
@@ -23,7 +24,10 @@ def create_publishers(node: LiveNode) -> None:
 def _create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
     message_class = import_interface(spec.type)
     profile = create_qos_profile(spec.qos, node.services.profiles)
-    send = node.ros.create_publisher(message_class, spec.topic, profile).publish
+    events = Endpoint(node, spec, profile).publisher_events()
+    send = node.ros.create_publisher(
+        message_class, spec.topic, profile, event_callbacks=events
+    ).publish
     convert = converter_for(message_class).convert
 
     def publish(payload: Payload) -> None:

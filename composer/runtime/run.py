@@ -9,8 +9,9 @@ import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from composer.errors import ExitCode
-from composer.runtime.logs import log_levels
+from composer.errors import ComposerError, ExitCode
+from composer.runtime import forks, last_resort
+from composer.runtime.logs import log_levels, system_logger
 from composer.runtime.system import System
 
 if TYPE_CHECKING:
@@ -33,8 +34,9 @@ def run_system(
 ) -> int:
     """Start a system, wait for its end, and stop it.
 
-    The first SIGINT or SIGTERM stops it, a second one leaves at once. If a behaviour cannot be
-    ended, the process is left with its exit code, since its threads cannot be ended either.
+    The first SIGINT or SIGTERM stops it, a second one leaves at once with exit code 1, and a third
+    one ends the process even if no Python can run. If a behaviour cannot be ended, the process is
+    left with its exit code, since its threads cannot be ended either.
 
     Returns:
         The exit code.
@@ -45,17 +47,26 @@ def run_system(
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
         system = System(spec, positions, functions, ros_arguments, log_level_requests)
-        with _stopped_by_signals(system):
-            system.start()
-            system.wait()
-            code, ended = system.stop()
+        with _stopped_by_signals(system, spec):
+            try:
+                system.start()
+                system.wait()
+                last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+                code, ended = system.stop()
+            except ComposerError as error:
+                if system.has_ended:
+                    raise
+                system_logger.error(str(error))
+                code, ended = ExitCode.FAILED, False
+            finally:
+                last_resort.disarm()
     if not ended:
         _leave(code)
     return code
 
 
 @contextmanager
-def _stopped_by_signals(system: System) -> Iterator[None]:
+def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
     # Python delivers signals to the main thread alone; elsewhere they stay with the caller.
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -66,11 +77,16 @@ def _stopped_by_signals(system: System) -> Iterator[None]:
             system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
+        last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+        for number in _SIGNALS:
+            last_resort.let_kernel_act_after_next(number)
 
-    before = {number: signal.signal(number, handle) for number in _SIGNALS}
+    before: dict[int, Any] = {number: signal.signal(number, handle) for number in _SIGNALS}
+    forks.signal_handlers.update(before)
     try:
         yield
     finally:
+        forks.signal_handlers.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -37,7 +37,7 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     behaviour = node.function(spec.behaviour)
     function = partial(behaviour, node.face, **spec.behaviour.arguments)
     owner = f"service '{spec.name}'"
-    call = node.call(owner, spec.path, function, on_error=spec.on_error)
+    call = node.call(owner, spec.path, function, rules=spec, admits=node.gate.lets_requests)
     full_name = node.ros.resolve_service_name(spec.service)
     failures = node.services.failures
 
@@ -48,8 +48,9 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     def response_of(responses: list[Any]) -> Any:
         if responses:
             return responses[0]
-        failures.note(full_name)
-        message = f'{owner} of {spec.name} has no response: its behaviour raised an error'
+        if node.gate.serves:
+            failures.note(full_name)
+        message = f'{owner} of {node.spec.key} has no response'
         raise NoResponseError(message)
 
     if kind_of(behaviour) is FunctionKind.COROUTINE:

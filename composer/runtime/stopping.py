@@ -1,17 +1,24 @@
-"""How the nodes of a system stop: nothing new begins, `on_stop` is heard, what runs may end."""
+"""How nodes stop: nothing new begins, what waits half-way is ended, `on_stop` is heard."""
 
 from __future__ import annotations
 
 import threading
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING
+
+from rclpy.exceptions import InvalidHandle
 
 from composer.python_source import FunctionKind
 from composer.runtime.behaviours import kind_of
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from composer.runtime.live_node import LiveNode
+
+_POLL_SEC = 0.05
 
 
 def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
@@ -27,30 +34,82 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     deadline = time.monotonic() + timeout_sec
     for node in nodes:
         node.gate.is_open = False
-        for timer in node.timers:
-            timer.cancel()
-    hooks = [
-        threading.Thread(target=_run_on_stop, args=(node, timeout_sec), daemon=True)
+        _cancel_timers(node)
+    ends = [
+        threading.Thread(target=_end, args=(node, timeout_sec), daemon=True)
         for node in reversed(nodes)
-        if node.spec.on_stop and node.has_begun
+        if _has_an_end(node)
     ]
-    for thread in hooks:
+    for thread in ends:
         thread.start()
-    for thread in hooks:
+    for thread in ends:
         thread.join(max(deadline - time.monotonic(), 0.0))
     for node in nodes:
         node.gate.close()
     ended = [_wait_until_idle(node, deadline) for node in nodes]
-    return all(ended) and not any(thread.is_alive() for thread in hooks)
+    return all(ended) and not any(thread.is_alive() for thread in ends)
 
 
-def _run_on_stop(node: LiveNode, timeout_sec: float) -> None:
-    hook = node.spec.on_stop
-    if hook is None:
-        return
+def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) -> bool:
+    """Let one node end so that it can be built anew.
+
+    Args:
+        gives_up: Whether that is not wanted any more.
+
+    Returns:
+        Whether it has ended. If only `on_stop` has not, the node stays closed; if one of its
+        behaviours hangs, nothing has been done to it.
+    """
+    node.gate.close()
+    if not _wait_for(node.ledger.wait_until_idle, timeout_sec, gives_up):
+        node.gate.open()
+        return False
+    _cancel_timers(node)
+    if _has_an_end(node):
+        ended = threading.Event()
+
+        def end() -> None:
+            _end(node, timeout_sec)
+            ended.set()
+
+        threading.Thread(target=end, daemon=True).start()
+        _wait_for(ended.wait, timeout_sec, gives_up)
+    # It is not stopped twice.
+    node.has_begun = False
+    node.at_stop.clear()
+    return node.ledger.wait_until_idle(0.0)
+
+
+def _wait_for(
+    wait: Callable[[float], bool], timeout_sec: float, gives_up: Callable[[], bool]
+) -> bool:
+    deadline = time.monotonic() + timeout_sec
+    while not wait(_POLL_SEC):
+        if gives_up() or time.monotonic() > deadline:
+            return False
+    return True
+
+
+def _has_an_end(node: LiveNode) -> bool:
+    return bool(node.at_stop) or (node.spec.on_stop is not None and node.has_begun)
+
+
+def _cancel_timers(node: LiveNode) -> None:
+    for timer in node.timers:
+        with suppress(InvalidHandle):
+            # A behaviour may have destroyed it.
+            timer.cancel()
+
+
+def _end(node: LiveNode, timeout_sec: float) -> None:
     node.ledger.wait_until_idle(timeout_sec / 2)
+    for one in node.at_stop:
+        one.close(timeout_sec)
     node.gate.serves = False
     node.waits.allow()
+    hook = node.spec.on_stop
+    if hook is None or not node.has_begun:
+        return
     call = node.hook('on_stop', hook)
     if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
         done = threading.Event()
@@ -68,7 +127,7 @@ def _wait_until_idle(node: LiveNode, deadline: float) -> bool:
         return True
     for call in node.ledger.running():
         system_logger.error(
-            f"node '{node.spec.name}': {call.owner} did not end in time; it is at\n"
+            f"node '{node.spec.key}': {call.owner} did not end in time; it is at\n"
             f'{call.format_stack()}'
         )
     return False

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
-
 from composer.interfaces.classes import import_interface
+from composer.runtime.matching import Endpoint
 from composer.runtime.qos import create_qos_profile
 
 if TYPE_CHECKING:
@@ -25,18 +24,18 @@ def create_subscriptions(node: LiveNode) -> None:
             owner,
             spec.path,
             _create_function(node, spec),
-            on_error=spec.on_error,
+            rules=spec,
             publish=spec.publish,
+            admits=node.gate.lets_events,
         )
+        profile = create_qos_profile(spec.qos, node.services.profiles)
         subscription = node.ros.create_subscription(
             import_interface(spec.type),
             spec.topic,
             call.as_callback(),
-            create_qos_profile(spec.qos, node.services.profiles),
+            profile,
             callback_group=node.group(spec.group),
-            # While a callback is queued its message is unread, and rclpy's default handlers of
-            # QoS events then wake the stock executor at once, again and again.
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            event_callbacks=Endpoint(node, spec, profile).subscription_events(),
         )
         node.follow(owner, subscription)
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import threading
 import time
-import traceback
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from composer.runtime.error_texts import format_error, place_of, summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,7 +43,7 @@ class ErrorReporter:
 
     def __init__(self, log: Callable[[str], Any]) -> None:
         self._log = log
-        self._counts: dict[str, _ErrorCount] = {}
+        self._counts: dict[tuple[str, str], _ErrorCount] = {}
         self._lock = threading.Lock()
 
     def report(self, owner: str, place: str, error: BaseException) -> None:
@@ -52,49 +53,51 @@ class ErrorReporter:
             owner: The entity in words, as in `timer 'tick'`.
             place: Where the file declares it, as `file:line`.
         """
-        frames = traceback.extract_tb(error.__traceback__)
-        line = frames[-1].lineno if frames else None
-        kind = (type(error).__name__, frames[-1].filename if frames else '', line)
-        summary = f'{type(error).__name__}: {error}'
+        kind = (type(error).__name__, *place_of(error))
+        summary = summarize(error)
         with self._lock:
-            count = self._counts.setdefault(owner, _ErrorCount())
+            count = self._counts.setdefault((owner, place), _ErrorCount())
             now = time.monotonic()
-            quiet = now - count.last_line < _QUIET_SEC
-            if kind not in count.shown and not quiet:
-                count.shown.add(kind)
-                text = f'{owner} ({place}) raised {summary}\n{_format_traceback(error)}'
-            elif quiet:
+            if now - count.last_line < _QUIET_SEC:
                 count.unsaid += 1
                 count.last_error = summary
                 return
+            if kind in count.shown:
+                count.unsaid += 1
+                count.last_error = summary
+                text = _say_count(owner, place, count)
             else:
-                text = f'{owner} ({place}) raised {count.unsaid + 1} more times, last: {summary}'
-            count.last_line, count.unsaid = now, 0
+                count.shown.add(kind)
+                earlier = f'{_say_count(owner, place, count)}\n' if count.unsaid else ''
+                text = f'{earlier}{owner} ({place}) raised {summary}\n{format_error(error)}'
+            count.last_line = now
         self._log(text)
+
+    def flush_old(self) -> None:
+        """Say the counts for which the time has come, though no error came that brought them."""
+        if self._counts:
+            self._flush(time.monotonic() - _QUIET_SEC)
 
     def flush(self) -> None:
         """Say the counts that have not been said yet."""
+        self._flush(float('inf'))
+
+    def _flush(self, before: float) -> None:
         with self._lock:
-            pending = [(owner, count) for owner, count in self._counts.items() if count.unsaid]
-            texts = [
-                f'{owner} raised {count.unsaid} more times, last: {count.last_error}'
-                for owner, count in pending
-            ]
-            for _, count in pending:
-                count.unsaid = 0
+            texts = []
+            for (owner, place), count in self._counts.items():
+                if count.unsaid and count.last_line <= before:
+                    texts.append(_say_count(owner, place, count))
+                    count.last_line = time.monotonic()
         for text in texts:
             self._log(text)
 
 
-def _format_traceback(error: BaseException) -> str:
-    """Return the traceback without Composer's own frames at its beginning."""
-    own = f'{__name__.partition(".")[0]}.'
-    trace = error.__traceback__
-    while (
-        trace and trace.tb_next and str(trace.tb_frame.f_globals.get('__name__')).startswith(own)
-    ):
-        trace = trace.tb_next
-    return ''.join(traceback.format_exception(type(error), error, trace)).rstrip()
+def _say_count(owner: str, place: str, count: _ErrorCount) -> str:
+    """Return the line about what was counted, and begin anew."""
+    times = 'once more' if count.unsaid == 1 else f'{count.unsaid} more times'
+    count.unsaid = 0
+    return f'{owner} ({place}) raised {times}, last: {count.last_error}'
 
 
 @dataclass(slots=True)

@@ -9,23 +9,28 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 
 from composer.errors import ComposerError, ExitCode, StartError, UsageError
 from composer.runtime.entities import create_entities
+from composer.runtime.error_texts import represent
 from composer.runtime.failures import ServiceFailures
+from composer.runtime.hangs import HangWatch
 from composer.runtime.health import HealthBoard
 from composer.runtime.health_publisher import HealthPublisher
 from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
+from composer.runtime.matching import GraphWatch
+from composer.runtime.ownership import release, reserve
 from composer.runtime.processes import Processes
 from composer.runtime.readiness import Readiness, describe_parts, list_waiters
-from composer.runtime.stopping import stop_nodes
+from composer.runtime.stopping import stop_node, stop_nodes
 from composer.runtime.supervision import Supervisor
 from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.waiting import StopSignal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.language.positions import SourceMap
     from composer.language.specs import NodeSpec, SystemSpec
@@ -37,6 +42,10 @@ _GONE_SEC = 2.0
 
 class System:
     """A system that can be started once and stopped once.
+
+    Attributes:
+        has_ended: Whether all has been torn down. If `start` or `stop` could not do so, threads
+            still run, and only the end of the process ends them.
 
     Args:
         positions: Where the parts of `spec` were written.
@@ -54,6 +63,7 @@ class System:
         log_levels: Sequence[str] = (),
     ) -> None:
         self._spec = spec
+        self.has_ended = False
         self._begun = time.monotonic()
         self._exit_code: int = ExitCode.DONE
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
@@ -62,7 +72,13 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = Context()
         _init_context(self._context, ros_arguments)
-        self._executor = SystemExecutor(self._context, spec.threads, log=system_logger.error)
+        reserve(self._context, 'the context', 'shutdown', 'try_shutdown', 'destroy')
+        self._executor = SystemExecutor(
+            self._context, spec.threads, log=system_logger.error, lost=self._on_lost
+        )
+        reserve(self._executor, 'the executor', 'shutdown')
+        self._watch = HangWatch(lambda: list(self._nodes.values()), _limits(spec))
+        self._graph_watch = GraphWatch(lambda: list(self._nodes.values()))
         self._supervisor = Supervisor(self._restart, self.request_stop)
         self._services = SystemServices(
             context=self._context,
@@ -113,7 +129,8 @@ class System:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
         Foreign processes come before any `on_start`; what waits for something comes after all
-        that does not, whose behaviours run by then.
+        that does not, whose behaviours run by then. Nodes
+        that have begun hear their `on_stop` if a later one cannot.
 
         Raises:
             StartError: One of them failed; all has been torn down again.
@@ -125,16 +142,14 @@ class System:
                 self._executor.add_node(node.ros)
             self._publish_health()
             self._executor.start()
+            self._watch.start()
+            self._graph_watch.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
             prompt = self._start_all()
         except BaseException:
-            if any(node.gate.is_open for node in self._nodes.values()):
-                # They have not waited for the others.
-                stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
-            self._processes.stop()
-            self._tear_down()
+            self.stop()
             raise
         if self.stop_requested:
             return
@@ -165,8 +180,11 @@ class System:
             self._exit_code = ExitCode.FAILED
         if not ended and self._exit_code == ExitCode.DONE:
             self._exit_code = ExitCode.FAILED
+        for node in self._nodes.values():
+            node.errors.flush()
         if ended:
             self._tear_down()
+        self.has_ended = ended
         return self._exit_code, ended
 
     def _start_all(self) -> list[LiveNode]:
@@ -201,7 +219,7 @@ class System:
         try:
             node = create_live_node(spec, self._services)
         except Exception as error:
-            message = f"node '{spec.name}' cannot be created: {error}"
+            message = f"node '{spec.key}' cannot be created: {error}"
             raise StartError(message) from error
         self._nodes[spec.full_name] = node
         create_entities(node)
@@ -222,7 +240,9 @@ class System:
         while not done.wait(_POLL_SEC) and not self.stop_requested:
             pass
         if failures:
-            message = f"node '{node.spec.name}': on_start raised {failures[0]!r}"
+            # What has not begun has nothing to stop.
+            node.has_begun = False
+            message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]
         node.gate.serves = not self.stop_requested
         self._executor.wake()
@@ -231,21 +251,26 @@ class System:
         for node in nodes:
             node.gate.open()
             for timer in node.timers:
-                timer.reset()
+                with suppress(InvalidHandle):
+                    # `on_start` may have destroyed it.
+                    timer.reset()
         self._executor.wake()
 
     def _restart(self, full_name: str) -> None:
         """Rebuild a node: its entities, parameters and state are as at the start again."""
         with self._rebuilding:
             old = self._nodes[full_name]
-            name = old.spec.name
+            name = old.spec.key
             if self.stop_requested:
                 return
-            old.gate.close()
-            if not old.ledger.wait_until_idle(self._spec.shutdown_timeout_sec):
-                system_logger.error(f"node '{name}' is not restarted: one of its behaviours hangs")
-                old.gate.open()
+            timeout_sec = self._spec.shutdown_timeout_sec
+            has_ended = stop_node(old, timeout_sec, lambda: self.stop_requested)
+            if self.stop_requested:
+                return
+            if not has_ended:
                 self._executor.wake()
+                hanging = ', '.join(call.owner for call in old.ledger.running())
+                system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
                 return
             self._executor.remove_node(old.ros)
             old.destroy()
@@ -269,7 +294,7 @@ class System:
         board, period_sec = self._services.health, self._spec.diagnostics_period_sec
         if board is None or period_sec is None:
             return
-        publisher = HealthPublisher(self._spec.name, period_sec, board, self._running_calls)
+        publisher = HealthPublisher(self._spec.name, period_sec, board, self._overdue_calls)
         try:
             publisher.start(self._context, self._services.ros_arguments)
         except ImportError as error:
@@ -277,14 +302,21 @@ class System:
         else:
             self._health_publisher = publisher
 
-    def _running_calls(self) -> list[tuple[str, RunningCall]]:
+    def _overdue_calls(self) -> list[tuple[str, RunningCall]]:
         return [
             (node.full_name, call)
             for node in list(self._nodes.values())
             for call in node.ledger.running()
+            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
 
+    def _on_lost(self) -> None:
+        if not self.stop_requested:
+            system_logger.error('ROS was shut down under the system, which ends now')
+            self.request_stop(ExitCode.FAILED)
+
     def _tear_down(self) -> None:
+        self._graph_watch.stop()
         if self._health_publisher is not None:
             self._health_publisher.stop()
         for node in self._nodes.values():
@@ -293,12 +325,21 @@ class System:
         for node in self._nodes.values():
             node.destroy()
         self._nodes.clear()
+        self._watch.stop()
+        release(self._context)
         self._context.try_shutdown()
         self._context.destroy()
 
 
 _POLL_SEC = 0.05
 _LONGEST_DEAF_SEC = 0.5
+
+
+def _limits(spec: SystemSpec) -> Iterator[float | None]:
+    for node in spec.nodes.values():
+        yield node.warn_after_sec
+        for entities in (node.subscriptions, node.timers, node.services, node.actions):
+            yield from (entity.warn_after_sec for entity in entities.values())
 
 
 def _init_context(context: Context, ros_arguments: Sequence[str]) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 import time
 import traceback
+import warnings
 from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.runtime.executor import ComposerExecutor
+from composer.runtime.ownership import release
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,11 +34,23 @@ class SystemExecutor(ComposerExecutor):
         threads: How many callbacks may run at the same time, without those that wait for others;
             `None` for as many as block.
         log: Takes the text of a fault outside all behaviours; dispatching goes on.
+        lost: Called when no callback can run any more, though nobody has called `stop`.
     """
 
-    def __init__(self, context: Context, threads: int | None, log: Callable[[str], None]) -> None:
-        super().__init__(threads, context=context)
+    def __init__(
+        self,
+        context: Context,
+        threads: int | None,
+        log: Callable[[str], None],
+        lost: Callable[[], None] | None = None,
+    ) -> None:
+        with warnings.catch_warnings():
+            # rclpy advises against one thread here, but means its own executors.
+            warnings.simplefilter('ignore', UserWarning)
+            super().__init__(threads, context=context)
         self._log = log
+        self._lost = lost
+        self._is_stopped = False
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True
         )
@@ -51,6 +65,8 @@ class SystemExecutor(ComposerExecutor):
         Returns:
             Whether all that were running have ended in time.
         """
+        self._is_stopped = True
+        release(self)
         return self.shutdown(timeout_sec)
 
     def report(self, error: BaseException) -> None:
@@ -59,6 +75,11 @@ class SystemExecutor(ComposerExecutor):
             self._log(''.join(traceback.format_exception(error)).rstrip())
 
     def _keep_spinning(self) -> None:
+        self._spin_on()
+        if self._lost is not None and not self._is_stopped:
+            self._lost()
+
+    def _spin_on(self) -> None:
         while not self._is_shutdown and self.context.ok():
             try:
                 self.spin()

@@ -33,9 +33,12 @@ def create_timers(node: LiveNode) -> None:
             owner,
             spec.path,
             ticker.function,
-            on_error=spec.on_error,
+            rules=spec,
             publish=spec.publish,
+            admits=node.gate.lets_events,
         )
+        if ticker.is_generator:
+            node.at_stop.append(ticker)
         ticker.timer = node.ros.create_timer(
             spec.period_sec,
             call.as_callback(ticker.kind),
@@ -53,9 +56,14 @@ def _create_clock(name: ClockName) -> Clock | None:
 
 
 class _Ticker:
-    """What a timer does at each tick, as one function without arguments."""
+    """What a timer does at each tick, as one function without arguments.
+
+    Attributes:
+        is_generator: Whether it waits half-way between two ticks.
+    """
 
     timer: Timer
+    is_generator = False
 
     def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
         self.kind = FunctionKind.PLAIN
@@ -67,18 +75,39 @@ class _Ticker:
         behaviour = node.function(spec.behaviour)
         self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
         kind = kind_of(behaviour)
+        self._node, self._spec = node, spec
+        self._generator: Generator[Any, Any, Any] | None = None
+        self._async_generator: AsyncGenerator[Any, Any] | None = None
+        self.is_generator = kind in (FunctionKind.GENERATOR, FunctionKind.ASYNC_GENERATOR)
         # Ticks of a reentrant group overlap, which a generator cannot: it lets such a tick pass.
         self._turn = threading.Lock()
         if kind is FunctionKind.GENERATOR:
-            self._generator: Generator[Any, Any, Any] | None = None
             self.function = self._resume
         elif kind is FunctionKind.ASYNC_GENERATOR:
-            self._async_generator: AsyncGenerator[Any, Any] | None = None
             self.kind = FunctionKind.COROUTINE
             self.function = self._resume_async
         else:
             self.kind = kind
             self.function = self._begin
+
+    def close(self, timeout_sec: float) -> None:
+        """See `AtStop`: what the generator has in `finally:` runs."""
+        if not self._turn.acquire(timeout=timeout_sec):
+            # It is not waiting but hanging, and is reported for that.
+            return
+        owner, path = f"timer '{self._spec.name}'", self._spec.path
+        generator, self._generator = self._generator, None
+        if generator is not None:
+            self._node.last_call(owner, path, generator.close).run()
+        async_generator, self._async_generator = self._async_generator, None
+        if async_generator is not None:
+            done = threading.Event()
+            call = self._node.last_call(owner, path, async_generator.aclose)
+            task = self._node.services.executor.create_task(
+                call.as_callback(FunctionKind.COROUTINE)
+            )
+            task.add_done_callback(lambda _task: done.set())
+            done.wait(timeout_sec)
 
     def _resume(self) -> Any:
         if not self._turn.acquire(blocking=False):

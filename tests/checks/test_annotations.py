@@ -173,7 +173,7 @@ def test_types_of_one_name_are_the_same_if_they_have_the_same_fields(check, tmp_
 def test_an_action_is_annotated_with_its_parts(check):
     nodes = """
   a:
-    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
+    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do, accept: parts:take}}
     action_clients: {do: {type: test_msgs/action/Fibonacci, feedback: parts:feel, result: parts:end}}
     on_start: parts:send
 """
@@ -184,11 +184,12 @@ def test_an_action_is_annotated_with_its_parts(check):
         def do(node, goal: Fibonacci.{}) -> Generator[{}, None, {}]:
             yield
 
+        def take(node, goal: Fibonacci.{}): ...
         def feel(node, feedback: Fibonacci.{}): ...
         def end(node, result: Fibonacci.Result): ...
         def send(node): node.send_goal('do')
     """
-    right = code.format('Goal', 'list[int]', 'Fibonacci.Result', 'Feedback')
+    right = code.format('Goal', 'list[int]', 'Fibonacci.Result', 'Goal', 'Feedback')
     assert check(nodes, right) == []
-    wrong = code.format('Result', 'Fibonacci.Goal', 'str', 'Result')
-    assert len(check(nodes, wrong, rule='wrong-annotation')) == 4
+    wrong = code.format('Result', 'Fibonacci.Goal', 'str', 'Feedback', 'Result')
+    assert len(check(nodes, wrong, rule='wrong-annotation')) == 5

@@ -23,6 +23,9 @@ CODE = """
     async def ask_later(node):
         await node.call_async('set_it')
 
+    def forget(node):
+        ask_later(node)
+
     def ask_beside(node):
         threading.Thread(target=lambda: node.call('set_it')).start()
 
@@ -56,6 +59,7 @@ def test_a_timer_that_waits_for_its_own_group_never_gets_an_answer(check, behavi
         '    timers: {tick: {period: 1, behaviour: parts:ask, group: reentrant}}\n',
         '    timers: {tick: {period: 1, behaviour: parts:ask, group: other}}\n',
         '    timers: {tick: {period: 1, behaviour: parts:ask_beside}}\n',
+        '    timers: {tick: {period: 1, behaviour: parts:forget}}\n',
         '    timers: {tick: {period: 1, behaviour: parts:ask_if, with: {asks: false}}}\n',
         '    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}\n',
     ],
@@ -69,6 +73,9 @@ def test_a_service_in_a_group_of_its_own_answers(check):
     for group in ('reentrant', 'other'):
         nodes = ALONE.replace('parts:set_it', f'parts:set_it, group: {group}') + timer
         assert deadlocks(check, nodes) == []
+    both = ALONE.replace('parts:set_it', 'parts:set_it, group: reentrant')
+    both += timer.replace('parts:ask', 'parts:ask, group: reentrant')
+    assert deadlocks(check, both) == []
     same = timer.replace('parts:ask', 'parts:ask, group: other')
     assert deadlocks(check, nodes.replace(timer, same)) == [6]
 

@@ -42,6 +42,12 @@ def test_a_behaviour_that_copes_without_is_right(check, line):
     assert check(NODE, run(USES_ALL, line)) == []
 
 
+def test_a_parameter_may_be_declared_with_rclpy(check):
+    lines = ["node.ros.declare_parameter('mode', 0)", 'print(node.parameters.mode)']
+    assert check(NODE, run(USES_ALL, *lines)) == []
+    assert check(NODE, run(USES_ALL, lines[1])) == [(6, 'unknown-parameter')]
+
+
 def test_what_an_argument_decides_is_left_to_it(check):
     nodes = NODE.replace('parts:run', '{behaviour: parts:run, with: {kind: out}}')
     code = run(
@@ -57,7 +63,8 @@ def test_helpers_are_followed_through_modules(check, tmp_path):
 
 
 def test_a_helper_that_calls_itself_ends(check):
-    code = 'def tell(node): tell(node)\n' + run('tell(node)')
+    lines = ["node.publish('out', 1)", *['tell(node)'] * 40]
+    code = run(*lines, head='def tell(node):') + run('tell(node)')
     assert check(NODE, code) == []
 
 

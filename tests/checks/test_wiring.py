@@ -82,11 +82,13 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
     timers:
       a: {period: 1, publish: out, message: {}}
       b: {period: 1, behaviour: parts:ask}
-  b: {}
+  b: {parameters: {speed: 1}}
 """
     assert check(nodes, CODE, installed=False) == []
     elsewhere = nodes.replace('/b/get', '/c/get')
     assert check(elsewhere, CODE, installed=False) == [(11, 'no-server')]
+    without = nodes.replace('speed: 1}', 'speed: 1}, parameter_services: false')
+    assert check(without, CODE, installed=False) == [(11, 'no-server')]
 
 
 def test_the_other_end_may_be_external(check):
@@ -120,6 +122,8 @@ def test_a_name_that_the_command_line_decides_meets_anything(check):
 def test_a_name_with_a_fault_meets_anything(check):
     nodes = meeting('', '').replace('topic: heard', 'topic: 3')
     assert [rule for _, rule in check(nodes, CODE)] == ['wrong-type']
+    nodes = meeting('', '').replace('publishers: {', 'publishers: 3 # {')
+    assert 'no-publisher' not in [rule for _, rule in check(nodes, CODE)]
     nodes = meeting('', '').replace('publishers:', 'senders:')
     assert 'no-publisher' not in [rule for _, rule in check(nodes, CODE)]
 
@@ -171,6 +175,29 @@ def test_qos_that_is_not_known_is_compatible(check):
         assert 'incompatible-qos' not in [rule for _, rule in check(text, CODE)]
     text = nodes.replace('topic: chatter', 'topic: chatter, qos: {reliability: "{{ how }}"}')
     assert check(text, CODE, before='args: {how: {type: string}}\n') == []
+
+
+def test_qos_that_the_command_line_decides_is_compatible(check):
+    nodes = meeting('', 'remap: {heard: chatter}')
+    nodes = nodes.replace('topic: chatter', 'topic: chatter, qos: {deadline: "{{ limit }}"}')
+    nodes = nodes.replace('topic: heard', 'topic: heard, qos: {deadline: 0.001}')
+    assert check(nodes, CODE, before='args: {limit: {type: double}}\n') == []
+
+
+@pytest.mark.parametrize(
+    ('served', 'used'), [('reliable', 'best_effort'), ('best_effort', 'reliable')]
+)
+def test_requests_have_to_reach_the_server_and_responses_the_client(check, served, used):
+    nodes = f"""
+  a:
+    services:
+      ask: {{type: std_srvs/srv/Empty, qos: {{reliability: {served}}}, behaviour: parts:serve}}
+  b:
+    service_clients: {{ask: {{type: std_srvs/srv/Empty, qos: {{reliability: {used}}}}}}}
+    on_start: parts:ask
+"""
+    assert check(nodes, CODE) == [(7, 'incompatible-qos')]
+    assert check(nodes.replace(served, used), CODE) == []
 
 
 LOOP = """

@@ -56,6 +56,7 @@ def test_an_empty_node_has_the_defaults():
     assert node.log_level is None
     assert node.use_sim_time is False
     assert node.on_error == 'log'
+    assert node.warn_after_sec == 5.0
     assert node.remap == ()
     assert node.on_start is node.on_stop is node.on_parameters is None
     for entries in (
@@ -158,6 +159,25 @@ def test_entities_inherit_how_errors_are_met():
     )
     assert [timer.on_error for timer in node.timers.values()] == ['restart', 'log']
     assert [sub.on_error for sub in node.subscriptions.values()] == ['restart', 'shutdown']
+
+
+def test_entities_inherit_how_long_they_may_run():
+    def entities(key, entry):
+        return f' {key}: {{a: {{{entry}}}, b: {{{entry}, warn_after: 0.5}}, c: {{{entry}, warn_after: null}}}},'
+
+    node = load_node(
+        '{warn_after: 2,'
+        + entities('timers', 'period: 1, behaviour: m:f')
+        + entities('subscriptions', 'type: p/msg/T, behaviour: m:f')
+        + entities('services', 'type: p/srv/T, behaviour: m:f')
+        + entities('actions', 'type: p/action/T, behaviour: m:f')
+        + '}',
+        'defaults: {warn_after: null}',
+    )
+    assert node.warn_after_sec == 2.0
+    for kind in (node.timers, node.subscriptions, node.services, node.actions):
+        assert [entity.warn_after_sec for entity in kind.values()] == [2.0, 0.5, None]
+    assert load_node('{}', 'defaults: {warn_after: null}').warn_after_sec is None
 
 
 def test_a_publisher_may_be_its_type_alone():

@@ -170,7 +170,7 @@ def test_aliases_in_aliases_do_not_explode(innermost, merged):
         value = f'{{<<: [{aliases}]}}' if merged else f'[{aliases}]'
         lines.append(f'x{level}: &x{level} {value}')
     line = first_line('\n'.join(lines))
-    assert line.endswith(': error[alias-bomb]: aliases expand to more than 1,000,000 values')
+    assert line.endswith(': error[alias-bomb]: aliases expand to more than 300,000 values')
     assert int(line.split(':')[1]) in range(3, 6)
 
 
@@ -506,3 +506,15 @@ def test_any_value_in_any_place_never_raises(value):
     for path in random.Random(repr(value)).sample(places, 12):
         text = json.dumps(replaced(data, path, value)).replace('NaN', '.nan')
         check(text)
+
+
+def test_a_second_merge_key_is_a_duplicate():
+    text = 'x-a: &a {k: 1}\nx-b: &b {l: 2}\nx-c: {<<: *a, m: 3, <<: *b}'
+    (finding,) = parse(text).diagnostics
+    assert (finding.rule, finding.span.line, finding.span.column) == ('duplicate-key', 3, 21)
+    assert finding.help == 'merge several with <<: [*one, *two]'
+
+
+def test_a_file_of_very_many_values_is_not_read():
+    text = f'a: [{"1," * 300_001}]'
+    assert first_line(text).endswith('the file holds more than 300,000 keys and values')

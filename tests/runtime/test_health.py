@@ -99,7 +99,18 @@ def test_a_report_tells_the_period_and_the_whole():
     assert (second.times.calls(), second.errors, second.last_error) == (1, 0, '')
     assert (second.all_calls, second.all_errors) == (2, 1)
     assert (second.missed, second.all_missed) == (Missed(), missed)
-    assert (second.period_sec, second.running_sec) == (2.0, 7.0)
+    assert (second.period_sec, second.overdue_sec) == (2.0, 7.0)
+
+
+def test_an_error_that_cannot_be_shown_counts_too():
+    class MuteError(Exception):
+        def __str__(self):
+            raise ValueError
+
+    health = EntityHealth()
+    health.note_error(MuteError())
+    report = health.report(1.0, 0.0)
+    assert (report.errors, report.last_error) == (1, 'MuteError')
 
 
 def test_counts_survive_that_the_node_is_built_anew():
@@ -123,8 +134,8 @@ def test_the_board_knows_the_oldest_call_of_each_entity():
         board.entity('/a', owner)
     running = [('/a', RunningCall("timer 'b'", begun_ns, 1)) for begun_ns in (9, 4, 6)]
     reports = board.reports(1.0, [(node, call) for node, call in running], 4 + 2 * 10**9)
-    assert reports['/a', "timer 'b'"].running_sec == 2.0
-    assert reports['/a', "timer 'c'"].running_sec == 0.0
+    assert reports['/a', "timer 'b'"].overdue_sec == 2.0
+    assert reports['/a', "timer 'c'"].overdue_sec == 0.0
 
 
 def measured_call(function, times, failed=lambda owner, error: None):
@@ -164,14 +175,14 @@ def test_every_system_has_a_node_with_a_valid_name(system):
     assert node_name('fleet.of-two rovers') == '_composer_fleet_of_two_rovers'
 
 
-def status_of(owner, durations=(), errors=(), missed=None, running_sec=0.0):
+def status_of(owner, durations=(), errors=(), missed=None, overdue_sec=0.0):
     health = EntityHealth()
     health.follow(lambda: missed or Missed())
     for duration in durations:
         health.times.add(duration)
     for error in errors:
         health.note_error(error)
-    return StatusWriter('/ns/talker', owner, 'robot').write(health.report(2.0, running_sec))
+    return StatusWriter('/ns/talker', owner, 'robot').write(health.report(2.0, overdue_sec))
 
 
 def test_a_status_is_named_as_diagnostic_tools_expect_it():
@@ -217,11 +228,10 @@ def test_only_subscriptions_have_overruns_and_services_neither():
         ),
         (
             "service 'a'",
-            {'running_sec': 12.34},
+            {'overdue_sec': 12.34},
             DiagnosticStatus.WARN,
             'a call has been running for 12.3 s',
         ),
-        ("action 'a'", {'running_sec': 12.34}, DiagnosticStatus.OK, 'not called'),
         (
             "timer 'a'",
             {'errors': [KeyError('x'), ValueError('boom')], 'missed': Missed(late_ticks=2)},

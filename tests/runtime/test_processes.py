@@ -432,10 +432,6 @@ def test_restart_is_for_the_ends_that_it_names(compose, when, end, runs):
             {'command': ['./empty.bin']},
             "cannot be started: './empty.bin': Exec format error",
         ),
-        (
-            {'command': ['true'], 'parameter_files': ['missing.yaml']},
-            "there is no parameter file 'missing.yaml'",
-        ),
         ({'command': ['echo', 'a\0b']}, "'a\\x00b' has a null character in it"),
     ],
 )

@@ -238,7 +238,7 @@ def test_on_error_restart_rebuilds_the_node_as_at_the_start(compose, peer, wait_
     assert child.stop() == 0
 
     assert set(child.matching('start: ')) == {'[INFO] [phoenix]: start: calm, 0 ticks, []'}
-    assert child.matching(']: stop') == ['[INFO] [phoenix]: stop']
+    assert len(child.matching(']: stop')) == len(child.matching('start: '))
     assert not child.matching('InvalidHandle')
     assert len(child.matching('Traceback')) == len(child.matching('raised RuntimeError'))
 

@@ -16,7 +16,8 @@ A datum's way: the middleware adds to an eventfd (`rcl`, `signals`) → the lead
 (`engine`) → the source is queued in its group (`schedule`) → claimed, taken and run by the leader
 itself (`execution`, `sources`), while a standby watches over the leader (`crew`). Deadlines of
 timers are in `alarms`, suspended coroutines in `tasks`, what rcl does not announce in `lane`, and
-`registry` compares the nodes' lists of entities with what is listened to.
+`registry` compares the nodes' lists of entities with what is listened to. `switching` says how
+long a computing callback may hold up the others.
 
 Locks are held for moments and nothing is called under them but the next in this order: `registry`,
 `lane`, `crew`, `schedule`, `alarms`, `signals`. A callback, a take and a wait run under none.

@@ -50,6 +50,8 @@ class ClockWatch:
 class Alarms:
     """All deadlines of one executor."""
 
+    rank = 0
+
     def __init__(self, wake: Any) -> None:
         self.timer = TimerFd(blocking=False)
         self.jumped: deque[ClockWatch] = deque()

@@ -30,6 +30,7 @@ class ComposerExecutor(MultiThreadedExecutor):
     - `shutdown` waits for running callbacks, as rclpy documents; but not for the one it is called
       from, and without `timeout_sec` not for long once the context has been shut down.
     - Several threads may spin at the same time.
+    - While one does, the process's `sys.getswitchinterval()` is at most 1 ms: see `switching`.
 
     Args:
         num_threads: How many callbacks may run at the same time; None for as many as block.
@@ -37,8 +38,8 @@ class ComposerExecutor(MultiThreadedExecutor):
     """
 
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
-        # The pool of the base class is not used, and of one thread it warns.
-        super().__init__(2, context=context)
+        super().__init__(num_threads, context=context)  # Whose pool is never used.
+        self.is_inherited = False
         self._engine = Engine(self, num_threads or _MOST_THREADS, self._guard, self._sigint_gc)
         _executors.add(self)
 
@@ -171,6 +172,14 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._engine.stop(COURTESY_SEC)
         self._engine.lane.close()
 
+    def leave_to_parent(self) -> None:
+        """Be shut down, and nothing of it destroyed: this process was forked."""
+        self.is_inherited = self._is_shutdown = True
+        _of_parent.append((self._engine, dict(vars(self._engine.registry)), self._sigint_gc))
+        self._guard = self._sigint_gc = None
+        self._nodes = set()
+        self._engine.leave_to_parent()
+
     def __del__(self) -> None:
         """Do what rclpy does, though `__init__` may have failed half-way."""
         with suppress(AttributeError, InvalidHandle, ValueError):
@@ -204,4 +213,13 @@ def _halt_all() -> None:
         executor.halt()
 
 
-os.register_at_fork(after_in_child=_executors.clear)
+_of_parent: list[Any] = []
+
+
+def _leave_to_parent() -> None:
+    for executor in tuple(_executors):
+        executor.leave_to_parent()
+    _executors.clear()
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)

@@ -3,19 +3,24 @@
 The leader waits for events and runs the callbacks itself, so that a short callback costs no
 thread switch. A standby sleeps on a kernel timer that the leader sets before a callback; if the
 leader is still in that callback when it wakes, the standby leads, and another thread stands by.
+As long as callbacks are short the leader puts the timer off, for each waking takes the interpreter
+from it.
 A callback that was slow last time makes the standby lead at once. Spare threads end by themselves.
 """
 
 import _thread
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from composer.runtime.executor.forks import end_child
 from composer.runtime.executor.rcl import TimerFd
 
 PATIENCE_SEC = 0.001
+_PATIENCE_NS = int(PATIENCE_SEC * 1e9)
 _SPARE_SEC = 2.0
 _POLL_SEC = 0.0005
 
@@ -36,6 +41,8 @@ class Worker:
         with self._crew.enlisted(self):
             while self.job is not None:
                 self.job(self)
+                if self._crew.is_inherited:
+                    end_child()
                 self.job = None
                 self._crew.rest(self)
 
@@ -46,12 +53,15 @@ class Crew:
     def __init__(self, lead: Callable[[Worker], None]) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
+        self.is_inherited = False
         self._standby: Worker | None = None
         self._lead = lead
         self._timer = TimerFd(blocking=True)
         self._armed = False
+        self._put_off_at = 0.0
         self._spares: list[Worker] = []
         self._workers: dict[int, Worker] = {}
+        self._hired = 0  # With those whose threads are yet to begin.
         self._dismissed = False
         self._handover: threading.Lock | None = None
 
@@ -65,7 +75,9 @@ class Crew:
         finally:
             # Python 3.11 keeps what it knows of such a thread for ever.
             threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
-            del self._workers[ident]
+            with self.lock:
+                del self._workers[ident]
+                self._hired -= 1
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
@@ -83,6 +95,8 @@ class Crew:
     def muster(self) -> None:
         """See that there are a leader and a standby."""
         with self.lock:
+            if self._dismissed:
+                return
             if self.leader is None:
                 self.leader = self._call(self._lead)
             self._appoint_standby()
@@ -108,10 +122,11 @@ class Crew:
 
     def begin(self, worker: Worker) -> None:
         """Note that `worker` begins a callback."""
-        worker.busy_since = time.monotonic()
-        if not self._armed:
+        worker.busy_since = now = time.monotonic()
+        if not self._armed or now > self._put_off_at:
             self._armed = True
-            self._timer.after_ns(int(PATIENCE_SEC * 1e9))
+            self._put_off_at = now + PATIENCE_SEC / 2
+            self._timer.after_ns(_PATIENCE_NS)
 
     def end_watch(self, worker: Worker) -> None:
         """Let the standby sleep: `worker` leads and will wait, and others want the interpreter."""
@@ -143,15 +158,26 @@ class Crew:
             self._spares.clear()
             self._wake_standby()
         deadline = time.monotonic() + timeout_sec
-        mine = threading.get_ident()
-        while self._workers.keys() - {mine} and time.monotonic() < deadline:
+        mine = int(threading.get_ident() in self._workers)
+        while self._hired > mine and time.monotonic() < deadline:
             time.sleep(_POLL_SEC)
-        if not self._workers:
-            self._timer.close()
+        with self.lock:
+            if not self._hired:
+                self._timer.close()
+
+    def leave_to_parent(self) -> None:
+        """Be without threads, but for one whose callback forked this process."""
+        self.is_inherited = True
+        self.leader = self._standby = None
+        self._spares.clear()
+        mine = threading.get_ident()
+        self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
+        self._hired = len(self._workers)
+        self._timer.leave_to_parent()
 
     def is_manned(self) -> bool:
         """Tell whether any thread is left."""
-        return bool(self._workers)
+        return bool(self._hired)
 
     def rest(self, worker: Worker) -> None:
         """Wait for the next job; return without one to end the thread."""
@@ -173,7 +199,9 @@ class Crew:
             worker.job = job
             worker.called.release()
             return worker
-        return Worker(self, job)
+        worker = Worker(self, job)
+        self._hired += 1
+        return worker
 
     def _appoint_standby(self) -> None:
         if self._standby is None:
@@ -182,6 +210,7 @@ class Crew:
     def _wake_standby(self) -> None:
         if self._standby is not None:
             self._armed = True
+            self._put_off_at = math.inf
             self._timer.after_ns(1)
 
     def _stand_by(self, me: Worker) -> None:

@@ -1,4 +1,4 @@
-"""The parts of one executor together, and the leader's loop."""
+"""The parts of one executor together, and what spinning is."""
 
 import threading
 import time
@@ -10,15 +10,17 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.runtime.executor.alarms import Alarms, Delay
 from composer.runtime.executor.crew import PATIENCE_SEC, Crew, Worker
 from composer.runtime.executor.execution import Execution
+from composer.runtime.executor.forks import end_child, free_locks
 from composer.runtime.executor.lane import Lane
+from composer.runtime.executor.leader import Leader
 from composer.runtime.executor.news import News
+from composer.runtime.executor.polling import Polling
 from composer.runtime.executor.registry import Registry
 from composer.runtime.executor.schedule import Schedule
-from composer.runtime.executor.signals import SignalBoard
 from composer.runtime.executor.sources import Desk
+from composer.runtime.executor.switching import prompt_switching
 
 COURTESY_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
@@ -35,30 +37,31 @@ class Engine:
     """
 
     def __init__(self, executor: Any, most_at_once: int, guard: Any, sigint_guard: Any) -> None:
-        self.schedule = Schedule(most_at_once, self.wake_poll)
-        self.alarms = Alarms(self.wake_poll)
+        self.polling = Polling()
+        self.schedule = Schedule(most_at_once, self.polling.wake)
+        self.alarms = self.polling.alarms
         self.execution = Execution(executor, self.schedule, self.alarms)
         self.news = News()
         self.executor = executor
         self.is_shutdown = False
-        self._board = SignalBoard()
-        self._board.add(self.alarms.timer.fd, self.alarms)
-        desk = Desk(executor, self.schedule, self._board, self.alarms)
+        desk = Desk(executor, self.schedule, self.polling.board, self.alarms)
         self.lane = Lane(desk, guard, sigint_guard, self)
         desk.look_again = self.lane.look_again
+        desk.peek = self.polling.peek
         self.registry = Registry(desk, self.lane)
-        self.crew = Crew(self._lead)
-        self._pollers: set[int] = set()
+        self.crew = Crew(Leader(self).lead)
         self._sessions = 0
+        self._loners = 0
         self._session_lock = threading.Lock()
         self._settling = 0
         self._errors: deque[BaseException] = deque()
-        self._put_off: Delay | None = None
 
     # Errors and news
 
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins, unless it tells of a lost context."""
+        if self.crew.is_inherited:
+            end_child(error)
         if isinstance(error, _rclpy.RCLError) and not self.context_is_valid():
             return
         self._errors.append(error)
@@ -71,13 +74,8 @@ class Engine:
 
     def wake(self) -> None:
         """Have the leader and all who wait look again."""
-        self.wake_poll()
+        self.polling.wake()
         self.news.tell()
-
-    def wake_poll(self) -> None:
-        """Have the leader look again."""
-        if self._pollers:
-            self._board.wake()
 
     def is_alive(self) -> bool:
         """Tell whether there is anything to spin for."""
@@ -113,15 +111,22 @@ class Engine:
             timeout_sec = None
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         self.lane.enter()
+        with self._session_lock:
+            self._loners += 1
         try:
-            self._look_at_everything()
+            if self.is_alive():
+                self._look_at_everything()
             while self.is_alive() and not condition() and not self._run_one():
                 left = None if deadline is None else deadline - time.monotonic()
                 if left is not None and left <= 0:
                     break
                 self._await_work(left)
         finally:
+            with self._session_lock:
+                self._loners -= 1
             self.lane.leave()
+            if self.is_shutdown:
+                self.news.tell()
         self.raise_error()
 
     def settle(self, timeout_sec: float | None) -> bool:
@@ -136,13 +141,15 @@ class Engine:
 
     def stop(self, timeout_sec: float | None) -> bool:
         """Begin no more callbacks, ever; returns whether those that ran have ended in time."""
-        self.is_shutdown = True
-        self.schedule.admitting = False
+        with self._session_lock:
+            self.is_shutdown = True
+            self.schedule.close()
         self.wake()
         return self.settle(timeout_sec)
 
     def _enter(self) -> None:
         self.lane.enter()
+        prompt_switching.enter()
         with self._session_lock:
             self._sessions += 1
             self.schedule.admitting = not self.is_shutdown
@@ -155,9 +162,10 @@ class Engine:
             last = not self._sessions
             if last:
                 self.schedule.admitting = False
+        prompt_switching.leave()
         self.lane.leave()
         if last:
-            self.wake_poll()
+            self.polling.wake()
             self.settle(COURTESY_SEC)
 
     def _look_at_everything(self) -> None:
@@ -165,20 +173,19 @@ class Engine:
             self.registry.refresh(self.executor.get_nodes())
         self.lane.flush_for_taking()
         self.execution.resume_paused()
-        self._peek()
+        self.polling.peek()
 
     def _await_work(self, timeout_sec: float | None) -> None:
         if self._sessions:  # Another thread leads, and may take the announcement or the wake-up.
             timeout_sec = COURTESY_SEC if timeout_sec is None else min(timeout_sec, COURTESY_SEC)
-        self._poll_if(self._has_nothing, timeout_sec)
-        self.alarms.follow_jumps()
+        self.polling.wait_if(self._has_nothing, timeout_sec)
         if self.registry.is_stale:
             self.registry.refresh(self.executor.get_nodes())
 
     def _run_one(self) -> bool:
         """Have a worker run one callback, if one is ready, and wait a little for its end."""
         while (work := self.schedule.claim(alone=True)) is not None:
-            attempt = _Attempt(self._execute, work)
+            attempt = _Attempt(self.execute, work)
             self.crew.dispatch(attempt)
             if attempt.has_run(PATIENCE_SEC if getattr(work, 'slow', False) else COURTESY_SEC):
                 return True
@@ -189,97 +196,31 @@ class Engine:
             return self.schedule.executing <= 1
         return not self.schedule.executing and self.crew.leader is None
 
-    # The leader
-
-    def _lead(self, me: Worker) -> None:
-        try:
-            while self.crew.leads(me, self._is_admitting):
-                if self._execute_ready(me) or self.schedule.executing:
-                    if self._peek() or not self._leader_has_nothing():
-                        continue
-                    if self.schedule.executing:
-                        self.crew.end_watch(me)
-                if self.crew.leader is me:
-                    self._poll_if(self._leader_has_nothing, None)
-                    self.alarms.follow_jumps()
-        except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
-            self.schedule.admitting = False
-            self.crew.leads(me, self._is_admitting)
-            self.report(error)
-        self.news.tell()
-
-    def _execute_ready(self, me: Worker) -> bool:
-        """Execute about what is ready now; False if there is no more, or `me` was replaced."""
-        crew, schedule = self.crew, self.schedule
-        for _ in range(max(1, len(schedule))):
-            if self.registry.is_stale:
-                self._refresh()
-            work = schedule.claim()
-            if work is None:
-                return False
-            crew.begin(me)
-            if work.slow:
-                crew.pass_on(me)
-            self._execute(work)
-            work.slow = time.monotonic() - me.busy_since > PATIENCE_SEC
-            me.busy_since = 0.0
-            if crew.leader is not me:
-                return False
-        return True
-
-    def _execute(self, work: Any) -> bool:
+    def execute(self, work: Any) -> bool:
+        """Execute what was claimed; False if there was nothing to take."""
         ran = self.execution.execute(work)
-        if self._pollers and len(self.schedule):
-            self._board.wake()
+        if len(self.schedule):
+            self.polling.wake()
         if self._settling:
             self.news.tell()
         return ran
-
-    def _refresh(self) -> None:
-        rest_sec = self.registry.rest_sec()
-        if not rest_sec:
-            self.registry.refresh(self.executor.get_nodes())
-        elif self._put_off is None:
-            self._put_off = Delay(self.alarms, rest_sec, self._end_rest)
-
-    def _end_rest(self) -> None:
-        self._put_off = None
-
-    def _peek(self) -> bool:
-        arrived = self._board.peek()
-        self._board.deliver(arrived)
-        self.alarms.follow_jumps()
-        return bool(arrived)
-
-    def _poll_if(self, has_nothing: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Wait for events; whoever makes `has_nothing()` false meanwhile calls `wake_poll`."""
-        me = threading.get_ident()
-        self._pollers.add(me)
-        try:
-            arrived = self._board.wait(timeout_sec if has_nothing() else 0)
-        finally:
-            self._pollers.discard(me)
-        self._board.deliver(arrived)
 
     def _has_nothing(self) -> bool:
         schedule = self.schedule
         return not (
             self.registry.is_stale
-            or self.alarms.jumped
+            or self.polling.alarms.jumped
             or (len(schedule) and schedule.can_admit())
         )
 
-    def _leader_has_nothing(self) -> bool:
-        schedule = self.schedule
-        return not (
-            (self.registry.is_stale and self._put_off is None)
-            or self.alarms.jumped
-            or not schedule.admitting
-            or (len(schedule) and schedule.can_admit())
-        )
-
-    def _is_admitting(self) -> bool:
-        return self.schedule.admitting
+    def leave_to_parent(self) -> None:
+        """Be shut down: this process was forked, and all of this is its parent's."""
+        free_locks((self, self.executor, self.schedule, self.alarms, self.polling.board))
+        free_locks((self.news, self.lane, self.registry, self.crew))
+        self.is_shutdown = True
+        self.schedule.leave_to_parent(int(self.crew.is_in_callback()))
+        for part in (self.polling, self.lane, self.registry, self.crew):
+            part.leave_to_parent()
 
     def tear_down(self, nodes: list[Any]) -> None:
         """Let go of the entities of `nodes`, the threads and what they waited for."""
@@ -288,9 +229,10 @@ class Engine:
                 self.registry.drop(node)
         self.lane.close()
         self.crew.dismiss(COURTESY_SEC)
-        if not self.crew.is_manned():
-            self._board.close()
-            self.alarms.timer.close()
+        if not self.crew.is_in_callback():
+            self.news.wait_for(lambda: not self._loners, COURTESY_SEC)
+        if not self._loners and not self.crew.is_manned():
+            self.polling.close()
 
 
 class _Attempt:

@@ -121,8 +121,9 @@ class Lane:
 
     def poke(self) -> None:
         """Look at the sources anew."""
-        with suppress(InvalidHandle):
-            self._guard.trigger()
+        if self._thread is not None:
+            with suppress(InvalidHandle):
+                self._guard.trigger()
 
     def look_soon(self) -> None:
         """Look at all events a few times in the next moments, for entities have come or gone."""
@@ -164,6 +165,11 @@ class Lane:
         self.poke()
         if thread is not None and thread is not threading.current_thread():
             thread.join(_ANSWER_SEC)
+
+    def leave_to_parent(self) -> None:
+        """Be without the thread."""
+        self._closing = True
+        self._thread = None
 
     def _place_of(self, source: PolledSource) -> set[PolledSource]:
         if not isinstance(source.entity, EventHandler):

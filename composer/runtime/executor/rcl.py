@@ -14,7 +14,6 @@ Fast DDS takes the event's lock before the reader's, and delivery takes them the
 
 import ctypes
 import os
-import struct
 import time
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +21,7 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.errors import ComposerError
+from composer.runtime.executor.forks import lay_over
 
 _CLOCK_MONOTONIC = 1
 _TFD_TIMER_ABSTIME = 1
@@ -30,7 +30,7 @@ _RCL_RET_OK = 0
 _rcl = ctypes.CDLL(_rclpy.__file__)
 _rcl_holding_gil = ctypes.PyDLL(_rclpy.__file__)
 _libc = ctypes.CDLL(None, use_errno=True)
-_libc_holding_gil = ctypes.PyDLL(None, use_errno=True)
+_libc_holding_gil = ctypes.PyDLL(None)
 _EVENTFD_WRITE = ctypes.cast(_libc.eventfd_write, ctypes.c_void_p).value
 
 
@@ -72,12 +72,29 @@ _libc_holding_gil.timerfd_settime.argtypes = (
 )
 
 
-_EPOLL_EVENT = '=IQ' if os.uname().machine == 'x86_64' else '=I4xQ'  # Packed only there.
+_EPOLL_GAP = 0 if os.uname().machine == 'x86_64' else 1  # Packed only there.
+
+
+class _EpollEvent(ctypes.Structure):
+    _fields_ = (
+        ('events', ctypes.c_uint32),
+        ('_gap', ctypes.c_int32 * _EPOLL_GAP),
+        ('fd', ctypes.c_int32),
+        ('_rest', ctypes.c_int32),
+    )
+
+
 _MOST_EVENTS = 64
-_EPOLL_BUFFER_SIZE = _MOST_EVENTS * struct.calcsize(_EPOLL_EVENT)
+_EpollEvents = _EpollEvent * _MOST_EVENTS
+_EventCount = ctypes.c_uint64 * 1
+# Made anew only when several threads look at the same time.
+_spare_events: list[Any] = []
+_spare_counts: list[Any] = []
 
 
 _libc_holding_gil.eventfd_write.argtypes = (ctypes.c_int, ctypes.c_uint64)
+_epoll_wait = _libc_holding_gil.epoll_wait
+_eventfd_read = _libc_holding_gil.eventfd_read
 
 
 def write_eventfd(fd: int) -> None:
@@ -88,24 +105,53 @@ def write_eventfd(fd: int) -> None:
 def read_eventfd(fd: int) -> int:
     """Return and reset the count of a non-blocking eventfd, without letting go of the GIL.
 
-    Whoever lets go of it beside a computing thread waits 5 ms to have it back.
+    Whoever lets go of it beside a computing thread waits a switch interval to have it back.
     """
-    count = ctypes.c_uint64()
-    _libc_holding_gil.eventfd_read(fd, ctypes.byref(count))
-    return count.value
+    try:
+        count = _spare_counts.pop()
+    except IndexError:
+        count = _EventCount()
+    value: int = 0 if _eventfd_read(fd, count) else count[0]
+    _spare_counts.append(count)
+    return value
 
 
 def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     """Return what is ready in an epoll as (descriptor, events), without letting go of the GIL."""
-    buffer = ctypes.create_string_buffer(_EPOLL_BUFFER_SIZE)
-    count = _libc_holding_gil.epoll_wait(epoll_fd, buffer, _MOST_EVENTS, 0)
-    if count <= 0:
-        return []
-    size = struct.calcsize(_EPOLL_EVENT)
-    return [
-        (data & 0xFFFFFFFF, events)
-        for events, data in struct.iter_unpack(_EPOLL_EVENT, buffer.raw[: count * size])
-    ]
+    try:
+        found = _spare_events.pop()
+    except IndexError:
+        found = _EpollEvents()
+    count = _epoll_wait(epoll_fd, found, _MOST_EVENTS, 0)
+    arrived = [(found[i].fd, found[i].events) for i in range(count)]
+    _spare_events.append(found)
+    return arrived
+
+
+class _PollFd(ctypes.Structure):
+    _fields_ = (('fd', ctypes.c_int), ('events', ctypes.c_short), ('revents', ctypes.c_short))
+
+
+class _TimeSpec(ctypes.Structure):
+    _fields_ = (('sec', ctypes.c_long), ('nsec', ctypes.c_long))
+
+
+_POLLIN = 1
+_libc.ppoll.argtypes = (
+    ctypes.POINTER(_PollFd),
+    ctypes.c_ulong,
+    ctypes.POINTER(_TimeSpec),
+    ctypes.c_void_p,
+)
+
+
+def wait_readable(fd: int, timeout_sec: float) -> None:
+    """Wait until `fd` is readable, a signal comes, or exactly `timeout_sec` has passed.
+
+    Python's own waits count in whole milliseconds and round up.
+    """
+    timeout = _TimeSpec(*divmod(int(timeout_sec * 1e9), 1_000_000_000))
+    _libc.ppoll(ctypes.byref(_PollFd(fd, _POLLIN, 0)), 1, ctypes.byref(timeout), None)
 
 
 def _watcher(function_name: str) -> Callable[[int, int | None], None]:
@@ -161,11 +207,22 @@ class TimerFd:
     """A kernel timer on the monotonic clock that makes a file descriptor readable."""
 
     def __init__(self, *, blocking: bool) -> None:
-        flags = os.O_CLOEXEC if blocking else os.O_CLOEXEC | os.O_NONBLOCK
         self._blocking = blocking
-        self.fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
-        if self.fd < 0:
+        self.fd = self._create()
+
+    def _create(self) -> int:
+        flags = os.O_CLOEXEC if self._blocking else os.O_CLOEXEC | os.O_NONBLOCK
+        fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
+        if fd < 0:
             raise OSError(ctypes.get_errno(), 'timerfd_create failed')
+        return fd
+
+    def leave_to_parent(self) -> None:
+        """Be a timer that the parent of this process has not."""
+        if self.fd >= 0:
+            fresh = self._create()
+            lay_over((self.fd,), fresh)
+            os.close(fresh)
 
     def set_ns(self, deadline_ns: int) -> None:
         """Expire once at `deadline_ns` of `time.monotonic_ns()`; at once if that has passed."""
@@ -190,9 +247,9 @@ class TimerFd:
 
     def close(self) -> None:
         """Give back the descriptor; nothing else is called after that."""
-        if self.fd >= 0:
-            os.close(self.fd)
-            self.fd = -1
+        fd, self.fd = self.fd, -1
+        if fd >= 0:
+            os.close(fd)
 
     def __del__(self) -> None:
         self.close()

@@ -73,6 +73,10 @@ class Registry:
         entities = self._nodes.get(node)
         return None if entities is None else entities.sources.get(entity)
 
+    def leave_to_parent(self) -> None:
+        """Have no sources; the parent listens to the entities."""
+        self._nodes = {}
+
     def drop(self, node: Any) -> None:
         """Listen no more to the entities of `node`."""
         with self._lock:

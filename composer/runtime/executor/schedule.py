@@ -55,6 +55,7 @@ class Schedule:
         self.executing = 0
         self.waiting = 0
         self.admitting = False
+        self.is_closed = False
         self._most_at_once = most_at_once
         self._wake = wake
         self._ready: deque[Source] = deque()
@@ -68,6 +69,10 @@ class Schedule:
 
     def __len__(self) -> int:
         return len(self._ready) + len(self._runs) + len(self._new_runs)
+
+    def count_runs(self) -> int:
+        """Return how many tasks could run now."""
+        return len(self._runs) + len(self._new_runs)
 
     def can_admit(self) -> bool:
         """Tell whether one more callback may run."""
@@ -85,8 +90,8 @@ class Schedule:
         """Add `count` to what `source` has to take."""
         with self.lock:
             source.stamp += 1
-            pending = source.pending + count
-            source.pending = min(UNKNOWN, pending)
+            if source.pending < UNKNOWN:
+                source.pending += count
             if source.alive and not source.queued:
                 source.queued = True
                 self._ready.append(source)
@@ -127,9 +132,11 @@ class Schedule:
         With `alone`, also while nobody spins: for the one callback of `spin_once`.
         """
         with self.lock:
-            if not (alone or self.admitting) or not self.can_admit():
+            if self.is_closed or not (alone or self.admitting) or not self.can_admit():
                 return None
-            if self._prefer_runs:
+            if not (self._runs or self._new_runs):
+                work: Any = self._next_source()
+            elif self._prefer_runs:
                 work = self._next_run() or self._next_source()
             else:
                 work = self._next_source() or self._next_run()
@@ -137,12 +144,25 @@ class Schedule:
                 self.executing += 1
             return work
 
+    def close(self) -> None:
+        """Let nothing be claimed any more."""
+        with self.lock:
+            self.is_closed = True
+            self.admitting = False
+
     def finish(self, source: Source | None, *, suspended: bool = False) -> None:
         """Note that what was claimed has run; `source` frees its group unless it is suspended."""
         with self.lock:
             self.executing -= 1
             if source is not None and not suspended:
                 self._release(source)
+
+    def leave_to_parent(self, executing: int) -> None:
+        """Begin nothing; of all callbacks under way, only `executing` are in this process."""
+        self.is_closed = True
+        self.admitting = False
+        self.executing = executing
+        self.waiting = 0
 
     def refuse(self, source: Source) -> None:
         """Undo a claim of `source`, whose group would not have it; `retry` brings it back."""

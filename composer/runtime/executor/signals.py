@@ -12,13 +12,21 @@ import select
 import threading
 from typing import Protocol
 
-from composer.runtime.executor.rcl import peek_epoll, read_eventfd, write_eventfd
+from composer.runtime.executor.forks import lay_over
+from composer.runtime.executor.rcl import (
+    peek_epoll,
+    read_eventfd,
+    wait_readable,
+    write_eventfd,
+)
 
 _MOST_EVENTS = 512
 
 
 class Listener(Protocol):
-    """What wants to hear of an announcement."""
+    """What wants to hear of an announcement; of several at a time, the least `rank` first."""
+
+    rank: int
 
     def on_signal(self, count: int) -> None:
         """Take note of `count` announcements; the count may be too high, never too low."""
@@ -63,8 +71,9 @@ _descriptors = _Descriptors()
 class Signal:
     """One eventfd and who listens to it."""
 
-    def __init__(self, fd: int) -> None:
+    def __init__(self, fd: int, rank: int) -> None:
         self.fd = fd
+        self.rank = rank
         self.listeners: list[Listener] = []
 
     def on_signal(self) -> None:
@@ -102,7 +111,7 @@ class SignalBoard:
         with self._lock:
             if shared is None:
                 try:
-                    shared = Signal(_descriptors.get())
+                    shared = Signal(_descriptors.get(), listener.rank)
                 except OSError:
                     if not self._signals:
                         raise
@@ -132,6 +141,9 @@ class SignalBoard:
 
     def wait(self, timeout_sec: float | None) -> list[tuple[int, int]]:
         """Wait for signals, for ever if `timeout_sec` is None; `deliver` is to follow."""
+        if timeout_sec:
+            wait_readable(self._epoll.fileno(), timeout_sec)
+            timeout_sec = 0
         return self._epoll.poll(timeout_sec, _MOST_EVENTS)
 
     def peek(self) -> list[tuple[int, int]]:
@@ -140,14 +152,32 @@ class SignalBoard:
 
     def deliver(self, arrived: list[tuple[int, int]]) -> None:
         """Tell the listeners of the signals that `wait` returned."""
+        if len(arrived) > 1:
+            arrived.sort(key=self._rank)
         for fd, _ in arrived:
             signal = self._signals.get(fd)
             if signal is not None:
                 signal.on_signal()
             elif fd == self._wake_fd:
                 read_eventfd(self._wake_fd)
-            else:
+            elif fd in self._others:  # Or it was detached since it came.
                 self._others[fd].on_signal(1)
+
+    def _rank(self, event: tuple[int, int]) -> int:
+        signal = self._signals.get(event[0])
+        return 0 if signal is None else signal.rank
+
+    def leave_to_parent(self) -> None:
+        """Have descriptors that the parent of this process has not; they say nothing."""
+        if self._epoll.closed:
+            return
+        eventfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        lay_over((self._wake_fd, *self._signals), eventfd)
+        os.close(eventfd)
+        with select.epoll() as epoll:
+            lay_over((self._epoll.fileno(),), epoll.fileno())
+        self._signals.clear()
+        self._others.clear()
 
     def close(self) -> None:
         """Give back every descriptor; nothing else is called after that."""

@@ -14,6 +14,7 @@ from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
 from composer.runtime.executor import rcl
+from composer.runtime.executor.forks import end_child
 from composer.runtime.executor.missed import Missed
 from composer.runtime.executor.schedule import Group, Schedule
 from composer.runtime.executor.signals import UNKNOWN
@@ -41,6 +42,11 @@ class Desk:
         self.board = board
         self.alarms = alarms
         self.look_again: Callable[[Source], None] = _look_at_nothing
+        self.peek: Callable[[], bool] = bool
+
+    def has_more(self) -> bool:
+        """Look for signals; returns whether there were any, or there are tasks to run."""
+        return self.peek() or bool(self.schedule.count_runs())
 
 
 def _look_at_nothing(_: 'Source') -> None:
@@ -48,8 +54,13 @@ def _look_at_nothing(_: 'Source') -> None:
 
 
 class Source:
-    """An entity in an executor; subclasses know its kind."""
+    """An entity in an executor; subclasses know its kind.
 
+    rclpy executes what is ready at the same time by its kind: timers, subscriptions, guard
+    conditions, clients, services, waitables. That is what `rank` is for.
+    """
+
+    rank = 0
     __slots__ = (
         '__weakref__',
         '_asynchronous',
@@ -132,6 +143,7 @@ class SubscriptionSource(Source):
     under way in another thread, as reentrant groups have them, is not held for a loss.
     """
 
+    rank = 1
     __slots__ = ('_announced', '_overruns', '_taken')
 
     def open(self, shared: 'Signal | None' = None) -> None:
@@ -185,16 +197,22 @@ class SubscriptionSource(Source):
             result = callback(taken[0])
         else:
             result = callback(*taken)
-        return result if self._is_async(callback) else None
+        return result if result is not None and self._is_async(callback) else None
 
 
 class ClientSource(Source):
-    """A service client."""
+    """A service client.
 
-    __slots__ = ()
+    Somebody who spins until the response is there stops then. So it lets go first what came
+    with it or before it, once: rclpy executes tasks and messages before responses.
+    """
+
+    rank = 2
+    __slots__ = ('_gave_way',)
 
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
+        self._gave_way = False
         self._watch(rcl.watch_client, shared)
 
     def close(self) -> None:
@@ -203,6 +221,10 @@ class ClientSource(Source):
 
     def run(self) -> Any:
         """See the base class."""
+        self._gave_way = not self._gave_way and self.desk.has_more()
+        if self._gave_way:
+            self.desk.schedule.announce(self, 1)
+            return NOTHING
         stamp = self.stamp
         try:
             handle = self.entity.handle
@@ -225,6 +247,7 @@ class ClientSource(Source):
 class ServiceSource(Source):
     """A service."""
 
+    rank = 3
     __slots__ = ()
 
     def open(self, shared: 'Signal | None' = None) -> None:
@@ -250,6 +273,8 @@ class ServiceSource(Source):
             return NOTHING
         callback = service.callback
         response = callback(request, service.srv_type.Response())
+        if self.desk.executor.is_inherited:
+            end_child()
         if self._is_async(callback):
             return self._respond(response, header)
         service.send_response(response, header)

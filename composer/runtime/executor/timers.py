@@ -88,7 +88,7 @@ class TimerSource(Source):
             return NOTHING
         callback = timer.callback
         result = callback()
-        return result if self._is_async(callback) else None
+        return result if result is not None and self._is_async(callback) else None
 
     def missed(self) -> Missed:
         """See the base class."""

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
@@ -47,6 +47,7 @@ class ActionSource(Source):
     Any of its parts announcing something leads to a look with a wait set of its own.
     """
 
+    rank = 4
     __slots__ = ('_looking', '_parts', '_timers', '_wait_set', '_watched_clock')
 
     def held(self) -> Any:
@@ -108,7 +109,15 @@ class ActionSource(Source):
                 timer.rearm()
             self.desk.schedule.drained(self, stamp)
             return NOTHING
-        return execute_waitable(self.entity, data, self.desk.executor)
+        return self._execute(data)
+
+    async def _execute(self, data: Any) -> None:
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(self.held())  # rclpy uses it after the user's callbacks.
+            except InvalidHandle:
+                return
+            await execute_waitable(self.entity, data, self.desk.executor)
 
 
 class PolledSource(Source):
@@ -154,7 +163,7 @@ class GuardConditionSource(PolledSource):
         self._forget_event()
         callback = self.entity.callback
         result = callback()
-        return result if self._is_async(callback) else None
+        return result if result is not None and self._is_async(callback) else None
 
 
 class WaitableSource(PolledSource):

@@ -1,0 +1,67 @@
+"""The behaviours of the systems that are measured."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from std_msgs.msg import Empty, Int64
+
+    from composer import Node
+
+
+def ignore(_node: Node, _message: Empty) -> None:
+    """Do nothing."""
+
+
+def hit_back(node: Node, message: Empty) -> None:
+    """Send the ball back."""
+    node.publish('pong', message)
+
+
+def return_ball(node: Node, message: Empty) -> None:
+    """Count a round trip and begin the next."""
+    node.state.count += 1
+    node.publish('ping', message)
+
+
+def count_round_trips(node: Node, seconds: float) -> Iterator[None]:
+    """Throw in one ball, let the players warm up, count for `seconds`, and stop the system."""
+    node.publish('ping', {})
+    yield
+    while not node.state.count:
+        yield
+    begin, before = time.monotonic(), node.state.count
+    while time.monotonic() - begin < seconds:
+        yield
+    rate = (node.state.count - before) / (time.monotonic() - begin)
+    print(json.dumps({'rate': rate}), flush=True)
+    node.shutdown()
+
+
+def emit(node: Node, seconds: float, per_sec: int) -> Iterator[None]:
+    """Send numbers, as many as are due at each tick; at the end, how many there were."""
+    begin = time.monotonic()
+    sent = 0
+    while (elapsed := time.monotonic() - begin) < seconds:
+        for _ in range(int(elapsed * per_sec) - sent):
+            sent += 1
+            node.publish('numbers', sent)
+        yield
+    while True:
+        node.publish('numbers', -sent)
+        yield
+
+
+def count(node: Node, message: Int64) -> None:
+    """Count the numbers, and say at the end how many did not come."""
+    if message.data > 0:
+        node.state.got += 1
+        return
+    sent = -message.data
+    print(json.dumps({'sent': sent, 'lost': sent - node.state.got}), flush=True)
+    node.shutdown()

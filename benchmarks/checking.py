@@ -1,0 +1,129 @@
+"""What it costs to check files, each in a process of its own, as people and CI run it.
+
+python -m benchmarks.checking
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+_REPEATS = 5
+
+_NODE = """\
+  node_{number}:
+    parameters: {{name: {{default: robot_{number}, description: who it is}}}}
+    publishers:
+      text_{number}: std_msgs/msg/String
+      pace_{number}: {{type: geometry_msgs/msg/Twist, topic: /pace, qos: 5, external: true}}
+    subscriptions:
+      heard:
+        type: std_msgs/msg/String
+        topic: text_{following}
+        behaviour: behaviours.greeter:reply
+        qos: {{depth: 5, reliability: reliable}}
+    timers:
+      tick: {{period: 1.0, behaviour: behaviours.greeter:say_name, publish: text_{number}}}
+      move:
+        rate: 10
+        publish: pace_{number}
+        message: {{linear: {{x: 1.0}}, angular: {{z: 0.1}}}}
+"""
+
+Figures = dict[str, float]
+
+
+def write_system(path: Path, nodes: int) -> Path:
+    """Write a system of nodes with five entities each, every one of them right."""
+    entries = [_NODE.format(number=each, following=(each + 1) % nodes) for each in range(nodes)]
+    path.write_text('version: 1\nnodes:\n' + ''.join(entries), encoding='utf-8')
+    return path
+
+
+def run_check(paths: list[Path]) -> tuple[float, float, float]:
+    """Return what a whole `composer check` takes: seconds, processor seconds and megabytes."""
+    script = 'import sys; from composer.cli import main; sys.exit(main())'
+    # Started anew, so that no other process counts as its memory.
+    watched = (
+        'import resource, subprocess, sys, time\n'
+        'begun = time.perf_counter()\n'
+        f'code = subprocess.call([sys.executable, "-c", {script!r}, "check", *sys.argv[1:]],'
+        ' stdout=subprocess.DEVNULL)\n'
+        'print(time.perf_counter() - begun)\n'
+        'used = resource.getrusage(resource.RUSAGE_CHILDREN)\n'
+        'print(used.ru_utime + used.ru_stime, used.ru_maxrss)\n'
+        'sys.exit(code)\n'
+    )
+    environment = os.environ | {'PYTHONPATH': str(ROOT)}
+    done = subprocess.run(  # noqa: S603 - Composer itself
+        [sys.executable, '-c', watched, *map(str, paths)],
+        cwd=ROOT,
+        env=environment,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    seconds, cpu_seconds, kilobytes = done.stdout.split()
+    return float(seconds), float(cpu_seconds), int(kilobytes) * 1024 / 1e6
+
+
+def measure_files(paths: list[Path], repeats: int = _REPEATS) -> Figures:
+    """Return the least time and the most memory of some runs over the same files."""
+    runs = [run_check(paths) for _ in range(repeats)]
+    seconds, cpu_seconds, megabytes = zip(*runs, strict=True)
+    return {
+        'seconds': min(seconds),
+        'cpu_seconds': min(cpu_seconds),
+        'megabytes': max(megabytes),
+    }
+
+
+def small_file() -> Figures:
+    """One small file."""
+    return measure_files([ROOT / 'configs' / 'greeter.yaml'])
+
+
+def hundred_files() -> Figures:
+    """A hundred files of ten nodes."""
+    with tempfile.TemporaryDirectory(dir=ROOT) as folder:
+        paths = [write_system(Path(folder) / f'{number}.yaml', 10) for number in range(100)]
+        return measure_files(paths)
+
+
+def large_file(nodes: int = 1000) -> Figures:
+    """One file of a thousand nodes with five thousand entities."""
+    with tempfile.TemporaryDirectory(dir=ROOT) as folder:
+        return measure_files([write_system(Path(folder) / 'large.yaml', nodes)])
+
+
+def twice_as_large() -> Figures:
+    """How many times the time and the memory a file takes that is twice as large."""
+    once, twice = large_file(), large_file(2000)
+    return {
+        **twice,
+        'times_the_seconds': twice['seconds'] / once['seconds'],
+        'times_the_cpu_seconds': twice['cpu_seconds'] / once['cpu_seconds'],
+        'times_the_megabytes': twice['megabytes'] / once['megabytes'],
+    }
+
+
+MEASUREMENTS: dict[str, Callable[[], Figures]] = {
+    'check_small_file': small_file,
+    'check_hundred_files': hundred_files,
+    'check_large_file': large_file,
+    'check_twice_as_large': twice_as_large,
+}
+
+
+def measure_all() -> dict[str, Any]:
+    """Return the figures of all measurements."""
+    return {name: measure() for name, measure in MEASUREMENTS.items()}
+
+
+if __name__ == '__main__':
+    print(json.dumps(measure_all(), indent=2))

@@ -1,0 +1,184 @@
+"""What is promised: a row for each figure, with its target. To promise more, add rows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One process's measurement; see `benchmarks.measure`."""
+
+    subject: str
+    side: str
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """A figure of a job, by its name."""
+
+    job: Job
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A promise.
+
+    Attributes:
+        other: What ours is held against, measured in turn with it.
+        figure: Makes of ours and the other what the target is for.
+        sense: How the figure relates to the target where the promise is kept.
+    """
+
+    what: str
+    ours: Side
+    other: Side | None
+    figure: Callable[[float, float], float]
+    sense: Literal['>=', '<=']
+    target: float
+
+    @property
+    def jobs(self) -> list[Job]:
+        """What must be measured for it, ours first."""
+        return [self.ours.job] + ([self.other.job] if self.other else [])
+
+
+def times(ours: float, other: float) -> float:
+    """Return how many times as much ours is."""
+    return ours / other if other else float('inf')
+
+
+def times_less(ours: float, other: float) -> float:
+    """Return how many times as much the other is."""
+    return times(other, ours)
+
+
+def more(ours: float, other: float) -> float:
+    """Return how much more ours is."""
+    return ours - other
+
+
+def alone(ours: float, _other: float) -> float:
+    """Return ours, whatever the other is."""
+    return ours
+
+
+def _side(subject: str, side: str, size: int, key: str) -> Side:
+    return Side(Job(subject, side, size), key)
+
+
+def _round_trips() -> list[Row]:
+    def rate(executor: str, idle: int) -> Side:
+        return _side('round_trips', executor, idle, 'rate')
+
+    def row(executor: str, name: str, idle: int, target: float) -> Row:
+        what = f'round trips/s, {idle} idle nodes, against {name}'
+        return Row(what, rate('composer', idle), rate(executor, idle), times, '>=', target)
+
+    rows = []
+    for idle in (0, 10, 50, 200):
+        rows += [
+            row('multi', 'MultiThreadedExecutor', idle, 300 if idle == 200 else 3),
+            row('single', 'SingleThreadedExecutor', idle, 3),
+            row('events', 'EventsExecutor', idle, 0.5),
+        ]
+    beside, without = rate('composer', 200), rate('composer', 0)
+    what = 'round trips/s, 200 idle nodes against 0'
+    return [*rows, Row(what, beside, without, times, '>=', 0.9)]
+
+
+def _overhead() -> list[Row]:
+    ours = _side('overhead', 'composer', 0, 'composed_us')
+    by_hand = _side('overhead', 'composer', 0, 'plain_us')
+    return [Row('us a message, more than by hand', ours, by_hand, more, '<=', 5)]
+
+
+def _forty() -> list[Row]:
+    def side(name: str, key: str) -> Side:
+        return _side('forty', name, 40, key)
+
+    def row(what: str, key: str, target: float) -> Row:
+        ours, other = side('composer', key), side('processes', key)
+        return Row(what, ours, other, times_less, '>=', target)
+
+    return [
+        row('40 nodes, s until all are up, against 40 processes', 'start_sec', 15),
+        row('40 nodes, MB (PSS), against 40 processes', 'memory_mb', 10),
+    ]
+
+
+def _further_node() -> list[Row]:
+    def row(kind: str, what: str, key: str, target: float) -> Row:
+        ours = _side('further_node', f'composer-{kind}', 100, key)
+        other = _side('further_node', f'rclpy-{kind}', 100, key)
+        return Row(what, ours, other, alone, '<=', target)
+
+    return [
+        row('plain', 'MB a further node', 'memory_mb', 0.3),
+        row('plain', 'ms a further node', 'start_ms', 3),
+        row('parameters', 'MB a further node with parameters', 'memory_mb', 1.3),
+        row('parameters', 'ms a further node with parameters', 'start_ms', 6),
+    ]
+
+
+def _thousand() -> list[Row]:
+    def side(name: str, size: int, key: str) -> Side:
+        return _side('thousand', name, size, key)
+
+    def row(what: str, key: str, target: float) -> Row:
+        return Row(
+            f'1,000 nodes in one file, {what}, against bare rclpy',
+            side('composer', 1000, key),
+            side('rclpy', 1000, key),
+            times,
+            '<=',
+            target,
+        )
+
+    beside, without = side('composer', 1000, 'rate'), side('composer', 0, 'rate')
+    return [
+        row('s until all are up', 'start_sec', 1.5),
+        row('MB (PSS)', 'memory_mb', 1.3),
+        Row(
+            'round trips/s in a file of 1,000 idle nodes against 0',
+            beside,
+            without,
+            times,
+            '>=',
+            0.85,
+        ),
+    ]
+
+
+def _at_rest_and_under_load() -> list[Row]:
+    def jitter(what: str, key: str, target: float) -> Row:
+        ours, threads = (_side('jitter', name, 0, key) for name in ('composer', 'threads'))
+        return Row(f'100 Hz timer beside full load, {what}', ours, threads, alone, '<=', target)
+
+    idle, bare = (_side('idle_cpu', name, 200, 'percent') for name in ('composer', 'rclpy'))
+    return [
+        Row('200 idle nodes, % of a core', idle, bare, alone, '<=', 2),
+        jitter('p99 ms (other: bare threads)', 'p99_ms', 6),
+        jitter('ticks lost (other: bare threads)', 'lost', 0),
+    ]
+
+
+def _soak() -> list[Row]:
+    def row(what: str, key: str, target: float) -> Row:
+        ours = _side('soak', 'composer', 1000, key)
+        return Row(f'soak at 1,000 messages/s, {what}', ours, None, alone, '<=', target)
+
+    return [row('MB grown after warm-up', 'grown_mb', 2), row('messages lost', 'lost', 0)]
+
+
+ROWS: list[Row] = [
+    *_round_trips(),
+    *_overhead(),
+    *_forty(),
+    *_further_node(),
+    *_thousand(),
+    *_at_rest_and_under_load(),
+    *_soak(),
+]

@@ -1,0 +1,85 @@
+"""Systems for `composer up` to run, as text."""
+
+from typing import Any
+
+import yaml
+
+_TYPE = 'std_msgs/msg/Empty'
+
+
+def render_system(nodes: dict[str, Any]) -> str:
+    """Return a file that declares `nodes`."""
+    return yaml.safe_dump({'version': 1, 'nodes': nodes}, sort_keys=False)
+
+
+def idle_nodes(count: int, *, parameters: bool = False) -> dict[str, Any]:
+    """Return nodes that do nothing, each with a publisher and a subscription of its own."""
+    return {f'idle_{number}': _idle_node(number, parameters) for number in range(count)}
+
+
+def _idle_node(number: int, parameters: bool) -> dict[str, Any]:  # noqa: FBT001
+    topic = f'idle_topic_{number}'
+    node = {
+        'publishers': {'out': {'type': _TYPE, 'topic': topic}},
+        'subscriptions': {
+            'in': {
+                'type': _TYPE,
+                'topic': topic,
+                'behaviour': 'benchmarks.behaviours:ignore',
+            }
+        },
+    }
+    return {'parameters': {'speed': 1.0}, **node} if parameters else node
+
+
+def rally(seconds: float) -> dict[str, Any]:
+    """Return two nodes that play ping-pong, print how many round trips a second, and stop."""
+    return {
+        'first': {
+            'state': {'count': 0},
+            'publishers': {'ping': _TYPE},
+            'subscriptions': {
+                'pong': {'type': _TYPE, 'behaviour': 'benchmarks.behaviours:return_ball'}
+            },
+            'timers': {
+                'referee': {
+                    'period': 0.2,
+                    'behaviour': 'benchmarks.behaviours:count_round_trips',
+                    'with': {'seconds': seconds},
+                }
+            },
+        },
+        'second': {
+            'publishers': {'pong': _TYPE},
+            'subscriptions': {
+                'ping': {'type': _TYPE, 'behaviour': 'benchmarks.behaviours:hit_back'}
+            },
+        },
+    }
+
+
+def stream(seconds: float, rate: int) -> dict[str, Any]:
+    """Return two nodes: `rate` messages a second from one to the other, which prints the count."""
+    numbers = 'std_msgs/msg/Int64'
+    return {
+        'source': {
+            'publishers': {'numbers': {'type': numbers, 'qos': rate}},
+            'timers': {
+                'emit': {
+                    'rate': rate,
+                    'behaviour': 'benchmarks.behaviours:emit',
+                    'with': {'seconds': seconds, 'per_sec': rate},
+                }
+            },
+        },
+        'sink': {
+            'state': {'got': 0},
+            'subscriptions': {
+                'numbers': {
+                    'type': numbers,
+                    'qos': rate,
+                    'behaviour': 'benchmarks.behaviours:count',
+                }
+            },
+        },
+    }

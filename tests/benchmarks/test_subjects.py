@@ -1,0 +1,34 @@
+"""Every side of every subject can be measured, here at a tiny size."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from benchmarks.processes import MeasurementError, run_job
+from benchmarks.rows import ROWS, Job
+
+pytestmark = pytest.mark.ros
+
+TINY = {'forty': 2, 'further_node': 1, 'thousand': 2, 'idle_cpu': 2, 'round_trips': 1, 'soak': 100}
+
+
+def sides():
+    """Return each side of each subject once, with the names of the figures that rows want."""
+    wanted = {}
+    for row in ROWS:
+        for side in [row.ours, *([row.other] if row.other else [])]:
+            wanted.setdefault((side.job.subject, side.job.side), set()).add(side.key)
+    return wanted
+
+
+@pytest.mark.parametrize(
+    ('subject', 'side', 'keys'), [(*job, keys) for job, keys in sides().items()]
+)
+def test_a_side_is_measured(subject, side, keys):
+    figures = run_job(Job(subject, side, TINY.get(subject, 0)), 0.3)
+    assert keys <= figures.keys()
+
+
+def test_a_measurement_that_cannot_be_says_why():
+    with pytest.raises(MeasurementError, match="KeyError: 'no such executor'"):
+        run_job(Job('round_trips', 'no such executor', 0), 0.1)

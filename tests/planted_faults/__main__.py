@@ -1,0 +1,40 @@
+"""python -m tests.planted_faults --systems 2000 --seed 1"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from tests.planted_faults.measurement import measure
+
+
+def main():
+    """Plant faults in systems and print what share of them is found."""
+    parser = argparse.ArgumentParser(prog='python -m tests.planted_faults')
+    parser.add_argument('--systems', type=int, default=2000)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--faults', type=int, default=4, help='the most faults of one file')
+    parser.add_argument('--show', type=int, default=10, help='how many missed ones are shown')
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        score = measure(Path(folder), arguments.seed, arguments.systems, arguments.faults)
+    for kind, planted in sorted(score.planted.items()):
+        found = f'{score.found[kind]}/{planted} found, {score.in_line[kind]} in line'
+        suggested = f'{score.suggested[kind]}/{score.to_suggest[kind]} suggested'
+        print(f'{kind:20} {found}, {suggested}')
+    for title in ('false_alarms', 'extra', 'missed'):
+        cases = getattr(score, title)
+        print(f'{title}: {len(cases)}')
+        for case in cases[: arguments.show]:
+            print('  ', ' | '.join(map(_shown, case)))
+    for what, share in score.shares().items():
+        print(f'{what}: {share:.2%}')
+
+
+def _shown(part):
+    if hasattr(part, 'rule'):
+        return f'{part.span} {part.rule}: {part.message} ({part.help})'
+    return str(part)
+
+
+if __name__ == '__main__':
+    main()

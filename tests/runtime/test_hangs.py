@@ -1,0 +1,287 @@
+"""Behaviours that run for long: what is said about them, and who is affected."""
+
+import re
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from std_srvs.srv import Trigger
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import threading
+import time
+from pathlib import Path
+
+from rclpy.task import Future
+
+def wait_for(name):
+    while not Path(name).exists():
+        time.sleep(0.01)
+
+def hang(node, *_):
+    wait_for('over')
+
+def hang_inside(node):
+    yield
+    wait_for('over')
+
+async def pause():
+    future = Future()
+    threading.Thread(target=lambda: (wait_for('over'), future.set_result(None))).start()
+    await future
+
+async def hang_async(node, *_):
+    await pause()
+
+async def block_async(node, *_):
+    await block()
+
+async def block():
+    wait_for('over')
+
+async def hang_async_generator(node):
+    yield
+    await pause()
+
+def live(node):
+    node.logger.info('alive')
+
+def call(node):
+    node.call('absent', timeout=1.0)
+
+def count(node, goal):
+    for number in range(goal.order):
+        time.sleep(0.12)
+        yield [number]
+    node.logger.info('counted')
+    return [1]
+
+def count_slowly(node, goal):
+    yield [0]
+    wait_for('over')
+    yield [1]
+    node.logger.info('counted')
+    return [1]
+"""
+
+REPORT = re.compile(
+    r'\[WARN\] \[bad\]: (.+) \(system.yaml:(\d+)\) has been running for (.+) s; it is at'
+)
+
+
+def stack_after(child, line):
+    begin = child.lines.index(line) + 1
+    end = next(
+        (
+            index
+            for index, text in enumerate(child.lines[begin:], begin)
+            if text.startswith('[') or not text.startswith(' ')
+        ),
+        len(child.lines),
+    )
+    return '\n'.join(child.lines[begin:end])
+
+
+@pytest.mark.parametrize(
+    ('behaviour', 'functions'),
+    [
+        ('hang', ['hang', 'wait_for']),
+        ('hang_inside', ['hang_inside', 'wait_for']),
+        ('hang_async', ['hang_async', 'pause']),
+        ('block_async', ['block_async', 'block', 'wait_for']),
+        ('hang_async_generator', ['hang_async_generator', 'pause']),
+    ],
+)
+def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends(
+    compose, behaviour, functions
+):
+    text = f"""
+        version: 1
+        nodes:
+          bad:
+            timers: {{stuck: {{period: 0.02, behaviour: 'parts:{behaviour}', warn_after: 0.2}}}}
+          good:
+            timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}
+    """
+    child = compose(text, CODE)
+    line = child.wait_for_line('has been running for')
+    found = REPORT.fullmatch(line)
+    assert found, line
+    assert found.groups()[:2] == ("timer 'stuck'", '5')
+    assert float(found[3]) >= 0.2
+    alive = len(child.matching('alive'))
+    child.wait_for_line('alive', times=alive + 20)
+    (compose.folder / 'over').touch()
+    end = child.wait_for_line(' returned after ')
+    assert re.fullmatch(
+        r"\[WARN\] \[bad\]: timer 'stuck' \(system.yaml:5\) returned after \d+\.\d s", end
+    )
+    child.stop()
+
+    stack = [text for text in stack_after(child, line).splitlines() if text.startswith('  File')]
+    assert [text.rpartition(' in ')[2] for text in stack if 'parts.py' in text] == functions
+    assert 'composer/' not in stack[0]
+    assert len(child.matching('has been running for')) == 1
+
+
+@pytest.mark.parametrize(
+    ('own', 'node', 'defaults', 'is_reported'),
+    [
+        ('null', '0.1', '0.1', False),
+        ('0.1', 'null', 'null', True),
+        (None, '0.1', 'null', True),
+        (None, 'null', '0.1', False),
+        (None, None, '0.1', True),
+    ],
+)
+def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
+    compose, own, node, defaults, is_reported
+):
+    def key(value):
+        return '' if value is None else f', warn_after: {value}'
+
+    text = f"""
+        version: 1
+        defaults: {{log_level: info{key(defaults)}}}
+        nodes:
+          bad:
+            timers: {{stuck: {{period: 0.02, behaviour: 'parts:hang'{key(own)}}}}}
+            description: a node
+            {key(node).removeprefix(', ')}
+          witness:
+            warn_after: 0.3
+            timers: {{stuck: {{period: 0.02, behaviour: 'parts:hang'}}}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('[witness]: timer')
+    (compose.folder / 'over').touch()
+    child.wait_for_line('[witness]: timer', times=2)
+    assert child.stop() == 0
+
+    assert bool(child.matching("[bad]: timer 'stuck' (system.yaml:6) has been")) is is_reported
+
+
+def test_what_is_slow_again_and_again_is_not_told_each_time(compose):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            warn_after: 0.05
+            timers: {slow: {period: 0.01, behaviour: 'parts:slow'}}
+    """
+    code = """
+        import time
+
+        def slow(node):
+            time.sleep(0.2)
+            node.logger.info('done')
+    """
+    child = compose(text, code)
+    child.wait_for_line('done', times=8)
+    assert child.stop() == 0
+
+    assert len(child.matching('has been running for')) == 1
+    assert len(child.matching('returned after')) == 1
+
+
+def test_a_wait_for_a_service_counts_like_any_other_time(compose):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            service_clients: {absent: std_srvs/srv/Trigger}
+            timers: {ask: {period: 0.02, behaviour: 'parts:call', warn_after: 0.1}}
+    """
+    child = compose(text, CODE)
+    line = child.wait_for_line('has been running for')
+    child.wait_for_line("[bad]: timer 'ask' (system.yaml:6) returned after")
+
+    assert 'in call' in stack_after(child, line)
+
+
+@pytest.mark.parametrize('behaviour', ['hang', 'hang_async'])
+def test_a_service_that_hangs_is_reported(compose, peer, behaviour):
+    text = f"""
+        version: 1
+        nodes:
+          bad:
+            services:
+              ask: {{type: std_srvs/srv/Trigger, behaviour: 'parts:{behaviour}', warn_after: 0.1}}
+    """
+    child = compose(text, CODE)
+    child.wait_until_ready()
+    client = peer.node.create_client(Trigger, 'ask')
+    assert client.wait_for_service(30)
+    client.call_async(Trigger.Request())
+    line = child.wait_for_line("[bad]: service 'ask' (system.yaml:6) has been running for")
+    (compose.folder / 'over').touch()
+    child.wait_for_line("[bad]: service 'ask' (system.yaml:6) returned after")
+
+    assert f'in {behaviour}' in stack_after(child, line)
+
+
+HOOKS = """
+version: 1
+nodes:
+  bad:
+    warn_after: 0.1
+    {hook}: parts:hang
+"""
+
+
+@pytest.mark.parametrize('hook', ['on_start', 'on_stop'])
+def test_hooks_of_a_node_that_hang_are_reported(compose, hook):
+    child = compose(HOOKS.format(hook=hook), CODE)
+    if hook == 'on_stop':
+        child.wait_until_ready()
+        child.send(2)
+    child.wait_for_line(f'[bad]: {hook} (system.yaml:6) has been running for')
+    (compose.folder / 'over').touch()
+    child.wait_for_line(f'[bad]: {hook} (system.yaml:6) returned after')
+
+
+ACTION = """
+version: 1
+nodes:
+  bad:
+    actions:
+      count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{behaviour}', warn_after: 0.4}}
+  client:
+    action_clients: {{count: test_msgs/action/Fibonacci}}
+    timers: {{go: {{period: 0.02, behaviour: 'parts:go'}}}}
+"""
+
+ACTION_CODE = (
+    CODE
+    + """
+def go(node):
+    yield
+    node.send_goal('count', {'order': 8}, timeout=30)
+    yield
+    return None
+"""
+)
+
+
+def test_an_action_that_yields_feedback_is_not_reported(compose):
+    pytest.importorskip('test_msgs')
+    child = compose(ACTION.format(behaviour='count'), ACTION_CODE)
+    child.wait_for_line('counted')
+    assert child.stop() == 0
+
+    assert not child.matching('has been running for')
+
+
+def test_an_action_that_yields_no_more_is_reported_until_it_does(compose):
+    pytest.importorskip('test_msgs')
+    child = compose(ACTION.format(behaviour='count_slowly'), ACTION_CODE)
+    line = child.wait_for_line("[bad]: action 'count' (system.yaml:6) has been running for")
+    (compose.folder / 'over').touch()
+    child.wait_for_line('counted')
+    child.wait_for_line("[bad]: action 'count' (system.yaml:6) ")
+    child.stop()
+
+    assert 'in count_slowly' in stack_after(child, line)
