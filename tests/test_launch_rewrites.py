@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import Peer, allocate_domain
+from tests.running import Peer, allocate_domain
 
 pytestmark = pytest.mark.ros
 
