@@ -90,10 +90,9 @@ def folder(tmp_path, monkeypatch):
 def write(folder, files):
     """Write an example with what the page leaves out; return the system's path and arguments."""
     for name, text in files.items():
-        if 'ros__parameters' not in text:
-            nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
-            text = f'version: 1\n{text}{nodes}'
-        (folder / name).write_text(text)
+        is_whole = 'ros__parameters' in text
+        nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
+        (folder / name).write_text(text if is_whole else f'version: 1\n{text}{nodes}')
     first = next(iter(files))
     words = re.search(r'^# arguments: (.*)$', files[first], re.MULTILINE)
     return folder / first, words[1].split() if words else []

@@ -9,6 +9,7 @@ import itertools
 import os
 import queue
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -170,8 +171,7 @@ class Processes:
     def _launch(self, process: LiveProcess) -> _Run | None:
         """Ask for a process; return its run, `None` after the stop."""
         spec = process.spec
-        # Python keeps what it prints to itself otherwise, until that is much.
-        environment = {'PYTHONUNBUFFERED': '1', **os.environ, **spec.env}
+        environment = {**_surroundings(), **spec.env}
         with self._lock:
             if self._stopping.is_set():
                 return None
@@ -340,3 +340,14 @@ def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
     else:
         reason = f"'{program}': {os.strerror(answer['errno'])}"
     return StartError(f"process '{spec.name}' cannot be started: {reason}")
+
+
+def _surroundings() -> dict[str, str]:
+    """Return the environment of all processes, as it is where Composer's own is activated."""
+    # Python keeps what it prints to itself otherwise, until that is much.
+    environment = {'PYTHONUNBUFFERED': '1', **os.environ}
+    if sys.prefix != sys.base_prefix:
+        # The `python3` of a virtual environment has what Composer has, rclpy for one.
+        own = str(Path(sys.executable).parent)
+        environment['PATH'] = f'{own}{os.pathsep}{environment.get("PATH", os.defpath)}'
+    return environment

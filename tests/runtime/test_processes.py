@@ -467,6 +467,14 @@ def test_a_process_runs_in_its_folder_with_its_environment(compose):
     ]
 
 
+def test_python_is_that_of_composer_where_that_has_an_environment_of_its_own(compose):
+    command = ['python3', '-c', 'import sys; print(sys.prefix)']
+    child = compose(system({'driver': {'command': command}}))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == [f'[driver] {sys.prefix}']
+
+
 def test_a_process_has_no_descriptors_of_composer_and_nothing_to_read(compose):
     code = (
         'import os, sys; print(sorted(os.listdir("/proc/self/fd"))[:-1], repr(sys.stdin.read()))'
