@@ -53,11 +53,18 @@ class Program:
             return line
 
     def memory_mb(self) -> float:
-        """Return its memory (PSS: shared pages count in part)."""
+        """Return its memory (PSS: of shared pages a part, as many as share them)."""
+        return self._rollup_mb('Pss:')
+
+    def resident_mb(self) -> float:
+        """Return its memory with all shared pages, whoever else uses them."""
+        return self._rollup_mb('Rss:')
+
+    def _rollup_mb(self, field: str) -> float:
         for line in Path(f'/proc/{self._process.pid}/smaps_rollup').read_text().splitlines():
-            if line.startswith('Pss:'):
+            if line.startswith(field):
                 return int(line.split()[1]) / 1000
-        message = 'smaps_rollup has no Pss'
+        message = f'smaps_rollup has no {field}'
         raise RuntimeError(message)
 
     def cpu_sec(self) -> float:

@@ -93,8 +93,10 @@ class ThreadWaits:
             timeout_sec: `None` for no end.
 
         Raises:
-            SystemStoppingError: A stop was requested meanwhile.
+            SystemStoppingError: A stop was requested meanwhile; or before, and the wait would
+                have no end.
         """
+        self.refuse_endless(future, timeout_sec)
         woken = threading.Event()
 
         def wake(_future: Future | None = None) -> None:
@@ -139,6 +141,15 @@ class ThreadWaits:
             raise stopping_error()
         return False
 
+    def refuse_endless(self, future: Future, timeout_sec: float | None) -> None:
+        """Begin no wait without an end when the system stops already.
+
+        Raises:
+            SystemStoppingError: It does, and `on_stop` has not been called yet.
+        """
+        if timeout_sec is None and self.gives_up() and not future.done():
+            raise stopping_error()
+
     def gives_up(self) -> bool:
         """Return whether nobody is to be waited for who is not there."""
         return self.stop.is_set and not self._is_patient
@@ -157,6 +168,7 @@ class CoroutineWaits:
 
     async def until_done(self, future: Future, timeout_sec: float | None) -> bool:
         """See `ThreadWaits.until_done`."""
+        self._threads.refuse_endless(future, timeout_sec)
         first: Future = Future()
 
         def wake(_future: Future | None = None) -> None:
