@@ -260,6 +260,14 @@ def _kill_all(find: Callable[[], set[int]]) -> None:
         time.sleep(_POLL_SEC / 4)
 
 
+def _remove(folder: str) -> None:
+    """Remove a folder of files; Composer may have done so itself."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            os.unlink(entry)  # noqa: PTH108 - fast
+        os.rmdir(folder)  # noqa: PTH106 - fast
+
+
 def _watch(guardian: int, mark: str) -> None:
     """Be the second guardian: wait for the end of the first one, and clean up after it."""
     # If that has died before, somebody else is the parent.
@@ -272,8 +280,8 @@ def _watch(guardian: int, mark: str) -> None:
 
 
 def main() -> None:
-    """Guard; the arguments are the connection, the process to watch, and the mark."""
-    descriptor, composer, mark = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
+    """Guard; the arguments: connection, process to watch, mark, and folder to remove at last."""
+    descriptor, composer, mark, folder = int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:5]
     # Composer decides when it is over; what goes to a whole group of processes comes here too.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -285,6 +293,7 @@ def main() -> None:
         os.close(descriptor)
         os.setsid()
         _watch(guardian, mark)
+        _remove(folder)
         os._exit(0)
     # It may be gone by then, and its number somebody else's.
     second_handle = os.pidfd_open(second)
@@ -292,6 +301,7 @@ def main() -> None:
         Guardian(socket.socket(fileno=descriptor), composer).run()
     finally:
         _kill_all(lambda: (find_descendants(guardian) | find_marked(mark)) - {second})
+        _remove(folder)
         with contextlib.suppress(ProcessLookupError):
             signal.pidfd_send_signal(second_handle, signal.SIGKILL)
             os.waitpid(second, 0)

@@ -29,12 +29,15 @@ class GuardianConnection:
     Args:
         hear: Takes each answer, in a thread of the connection.
         lost: Called in that thread if the guardian has ended by itself.
+        folder: A folder of files that the guardian removes at its end.
 
     Attributes:
         mark: A variable that is in the environment of all that was started.
     """
 
-    def __init__(self, hear: Callable[[dict[str, Any]], None], lost: Callable[[], None]) -> None:
+    def __init__(
+        self, hear: Callable[[dict[str, Any]], None], lost: Callable[[], None], folder: str
+    ) -> None:
         self.mark = f'COMPOSER_SYSTEM_{uuid.uuid4().hex}'
         self._hear = hear
         self._lost = lost
@@ -45,7 +48,7 @@ class GuardianConnection:
             self._process = subprocess.Popen(  # noqa: S603 - our own script
                 [
                     *(sys.executable, '-I', '-S', guardian.__file__),
-                    *(str(other_end.fileno()), str(os.getpid()), self.mark),
+                    *(str(other_end.fileno()), str(os.getpid()), self.mark, folder),
                 ],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

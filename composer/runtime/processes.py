@@ -273,10 +273,10 @@ class _Tools:
         ros_arguments: Sequence[str],
         log_levels: Sequence[str],
     ) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix='composer-')
+        self._folder = tempfile.TemporaryDirectory(prefix='composer-', ignore_cleanup_errors=True)
         self.commands = CommandWriter(Path(self._folder.name), ros_arguments, log_levels)
         self.outputs = ProcessOutputs()
-        self.guardian = GuardianConnection(hear, lose)
+        self.guardian = GuardianConnection(hear, lose, self._folder.name)
 
     def close(self) -> None:
         """End all that was started, and remove what was made for it."""
