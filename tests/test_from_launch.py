@@ -60,12 +60,29 @@ EXAMPLES = read_examples()
 def test_the_page_shows_each_thing_that_a_launch_file_does():
     assert len(EXAMPLES) >= 16
     text = PAGE.read_text()
-    for term in (
-        'DeclareLaunchArgument remappings PushRosNamespace GroupAction SetRemap IfCondition '
-        'UnlessCondition PythonExpression IncludeLaunchDescription respawn OnProcessExit '
-        'OnProcessStart OnShutdown TimerAction SetEnvironmentVariable ExecuteProcess SetParameter '
-        'ComposableNode LifecycleNode log-level output'
-    ).split():
+    for term in [
+        'DeclareLaunchArgument',
+        'remappings',
+        'PushRosNamespace',
+        'GroupAction',
+        'SetRemap',
+        'IfCondition',
+        'UnlessCondition',
+        'PythonExpression',
+        'IncludeLaunchDescription',
+        'respawn',
+        'OnProcessExit',
+        'OnProcessStart',
+        'OnShutdown',
+        'TimerAction',
+        'SetEnvironmentVariable',
+        'ExecuteProcess',
+        'SetParameter',
+        'ComposableNode',
+        'LifecycleNode',
+        'log-level',
+        'output',
+    ]:
         assert term in text
 
 
@@ -89,10 +106,9 @@ def folder(tmp_path, monkeypatch):
 def write(folder, files):
     """Write an example with what the page leaves out; return the system's path and arguments."""
     for name, text in files.items():
-        if 'ros__parameters' not in text:
-            nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
-            text = f'version: 1\n{text}{nodes}'
-        (folder / name).write_text(text)
+        nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
+        whole = text if 'ros__parameters' in text else f'version: 1\n{text}{nodes}'
+        (folder / name).write_text(whole)
     first = next(iter(files))
     words = re.search(r'^# arguments: (.*)$', files[first], re.MULTILINE)
     return folder / first, words[1].split() if words else []
