@@ -141,7 +141,7 @@ def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
         "did you mean 'name'?",
         'in scope are: count, env, find, here, loud, name, range, rate',
     ]
-    (finding,) = load_system_text('version: 1\nnodes: {}\nx-a: "{{ a }}"').diagnostics
+    (finding,) = load_system_text('version: 1\nnodes: {}\ndescription: "{{ a }}"').diagnostics
     assert finding.help == "declare it as an argument, under 'args'"
 
 
