@@ -12,13 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.running import Peer, allocate_domain
+from tests.graphs import Graph
+from tests.running import allocate_domain
 
 pytestmark = pytest.mark.ros
 
 STRING, TWIST, POSE = 'std_msgs/msg/String', 'geometry_msgs/msg/Twist', 'geometry_msgs/msg/Pose'
-INFRASTRUCTURE = ('/rosout', '/parameter_events', '/diagnostics')
-OWN_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 
 
 def program(name, *arguments, publishers=(), subscriptions=(), parameters=None):
@@ -209,61 +208,6 @@ OPTIONAL_PROGRAMS = [
     program('parameter_blackboard', *ns('/robot1'), *FILE, parameters=BLACKBOARD),
     program('other', *ns('/robot1/arm'), *FILE, parameters={'some_int': 1, 'wide': False}),
 ]
-
-
-class Graph:
-    """What a plain node sees of a domain."""
-
-    def __init__(self, domain_id):
-        self._peer = Peer(domain_id)
-
-    def nodes(self):
-        names = self._peer.node.get_node_names_and_namespaces()
-        return sorted(
-            (namespace, name)
-            for name, namespace in names
-            if name != 'peer' and not name.startswith('_')
-        )
-
-    def ends(self):
-        """Return all ends of topics: the topic, type, node, and policies."""
-        node = self._peer.node
-        found = []
-        for topic, _ in node.get_topic_names_and_types():
-            if topic in INFRASTRUCTURE:
-                continue
-            for info in (
-                *node.get_publishers_info_by_topic(topic),
-                *node.get_subscriptions_info_by_topic(topic),
-            ):
-                profile = info.qos_profile
-                policies = (profile.reliability, profile.durability, profile.liveliness)
-                durations = (profile.deadline, profile.lifespan)
-                found.append(
-                    (
-                        topic,
-                        info.topic_type,
-                        f'{info.node_namespace} {info.node_name}',
-                        info.endpoint_type.name,
-                        *(policy.name for policy in policies),
-                        *(duration.nanoseconds for duration in durations),
-                    )
-                )
-        return sorted(found)
-
-    def parameters(self, full_names):
-        from rcl_interfaces.srv import GetParameters, ListParameters
-
-        found = {}
-        for full_name in full_names:
-            listed = self._peer.call(ListParameters, f'{full_name}/list_parameters')
-            names = sorted(set(listed.result.names) - set(OWN_PARAMETERS))
-            response = self._peer.call(GetParameters, f'{full_name}/get_parameters', names=names)
-            found[full_name] = dict(zip(names, map(str, response.values), strict=True))
-        return found
-
-    def close(self):
-        self._peer.close()
 
 
 @pytest.fixture

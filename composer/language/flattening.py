@@ -76,7 +76,7 @@ class _Pushing:
         outer, inner = self._defaults.get('namespace', ''), entry.get('namespace', '')
         namespace = _join(outer, inner)
         if namespace != inner:
-            _note_namespace(self._instance, (*at, 'namespace'), ('defaults', 'namespace'))
+            _note_namespace(self._instance, (*at, 'namespace'), ('defaults', 'namespace'), inner)
         return {'namespace': namespace} if namespace else {}
 
     def _with_qos(self, at: DataPath, entries: dict[str, Any]) -> dict[str, Any]:
@@ -100,11 +100,11 @@ class _Pushing:
                 self._instance.notes[path + at[2:]] = note
 
 
-def _note_namespace(instance: Instance, path: DataPath, outer: DataPath) -> None:
+def _note_namespace(instance: Instance, path: DataPath, outer: DataPath, inner: str) -> None:
     """Note that the namespace at a path lies in the one that is written at another path."""
     positions, notes = instance.positions, instance.notes
     place = ', '.join(filter(None, (positions.value(outer).place, notes.get(outer))))
-    if path in positions.values:
+    if inner:
         own = notes.get(path)
         notes[path] = f'{own}, in that of {place}' if own else f'in that of {place}'
         return
@@ -248,7 +248,7 @@ class Flattening:
         inner = plain.pop('namespace', '')
         namespace = _join(inclusion.namespace, inner)
         if namespace != inner:
-            _note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'))
+            _note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'), inner)
         if namespace and not str(path[-1]).startswith('/'):
             plain = {'namespace': namespace} | plain
         if inclusion.remap:

@@ -50,7 +50,9 @@ class Includer:
             path: The file of the instance.
             chain: Where it is included itself, innermost first.
         """
-        self._limit = max(self._limit, instance.data.get('max_nodes', MAX_ENTRIES))
+        # An included file may ask for more; one that asks for nothing changes nothing.
+        asked = instance.data.get('max_nodes', 0 if chain else MAX_ENTRIES)
+        self._limit = max(self._limit, asked)
         entries = instance.data.pop('include', {})
         if not entries:
             return instance

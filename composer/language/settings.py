@@ -54,7 +54,12 @@ def apply_settings(document: Document, settings: Sequence[str]) -> Document:
         source = SourceFile(f'--set {setting}', (setting,), home='.')
         positions.remove(path)
         start = len(path_text) + 2
-        positions.keys[path] = Span(source, 1, 1, len(path_text))
+        written = Span(source, 1, 1, len(path_text))
+        for depth in range(1, len(path)):
+            # What is around the value may be new as well.
+            if positions.keys.setdefault(path[:depth], written) is written:
+                positions.values[path[:depth]] = written
+        positions.keys[path] = written
         positions.values[path] = Span(source, 1, start, len(value_text))
     return Document(data, positions, document.diagnostics)
 

@@ -203,3 +203,100 @@ def test_a_cycle_over_two_files_names_the_way(write):
 def test_a_missing_file_comes_with_the_nearest_one(write):
     path = write(arm=ARM, robot=robot('{file: amr.yaml}'))
     assert load_system(path).diagnostics[0].help == "did you mean 'arm.yaml'?"
+
+
+# Includes in includes
+
+MIDDLE = """
+version: 1
+include:
+  left: {file: leaf.yaml, namespace: left}
+  right: {file: leaf.yaml, namespace: right}
+nodes: {}
+"""
+
+
+def test_a_relative_namespace_stays_relative_through_all_includes(write):
+    path = write(
+        leaf='version: 1\nnodes: {t: {}}\n',
+        middle=MIDDLE,
+        robot='version: 1\ninclude: {a: {file: middle.yaml, namespace: a}, b: {file: middle.yaml, '
+        'namespace: b}}\nnodes: {}\n',
+    )
+    system = load_system(path)
+    assert not system.diagnostics
+    names = [node.full_name for node in system.spec.nodes.values()]
+    assert names == ['/a/left/t', '/a/right/t', '/b/left/t', '/b/right/t']
+
+
+def test_profiles_that_start_from_others_of_one_name_stay_apart(write):
+    path = write(
+        leaf='version: 1\nqos: {base: {depth: 2}, fast: {profile: base}}\nnodes: {}\n',
+        robot=robot(
+            '{file: leaf.yaml}',
+            'qos: {base: {depth: 1}, fast: {profile: base}}\nnodes: {}',
+        ),
+    )
+    assert load_system(path).data['qos'] == {
+        'base': {'depth': 1},
+        'fast': {'profile': 'base'},
+        'part_base': {'depth': 2},
+        'part_fast': {'profile': 'part_base'},
+    }
+
+
+@pytest.mark.parametrize('who', ['robot', 'leaf'])
+def test_the_profiles_of_one_file_are_not_those_of_another(write, who):
+    user = 'nodes: {n: {publishers: {c: {type: std_msgs/msg/String, qos: fast}}}}'
+    owner = 'qos: {fast: {depth: 1}}\nnodes: {}'
+    rest = {'robot': owner, 'leaf': owner} | {who: user}
+    path = write(
+        leaf=f'version: 1\n{rest["leaf"]}', robot=robot('{file: leaf.yaml}', rest['robot'])
+    )
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, finding.message) == (
+        'unknown-qos-profile',
+        "no QoS profile is called 'fast'",
+    )
+    assert finding.span.source.name == f'{who}.yaml'
+    assert len(finding.related) == (who == 'leaf')
+
+
+def test_a_node_that_is_left_out_takes_no_name(write):
+    path = write(
+        leaf='version: 1\nnodes: {lidar: {log_level: info}}\n',
+        robot=robot('{file: leaf.yaml}', 'nodes: {lidar: {when: false}}'),
+    )
+    system = load_system(path)
+    assert not system.diagnostics
+    assert [node.log_level for node in system.spec.nodes.values()] == ['info']
+
+
+def test_files_that_include_each_other_over_and_over_are_bounded(write):
+    again = '{file: FILE, namespace: "n_{{ i }}", foreach: {i: "{{ range(10) }}"}}'
+    files = {
+        f'f{number}': f'version: 1\ninclude: {{"x_{{{{ i }}}}": {again}}}\nnodes: {{}}\n'.replace(
+            'FILE', f'f{number + 1}.yaml'
+        )
+        for number in range(6)
+    }
+    path = write(
+        **files,
+        f6='version: 1\nnodes: {n: {}}\n',
+        robot=robot('{file: f0.yaml}', 'max_nodes: 50\nnodes: {}'),
+    )
+    (finding,) = load_system(path).diagnostics
+    assert finding.rule == 'too-many-entries'
+    assert finding.message == 'there are more than 50 entries in include of all files'
+
+
+def test_what_is_ignored_may_hold_variables_of_foreach(write):
+    text = """
+    version: 1
+    x-wheel: &wheel {parameters: {index: "{{ i }}"}}
+    nodes:
+      "wheel_{{ i }}": {<<: *wheel, foreach: {i: [1, 2]}}
+    """
+    system = load_system(write(robot=text))
+    assert not system.diagnostics
+    assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]

@@ -131,3 +131,35 @@ def test_a_fault_in_a_setting_is_said_at_the_setting(write):
     (finding,) = load(write(base=BASE), 'nodes.talker.log_level=loud').diagnostics
     assert finding.span.source.name == '--set nodes.talker.log_level=loud'
     assert finding.span.text == 'loud'
+
+
+def test_null_is_a_value_of_warn_after(write):
+    base = 'version: 1\nnodes: {talker: {warn_after: 3}, other: {warn_after: 3}}\n'
+    site = 'nodes: {talker: {warn_after: null}, new: {warn_after: null, state: {x: null}}}'
+    system = load(write(base=base, site=site), 'nodes.other.warn_after=null')
+    assert [each.warn_after_sec for each in system.spec.nodes.values()] == [None] * 3
+    assert system.spec.nodes['new'].state == {'x': None}
+
+
+def test_names_of_sections_are_names_like_others(write):
+    system = load(
+        write(base='version: 1\nnodes: {timers: {description: x}}\n'),
+        'nodes.timers.log_level=debug',
+    )
+    assert system.spec.nodes['timers'].log_level == 'debug'
+
+
+def test_a_setting_of_one_item_of_a_list_says_how_to_set_the_list(write):
+    paths = write(base='version: 1\nnodes: {a: {parameter_files: [x.yaml]}}\n')
+    with pytest.raises(UsageError) as caught:
+        load(paths, 'nodes.a.parameter_files.0=y.yaml')
+    assert caught.value.help == (
+        'give the whole list, as in --set "nodes.a.parameter_files=[first, second]"'
+    )
+
+
+def test_a_wrong_key_in_a_setting_is_said_at_the_setting(write):
+    system = load(write(base='version: 1\nnodes: {a: {}}\n'), 'nodes.a.parametrs.x=3')
+    (finding,) = system.diagnostics
+    assert finding.rule == 'unknown-key'
+    assert str(finding.span) == '--set nodes.a.parametrs.x=3:1:1'
