@@ -3,10 +3,10 @@ CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
 BIN := .venv/bin
 ifdef ROS_DISTRO
-EXTRAS := test
+EXTRAS := graph,test
 VENV_FLAGS := --system-site-packages
 else
-EXTRAS := ros,interfaces,ros-test,test
+EXTRAS := ros,interfaces,graph,ros-test,test
 endif
 
 .PHONY: up test check format docs bench clean

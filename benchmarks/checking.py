@@ -1,16 +1,10 @@
-"""What it costs to check files, each in a process of its own, as people and CI run it.
+"""What it costs to check files, each in a process of its own, as people and CI run it."""
 
-python -m benchmarks.checking
-"""
-
-import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 _REPEATS = 5
@@ -83,47 +77,16 @@ def measure_files(paths: list[Path], repeats: int = _REPEATS) -> Figures:
     }
 
 
-def small_file() -> Figures:
-    """One small file."""
-    return measure_files([ROOT / 'configs' / 'greeter.yaml'])
+def measure(side: str, size: int, _seconds: float) -> Figures:
+    """Return what a check takes.
 
-
-def hundred_files() -> Figures:
-    """A hundred files of ten nodes."""
+    Args:
+        side: `shipped` for one small file, `many` for a hundred of `size` nodes, `one` for one
+            file of `size` nodes with five times as many entities.
+    """
+    if side == 'shipped':
+        return measure_files([ROOT / 'configs' / 'greeter.yaml'])
     with tempfile.TemporaryDirectory(dir=ROOT) as folder:
-        paths = [write_system(Path(folder) / f'{number}.yaml', 10) for number in range(100)]
-        return measure_files(paths)
-
-
-def large_file(nodes: int = 1000) -> Figures:
-    """One file of a thousand nodes with five thousand entities."""
-    with tempfile.TemporaryDirectory(dir=ROOT) as folder:
-        return measure_files([write_system(Path(folder) / 'large.yaml', nodes)])
-
-
-def twice_as_large() -> Figures:
-    """How many times the time and the memory a file takes that is twice as large."""
-    once, twice = large_file(), large_file(2000)
-    return {
-        **twice,
-        'times_the_seconds': twice['seconds'] / once['seconds'],
-        'times_the_cpu_seconds': twice['cpu_seconds'] / once['cpu_seconds'],
-        'times_the_megabytes': twice['megabytes'] / once['megabytes'],
-    }
-
-
-MEASUREMENTS: dict[str, Callable[[], Figures]] = {
-    'check_small_file': small_file,
-    'check_hundred_files': hundred_files,
-    'check_large_file': large_file,
-    'check_twice_as_large': twice_as_large,
-}
-
-
-def measure_all() -> dict[str, Any]:
-    """Return the figures of all measurements."""
-    return {name: measure() for name, measure in MEASUREMENTS.items()}
-
-
-if __name__ == '__main__':
-    print(json.dumps(measure_all(), indent=2))
+        count = 100 if side == 'many' else 1
+        paths = [write_system(Path(folder) / f'{each}.yaml', size) for each in range(count)]
+        return measure_files(paths, repeats=3)

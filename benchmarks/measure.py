@@ -34,6 +34,7 @@ SUBJECTS = {
     'thousand': Subject('benchmarks.thousand', 3.0),
     'jitter': Subject('benchmarks.jitter', 6.0),
     'idle_cpu': Subject('benchmarks.idle_cpu', 5.0),
+    'check': Subject('benchmarks.checking', most_rounds=2),
     'soak': Subject('benchmarks.soak', 60.0, most_rounds=1),
 }
 

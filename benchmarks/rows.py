@@ -165,6 +165,21 @@ def _at_rest_and_under_load() -> list[Row]:
     ]
 
 
+def _check() -> list[Row]:
+    def row(what: str, side: str, size: int, key: str, target: float) -> Row:
+        ours = _side('check', side, size, key)
+        return Row(f'composer check of {what}', ours, None, alone, '<=', target)
+
+    once, twice = (_side('check', 'one', size, 'seconds') for size in (1000, 2000))
+    return [
+        row('a small file, s', 'shipped', 2, 'seconds', 0.2),
+        row('100 files of 10 nodes, s', 'many', 10, 'seconds', 2.5),
+        row('1,000 nodes, 5,000 entities, s', 'one', 1000, 'seconds', 2.5),
+        row('1,000 nodes, 5,000 entities, MB', 'one', 1000, 'megabytes', 200),
+        Row('composer check of twice as large, s', twice, once, times, '<=', 2.2),
+    ]
+
+
 def _soak() -> list[Row]:
     def row(what: str, key: str, target: float) -> Row:
         ours = _side('soak', 'composer', 1000, key)
@@ -180,5 +195,6 @@ ROWS: list[Row] = [
     *_further_node(),
     *_thousand(),
     *_at_rest_and_under_load(),
+    *_check(),
     *_soak(),
 ]

@@ -35,6 +35,9 @@ def up(
     words: Sequence[str] = (),
     ros_arguments: Sequence[str] = (),
     log_levels: Sequence[str] = (),
+    *,
+    layers: Sequence[str | Path] = (),
+    settings: Sequence[str] = (),
 ) -> int:
     """Run the system that a file declares until it is stopped; return the exit code.
 
@@ -42,6 +45,8 @@ def up(
         words: Values for the arguments that the file declares, as in `['a:=1']`.
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all loggers, `talker:=debug` for one.
+        layers: Files that change the first one, each over those before it.
+        settings: Changes of single values, as in `['nodes.talker.log_level=debug']`.
 
     Raises:
         RosNotFoundError: There is no rclpy.
@@ -50,4 +55,5 @@ def up(
     """
     from composer.commands.up import up as run
 
-    return run(Path(path), words, ros_arguments, log_levels)
+    paths = [Path(each) for each in (path, *layers)]
+    return run(paths, words, ros_arguments, log_levels, settings)

@@ -8,12 +8,18 @@ import re
 import sys
 import traceback
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.reports import FORMATS
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_SET_HELP = 'Change a value, as in nodes.talker.log_level=debug; null removes it.'
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
 
 
@@ -68,6 +74,17 @@ def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
         else:
             (ros if inside else own).append(argument)
     return own, ros
+
+
+def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """Divide what a command line says into files and the arguments that follow them.
+
+    The first word is a file, and so are those right after it that end in `.yaml` or `.yml`.
+    """
+    count = 1
+    while count < len(words) and words[count].endswith(('.yaml', '.yml')):
+        count += 1
+    return [Path(word) for word in words[:count]], list(words[count:])
 
 
 def _check_log_levels(
@@ -133,8 +150,10 @@ def cli() -> None:
     context_settings={'ignore_unknown_options': True, 'help_option_names': []},
     options_metavar='[OPTIONS]',
 )
-@click.argument('file', type=click.Path(path_type=Path), required=False)
-@click.argument('arguments', nargs=-1, type=click.UNPROCESSED, metavar='[NAME:=VALUE]...')
+@click.argument(
+    'words', nargs=-1, type=click.UNPROCESSED, metavar='FILE [LAYER]... [NAME:=VALUE]...'
+)
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
 @click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
 )
@@ -149,32 +168,35 @@ def cli() -> None:
 @click.pass_context
 def up_command(
     context: click.Context,
-    file: Path | None,
-    arguments: tuple[str, ...],
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
     log_levels: tuple[str, ...],
     *,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run the system that it declares until it is stopped.
 
-    The file's own arguments are given by name, NAME:=VALUE, or as values in their order. What
-    follows --ros-args (up to the end, or a --) goes to every node.
+    LAYERs are files (.yaml, .yml) that change what those before them say. The file's own
+    arguments are given by name, NAME:=VALUE, or as values in their order. What follows --ros-args
+    (up to the end, or a --) goes to every node.
     """
     from composer.commands.up import describe_file_arguments, up
 
     if wants_help:
         click.echo(context.get_help())
-        if file is not None:
-            click.echo(f'\n{file}: {describe_file_arguments(file)}')
+        if words:
+            paths, _ = split_words(words)
+            click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
-    if file is None:
+    if not words:
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
+    paths, arguments = split_words(words)
     for argument in arguments:
         # A minus before a digit or a dot belongs to a number.
         if re.match(r'-[^\W\d]|--', argument):
             raise click.NoSuchOption(argument, ctx=context)
-    return up(file, arguments, context.obj, log_levels)
+    return up(paths, arguments, context.obj, log_levels, settings)
 
 
 @cli.command('check')
@@ -271,6 +293,89 @@ def schema_command(*, path_only: bool) -> int:
     from composer.commands.schema import print_schema
 
     return print_schema(path_only=path_only)
+
+
+@cli.command('show', options_metavar='[OPTIONS]')
+@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@click.option(
+    '--format',
+    'output_format',
+    type=click.Choice(['yaml', 'json']),
+    default='yaml',
+    help='How it is written.',
+)
+@click.option('--origin', is_flag=True, help='Say of each value where it comes from.')
+@click.option('--args', 'wants_arguments', is_flag=True, help='List the arguments of FILE.')
+@click.option(
+    '--params',
+    'wants_parameters',
+    is_flag=True,
+    help="Write all parameters of all nodes, in ROS's own format.",
+)
+def show_command(
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
+    output_format: str,
+    *,
+    origin: bool,
+    wants_arguments: bool,
+    wants_parameters: bool,
+) -> int:
+    """Print the system that FILE declares: all included, and with nothing left to evaluate.
+
+    Several FILEs are layers, each over those before it. `composer up` accepts what is printed.
+    """
+    from composer.commands.show import show, show_arguments
+    from composer.commands.show_parameters import show_parameters
+
+    paths, arguments = split_words(words)
+    if wants_arguments:
+        return show_arguments(paths)
+    if wants_parameters:
+        return show_parameters(paths, arguments, settings)
+    return show(paths, arguments, settings, output_format=output_format, origins=origin)
+
+
+@cli.command('graph', options_metavar='[OPTIONS]')
+@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
+@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(list(PICTURE_FORMATS)),
+    help='What to draw; by the ending of --output, or mermaid, if not given.',
+)
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    help='Write the drawing to this file.',
+)
+def graph_command(
+    words: tuple[str, ...],
+    settings: tuple[str, ...],
+    *,
+    format_name: str | None,
+    output: Path | None,
+) -> int:
+    """Draw the system that FILE declares: who publishes, hears, serves and calls what.
+
+    Types, QoS that differs from the default, and what `composer check` finds are in it. svg and
+    html need Graphviz: the program, or the extra 'graph'. Several FILEs are layers.
+    """
+    from composer.commands.graph import graph
+
+    paths, arguments = split_words(words)
+    return graph(paths, arguments, settings, format_name=format_name, output=output)
+
+
+@cli.command('new')
+@click.argument('name')
+def new_command(name: str) -> int:
+    """Create the folder NAME with a project that works: a system, behaviours, tests, CI."""
+    from composer.commands.new import create_project
+
+    return create_project(name)
 
 
 @cli.group('interfaces')

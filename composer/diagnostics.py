@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -29,10 +30,17 @@ class SourceFile:
     Attributes:
         name: The path as the user wrote it, for display.
         lines: The lines without their ends.
+        home: Where relative paths in it begin, if that is not the file's folder.
     """
 
     name: str
     lines: tuple[str, ...]
+    home: str | None = None
+
+    @property
+    def folder(self) -> Path:
+        """The folder where relative paths in it begin, as the user would write it."""
+        return Path(self.name).parent if self.home is None else Path(self.home)
 
     def line(self, number: int) -> str:
         """Return line `number`, counted from 1; an empty string past the end."""
@@ -60,6 +68,12 @@ class Span:
         """The characters that the span covers."""
         start = self.column - 1
         return self.source.line(self.line)[start : start + self.length]
+
+    @property
+    def place(self) -> str:
+        """`file:line`, or where else it was written."""
+        is_file = self.source.home is None
+        return f'{self.source.name}:{self.line}' if is_file else self.source.name
 
     def narrowed_to(self, part: str, *, first: bool = False) -> Span:
         """Return the span of the last (or `first`) `part` within this one; this one if none."""
@@ -102,6 +116,10 @@ class Diagnostic:
     severity: Severity = Severity.ERROR
     help: str | None = None
     related: tuple[Related, ...] = field(default=())
+
+    def with_related(self, related: Iterable[Related]) -> Diagnostic:
+        """Return the same finding with more places that take part in it."""
+        return replace(self, related=(*self.related, *related))
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:

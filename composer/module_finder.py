@@ -7,9 +7,13 @@ import sys
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.names import suggest
 from composer.python_source import ModuleSource, read_module
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 _PROJECT_MARKS = ('pyproject.toml', '.git')
 
@@ -27,17 +31,22 @@ class MissingModule:
     nearest: str | None
 
 
-def project_search_path(config: Path) -> list[Path]:
-    """Return where a file's behaviours are sought before the installed packages.
+def project_search_path(configs: Iterable[Path]) -> list[Path]:
+    """Return where the behaviours of files are sought before the installed packages.
 
-    That is the folder the command runs in, then the file's folder and its parents up to the one
+    That is the folder the command runs in, then each file's folder and its parents up to the one
     with a `pyproject.toml` or `.git`; without such a one, the file's folder alone.
     """
-    folder = config.resolve().parent
+    folders = dict.fromkeys(config.resolve().parent for config in configs)
+    chains = (each for folder in folders for each in _lineage(folder))
+    return list(dict.fromkeys([Path.cwd(), *chains]))
+
+
+def _lineage(folder: Path) -> list[Path]:
+    """Return a folder and its parents up to the project's."""
     lineage = [folder, *folder.parents]
     roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in _PROJECT_MARKS)]
-    chain = lineage[: roots[0] + 1] if roots else [folder]
-    return list(dict.fromkeys([Path.cwd(), *chain]))
+    return lineage[: roots[0] + 1] if roots else [folder]
 
 
 class ModuleFinder:

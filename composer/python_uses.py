@@ -28,7 +28,7 @@ _METHODS: dict[str, UseKind] = {
     'send_goal': 'action client',
 }
 # Attributes of `composer.Node` through which nothing that a file declares is reached by name.
-_HARMLESS = {'name', 'logger', 'now', 'state', 'shutdown', 'set_parameters'}
+_HARMLESS = {'name', 'logger', 'now', 'state', 'own_state', 'shutdown', 'set_parameters'}
 # What `node.publish('x')` raises for a name that is not declared, and what catches it.
 _CATCHING = {
     'AttributeError',

@@ -36,6 +36,12 @@ _TITLES = {
     'parameter': 'A parameter',
     'hook': 'A behaviour of the node itself',
     'argument': 'An argument',
+    'include': 'An include',
+    'foreach': 'Repetition',
+    'process': 'A process',
+    'process_restart': 'Starting a process again',
+    'process_stop': 'Stopping a process',
+    'condition': 'What is waited for',
     'qos': 'QoS',
     'qos_profile': 'A QoS profile',
 }

@@ -299,18 +299,18 @@ def test_a_project_reaches_up_to_its_mark(tmp_path, monkeypatch):
     monkeypatch.chdir('/')
     folder = tmp_path / 'project' / 'systems' / 'deep'
     folder.mkdir(parents=True)
-    assert project_search_path(folder / 'a.yaml') == [Path('/'), folder]
+    assert project_search_path([folder / 'a.yaml']) == [Path('/'), folder]
     (tmp_path / 'project' / 'pyproject.toml').touch()
-    assert project_search_path(folder / 'a.yaml') == [
+    assert project_search_path([folder / 'a.yaml']) == [
         Path('/'), folder, folder.parent, folder.parent.parent
     ]  # fmt: skip
     (tmp_path / 'project' / 'systems' / '.git').mkdir()
-    assert project_search_path(folder / 'a.yaml') == [Path('/'), folder, folder.parent]
+    assert project_search_path([folder / 'a.yaml']) == [Path('/'), folder, folder.parent]
 
 
 def test_the_folder_of_the_command_comes_first(tmp_path, monkeypatch):
     make(tmp_path, 'here/f.py', 'there/f.py')
     monkeypatch.chdir(tmp_path / 'here')
-    path = project_search_path(tmp_path / 'there' / 'a.yaml')
+    path = project_search_path([tmp_path / 'there' / 'a.yaml'])
     assert path == [tmp_path / 'here', tmp_path / 'there']
     assert ModuleFinder(path).find('f').path == tmp_path / 'here' / 'f.py'

@@ -1,4 +1,4 @@
-"""`LoadedSystem` → findings. The rules, a function each, in one table."""
+"""`LoadedSystem` → findings. The rules, a function each, in two tables."""
 
 from __future__ import annotations
 
@@ -11,9 +11,16 @@ from composer.checks.behaviours import check_behaviour_sources
 from composer.checks.context import CheckContext
 from composer.checks.fields import check_messages
 from composer.checks.ignoring import apply_ignore_comments
-from composer.checks.names import check_names
+from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
+from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
+from composer.checks.processes import (
+    check_environment,
+    check_executables,
+    check_processes,
+    check_waits,
+)
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
@@ -27,10 +34,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from composer.diagnostics import Diagnostic, Span
+    from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.rules.record import Need
 
-RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_names,
     check_qos,
     check_publish,
@@ -38,8 +45,16 @@ RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_processes,
     check_annotations,
     check_uses,
+)
+SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+    check_full_names,
+    check_parameter_files,
+    check_executables,
+    check_waits,
+    check_environment,
     check_wiring,
 )
 _MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
@@ -55,7 +70,7 @@ def create_context(
     if system.spec is None:
         return None, []
     catalogue, unreadable, findings = describe_declared(system, installed)
-    modules = ModuleFinder(project_search_path(system.path))
+    modules = ModuleFinder(project_search_path(system.files))
     uses = UseReader(modules)
     return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
 
@@ -76,12 +91,13 @@ def check_system(
     if context and further:
         more = further(context, found)
         found += [each for each in more if not _hangs_on_samples(each, samples)]
-    # What several entries share through an alias is wrong once.
-    once = dict.fromkeys([*system.diagnostics, *declared, *found])
+    # What several entries share through an alias, or a file included twice, is wrong once.
+    every = [*system.diagnostics, *declared, *found]
+    once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
     unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
     unchecked |= set() if further else {'import'}
     heard = apply_ignore_comments(
-        once, system.positions.source, None if system.diagnostics else unchecked
+        once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
     return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
 
@@ -95,25 +111,37 @@ def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
 
 def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
     samples = _by_line(context.system.sampled)
-    for rule in RULES:
-        findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
+    for rule, each_context in _applications(context):
+        findings = (each for each in rule(each_context) if not _hangs_on_samples(each, samples))
         # One more, as a sign that there are more.
         yield from islice(findings, MAX_FINDINGS + 1)
 
 
-def _by_line(spans: Iterable[Span]) -> dict[int, list[Span]]:
-    lines: dict[int, list[Span]] = {}
+def _applications(
+    context: CheckContext,
+) -> Iterator[tuple[Callable[[CheckContext], Iterable[Diagnostic]], CheckContext]]:
+    yield from ((rule, context) for rule in (*NODE_RULES, *SYSTEM_RULES))
+    if context.system.unused is not None:
+        # What is left out this time may be there the next.
+        other = replace(context, spec=context.system.unused)
+        yield from ((rule, other) for rule in NODE_RULES)
+
+
+def _by_line(spans: Iterable[Span]) -> dict[tuple[SourceFile, int], list[Span]]:
+    lines: dict[tuple[SourceFile, int], list[Span]] = {}
     for span in spans:
-        lines.setdefault(span.line, []).append(span)
+        lines.setdefault((span.source, span.line), []).append(span)
     return lines
 
 
-def _hangs_on_samples(finding: Diagnostic, samples: Mapping[int, list[Span]]) -> bool:
+def _hangs_on_samples(
+    finding: Diagnostic, samples: Mapping[tuple[SourceFile, int], list[Span]]
+) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(
         span.column <= place.column < span.column + span.length
-        for span in samples.get(place.line, ())
+        for span in samples.get((place.source, place.line), ())
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, Severity, Span, diagnostic_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -53,7 +53,8 @@ class CheckContext:
     ) -> Diagnostic:
         """Return a finding at a value, or at the last (or `first`) `part` of its text."""
         span = self.system.positions.value(path).narrowed_to(part, first=first)
-        return diagnostic_at(span, rule, message, help=help, severity=severity, related=related)
+        places = (*related, *self._includes(path, span))
+        return diagnostic_at(span, rule, message, help=help, severity=severity, related=places)
 
     def at_key(
         self,
@@ -67,7 +68,13 @@ class CheckContext:
     ) -> Diagnostic:
         """Return a finding at a key."""
         span = self.system.positions.key(path)
-        return diagnostic_at(span, rule, message, help=help, severity=severity, related=related)
+        places = (*related, *self._includes(path, span))
+        return diagnostic_at(span, rule, message, help=help, severity=severity, related=places)
+
+    def _includes(self, path: DataPath, span: Span) -> tuple[Related, ...]:
+        """Return where the file of a finding is included, if it is not the first one."""
+        is_own = span.source is self.system.positions.source
+        return () if is_own else self.system.chains.get(path[:2], ())
 
     def related(self, path: DataPath, message: str) -> Related:
         """Return a second place of a finding: that of a key."""

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from composer.language.specs import (
         ActionClientSpec,
         ActionSpec,
+        ProcessSpec,
         PublisherSpec,
         QosSpec,
         ServiceClientSpec,
@@ -119,11 +120,13 @@ class Graph:
         of_ros: The full names of the services that ROS itself gives to the nodes.
         unsure: The kinds of channels that may have further ends: a name hangs on an argument
             that is not given yet, or is missing for a fault of its own.
+        left_out: What nodes have that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
     of_ros: frozenset[str]
     unsure: frozenset[ChannelKind]
+    left_out: frozenset[tuple[ChannelKind, str]]
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
@@ -146,15 +149,26 @@ def build_graph(context: CheckContext) -> Graph:
                 ends = channel.providers if section in _PROVIDING else channel.users
                 ends.append(Endpoint(node, entity, noun))
     of_ros = (name for node in context.spec.nodes.values() for name in _services_of_ros(node))
-    return Graph(channels, frozenset(of_ros), frozenset(unsure))
+    return Graph(
+        channels, frozenset(of_ros), frozenset(unsure), frozenset(_channels_left_out(context))
+    )
 
 
-def full_name(node: NodeSpec, kind: ChannelKind, name: str) -> str:
-    """Return the name of a node's topic, service or action as others see it."""
-    full = expand_name(name, node.name, node.namespace)
+def _channels_left_out(context: CheckContext) -> Iterator[tuple[ChannelKind, str]]:
+    unused = context.system.unused
+    for node in unused.nodes.values() if unused else ():
+        for section, (kind, _) in _SECTIONS.items():
+            for entity in getattr(node, section).values():
+                yield kind, full_name(node, kind, getattr(entity, kind))
+
+
+def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
+    """Return the name of a topic, service or action of a node or process as others see it."""
+    namespace = node.namespace or '/'
+    full = expand_name(name, node.name, namespace)
     if not node.remap or kind not in _SCHEMES:
         return full
-    return remap_name(full, node.remap, node.name, node.namespace, _SCHEMES[kind])
+    return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
 
 
 def _services_of_ros(node: NodeSpec) -> Iterator[str]:

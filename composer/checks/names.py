@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.diagnostics import Related
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
@@ -35,10 +36,10 @@ _LONGEST_OWN_SERVICES = {
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS will see."""
     yield from _check_namespaces(context)
-    for name, node in context.spec.nodes.items():
-        fault = find_node_name_fault(name)
+    for node in context.spec.nodes.values():
+        fault = find_node_name_fault(node.name)
         if fault:
-            yield context.at_key(node.path, _RULE, f"'{name}' cannot name a node: {fault}")
+            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {fault}")
         else:
             yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
@@ -55,9 +56,27 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
         fault = find_namespace_fault(node.namespace)
         own = (*node.path, 'namespace')
         path = own if own in context.system.positions.values else ('defaults', 'namespace')
+        if str(node.path[-1]).startswith('/'):
+            path = node.path
         if fault and path not in reported:
             reported.add(path)
-            yield context.at_value(path, _RULE, f"'{node.namespace}': {fault}")
+            say = context.at_key if path == node.path else context.at_value
+            yield say(path, _RULE, f"'{node.namespace}': {fault}")
+
+
+def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
+    """No two nodes have one full name."""
+    first: dict[str, NodeSpec] = {}
+    for node in context.spec.nodes.values():
+        other = first.setdefault(node.full_name, node)
+        if other is not node:
+            yield context.at_key(
+                node.path,
+                'duplicate-node',
+                f"there is a node '{node.full_name}' already",
+                help="give one of them another name, or a 'namespace'",
+                related=[Related('the other one', context.system.positions.key(other.path))],
+            )
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:

@@ -21,7 +21,7 @@ _LIMITS = ('minimum', 'maximum', 'step')
 _HAS_CHOICES = (*_NUMERIC, 'string')
 
 # Parameters that each node of rclpy declares itself, and what to say of them.
-_OF_EVERY_NODE = {
+OF_EVERY_NODE = {
     'use_sim_time': (
         'a key of the node, not one of its parameters',
         "move it out of 'parameters:'",
@@ -54,8 +54,8 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
     path = _value_path(context, parameter)
-    if parameter.name in _OF_EVERY_NODE:
-        what, help_text = _OF_EVERY_NODE[parameter.name]
+    if parameter.name in OF_EVERY_NODE:
+        what, help_text = OF_EVERY_NODE[parameter.name]
         message = f"'{parameter.name}' is {what}"
         yield context.at_key(parameter.path, _RULE, message, help=help_text)
         return

@@ -43,6 +43,9 @@ _MESSAGES = {
 
 def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
     """Everyone who needs another end has one, or says that it is elsewhere."""
+    if context.system.data.get('processes'):
+        # Nobody knows what programs publish, hear and serve.
+        return
     partners = _Partners(graph)
     for channel in graph.channels.values():
         if not _is_alone(graph, channel):
@@ -55,6 +58,8 @@ def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic
 
 def _is_alone(graph: Graph, channel: Channel) -> bool:
     if channel.providers and channel.users:
+        return False
+    if (channel.kind, channel.name) in graph.left_out:
         return False
     if channel.kind in graph.unsure or channel.name in _OF_ROS or channel.name in graph.of_ros:
         return False

@@ -129,7 +129,7 @@ def _own_modules(context: CheckContext) -> Iterator[None]:
 
     before = set(sys.modules)
     names = {binding.behaviour.module.partition('.')[0] for binding in _bindings(context.spec)}
-    with behaviours.project_on_path(project_search_path(context.system.path)):
+    with behaviours.project_on_path(project_search_path(context.system.files)):
         yield
     for name in set(sys.modules) - before:
         if name.partition('.')[0] in names:

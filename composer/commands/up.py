@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import SystemSpec
 
 _NO_ROS_HELP = (
     "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
@@ -32,24 +33,27 @@ _NO_ROS_HELP = (
 
 
 def up(
-    path: Path,
+    paths: Sequence[Path],
     words: Sequence[str] = (),
     ros_arguments: Sequence[str] = (),
     log_levels: Sequence[str] = (),
+    settings: Sequence[str] = (),
 ) -> int:
     """Run a system until it ends; return the exit code.
 
     Args:
+        paths: The file, and layers over it.
         words: Values for the arguments that the file declares.
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all loggers, `talker:=debug` for one.
+        settings: Changes of single values, as in `nodes.talker.log_level=debug`.
 
     Raises:
         RosNotFoundError: There is no rclpy.
         StartError: The system could not be brought up.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    system = load_system(path, words)
+    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
     catalogue = InterfaceCatalogue()
     findings = check_system(system, catalogue)
     if _report(findings) or system.spec is None:
@@ -57,16 +61,31 @@ def up(
     if importlib.util.find_spec('rclpy') is None:
         message = 'there is no rclpy in this Python, so nothing can run'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
+    from composer.runtime.environment import check_middleware, environment_set
+
+    # Before anything of ROS is imported, which reads it.
+    with environment_set(system.spec.environment):
+        check_middleware(system.spec.environment)
+        return _run(system, system.spec, catalogue, ros_arguments, log_levels)
+
+
+def _run(
+    system: LoadedSystem,
+    spec: SystemSpec,
+    catalogue: InterfaceCatalogue,
+    ros_arguments: Sequence[str],
+    log_levels: Sequence[str],
+) -> int:
     from composer.runtime.behaviours import project_on_path
     from composer.runtime.run import run_system
 
     provide_declared(system, lambda line: click.echo(line, err=True))
-    with project_on_path(project_search_path(path)):
+    with project_on_path(project_search_path(system.files)):
         functions, findings = _import(system, catalogue)
         if _report(findings):
             return ExitCode.FAILED
         return run_system(
-            system.spec,
+            spec,
             system.positions,
             functions,
             ros_arguments=ros_arguments,
@@ -74,9 +93,9 @@ def up(
         )
 
 
-def describe_file_arguments(path: Path) -> str:
+def describe_file_arguments(paths: Sequence[Path]) -> str:
     """Return which arguments a file declares, as its help shows them."""
-    system = load_system(path)
+    system = load_system(paths[0], layers=paths[1:])
     if system.spec is None:
         return 'the file cannot be read'
     return describe_arguments(system.arguments)

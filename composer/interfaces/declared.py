@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import diagnostic_at
@@ -10,19 +11,15 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from composer.diagnostics import Diagnostic
     from composer.language import LoadedSystem
 
 
 def declared_folders(system: LoadedSystem) -> dict[str, Path]:
-    """Return the folder of each interface package that a file declares.
-
-    Folders are relative to that of the file.
-    """
+    """Return the folder of each interface package that a system declares."""
     declared = system.spec.interfaces if system.spec else {}
-    return {package: system.path.parent / folder for package, folder in declared.items()}
+    return {package: Path(folder) for package, folder in declared.items()}
 
 
 def describe_declared(

@@ -1,4 +1,4 @@
-"""YAML text → `SystemSpec`: read → arguments → templates → schema → specs.
+"""YAML text → `SystemSpec`: read → layers → arguments → templates → schema → includes → specs.
 
 Each step is one module; findings are collected on the way. Only the words of the command line
 raise, since what is wrong with them is not in the file.
@@ -10,22 +10,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, diagnostic_at
-from composer.language.arguments import (
-    ArgumentSpec,
-    find_argument_faults,
-    parse_arguments,
-    read_arguments,
-)
-from composer.language.filling import FilledDocument
+from composer.language.arguments import ArgumentSpec, parse_arguments
+from composer.language.includes import Includer
+from composer.language.instances import ArgumentValues, read_instance, sample_values
+from composer.language.layers import merge_documents
 from composer.language.parser import parse_system
-from composer.language.schema import check_structure, is_sound
+from composer.language.settings import apply_settings
 from composer.language.source import Document, parse_document, read_document
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from composer.diagnostics import Span
+    from composer.diagnostics import Diagnostic, Related, SourceFile, Span
     from composer.language.positions import DataPath, SourceMap
     from composer.language.specs import SystemSpec
 
@@ -41,6 +37,12 @@ class LoadedSystem:
         arguments: What the file takes from the command line.
         sampled: Where values stand that hang on samples of arguments: what is said of these
             need not hold for the real ones.
+        data: The whole system as plain data, all included, with nothing left to evaluate.
+        values: What the arguments are.
+        included: The files that are part of it.
+        chains: Where entries come from by includes, innermost first, by their paths.
+        notes: Where the values that the expressions of a scalar use come from, by its path.
+        unused: As `spec`, of the nodes whose `when` does not hold.
     """
 
     path: Path
@@ -50,19 +52,40 @@ class LoadedSystem:
     diagnostics: tuple[Diagnostic, ...]
     arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
     sampled: tuple[Span, ...] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    included: tuple[SourceFile, ...] = ()
+    chains: Mapping[DataPath, tuple[Related, ...]] = field(default_factory=dict)
+    notes: Mapping[DataPath, str] = field(default_factory=dict)
+    unused: SystemSpec | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The file and those that are included in it."""
+        return [self.path, *(Path(source.name) for source in self.included)]
 
 
-def load_system(path: Path, words: Sequence[str] | None = None) -> LoadedSystem:
+def load_system(
+    path: Path,
+    words: Sequence[str] | None = None,
+    *,
+    layers: Sequence[Path] = (),
+    settings: Sequence[str] = (),
+) -> LoadedSystem:
     """Read a file as far as it can be read.
 
     Args:
         words: The arguments of the command line; `None` to read the file with its defaults, and
             with samples where there are none.
+        layers: Files that change the first one, each over those before it.
+        settings: Changes of single values, as in `nodes.talker.log_level=debug`.
 
     Raises:
-        UsageError: The words do not fit the arguments that the file declares.
+        UsageError: The words do not fit the arguments that the file declares, or a setting fits
+            nothing.
     """
-    return _load(read_document(path), path, words)
+    documents = [read_document(each) for each in (path, *layers)]
+    return _load(apply_settings(merge_documents(documents), settings), path, words)
 
 
 def load_system_text(
@@ -80,64 +103,45 @@ def load_system_content(
 
 
 def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:
-    positions = document.positions
-    if document.data is None:
-        return LoadedSystem(path, None, positions, frozenset(), document.diagnostics)
-    declared = read_arguments(document.data)
-    faults = _check_arguments(declared, positions)
-    sound = not faults and is_sound({'args': document.data.get('args', {})})
-    # Words are not held against declarations that are wrong: those have to be mended first.
-    values, samples = _give_values(declared, words if sound else None)
-    filled = _fill(document.data, values, positions, samples if sound else values)
-    data, dropped, structure_faults = check_structure(
-        filled.data, positions, filled.failed, filled.sampled
-    )
+    def give_values(
+        declared: Mapping[str, ArgumentSpec],
+    ) -> ArgumentValues:
+        if words is None:
+            return sample_values(declared)
+        values, given = parse_arguments(declared, words)
+        return ArgumentValues(values, origins=dict.fromkeys(given, 'command line'))
+
+    instance = read_instance(document, give_values)
+    if instance is None:
+        return LoadedSystem(path, None, document.positions, frozenset(), document.diagnostics)
+    whole = Includer().include(instance, path)
+    used, unused = _divided(whole.data, whole.left_out)
     return LoadedSystem(
         path,
-        parse_system(data, path.stem),
-        positions,
-        dropped,
-        (*document.diagnostics, *faults, *filled.faults, *structure_faults),
-        declared,
-        tuple(filled.sampled_spans),
+        parse_system(used, path.stem),
+        whole.positions,
+        frozenset(whole.dropped),
+        tuple(whole.diagnostics),
+        whole.arguments,
+        tuple(whole.sampled_spans),
+        used,
+        whole.values,
+        tuple(whole.included),
+        whole.chains,
+        whole.notes,
+        parse_system(unused, path.stem) if unused else None,
     )
 
 
-def _give_values(
-    declared: Mapping[str, ArgumentSpec], words: Sequence[str] | None
-) -> tuple[dict[str, Any], Collection[str]]:
-    """Return the value of each argument, and the names of those whose value is a sample."""
-    if words is not None:
-        return parse_arguments(declared, words), ()
-    values = {name: argument.sample for name, argument in declared.items()}
-    return values, [name for name, argument in declared.items() if argument.is_open]
-
-
-def _fill(
-    data: dict[str, Any],
-    values: Mapping[str, Any],
-    positions: SourceMap,
-    samples: Collection[str],
-) -> FilledDocument:
-    if not any('{{' in line for line in positions.source.lines):
-        return FilledDocument(data)
-    # jinja2 takes a tenth of a check's time to import, and most files have no templates.
-    from composer.language.templates import fill_templates
-
-    declarations = {key: data[key] for key in ('args',) if key in data}
-    system = {key: value for key, value in data.items() if key not in declarations}
-    filled = fill_templates(system, values, positions, samples)
-    filled.data |= declarations
-    return filled
-
-
-def _check_arguments(
-    declared: Mapping[str, ArgumentSpec], positions: SourceMap
-) -> list[Diagnostic]:
-    found = []
-    for name, argument in declared.items():
-        for key, fault in find_argument_faults(argument):
-            path = ('args', name, *key)
-            span = positions.value(path) if key else positions.key(path)
-            found.append(diagnostic_at(span, 'bad-argument-declaration', fault))
-    return found
+def _divided(
+    data: dict[str, Any], left_out: Collection[DataPath]
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Return the data without the entries that are left out, and with these alone."""
+    if not left_out:
+        return data, None
+    used, unused = dict(data), dict(data)
+    for section in ('nodes', 'processes'):
+        entries = data.get(section, {})
+        used[section] = {k: v for k, v in entries.items() if (section, k) not in left_out}
+        unused[section] = {k: v for k, v in entries.items() if (section, k) in left_out}
+    return used, unused

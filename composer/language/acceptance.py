@@ -151,6 +151,15 @@ def _compile_min_length(_: SchemaCompiler, schema: Schema) -> Acceptor:
     return lambda data: not isinstance(data, str) or len(data) >= schema['minLength']
 
 
+def _compile_min_properties(_: SchemaCompiler, schema: Schema) -> Acceptor:
+    return lambda data: not isinstance(data, dict) or len(data) >= schema['minProperties']
+
+
+def _compile_property_names(compiler: SchemaCompiler, schema: Schema) -> Acceptor:
+    accepts = compiler.compile(schema['propertyNames'])
+    return lambda data: not isinstance(data, dict) or all(map(accepts, data))
+
+
 def _compile_dependent_required(_: SchemaCompiler, schema: Schema) -> Acceptor:
     rules = schema['dependentRequired'].items()
     return lambda data: (
@@ -200,5 +209,7 @@ _COMPILERS: dict[str, Callable[[SchemaCompiler, Schema], Acceptor]] = {
     'maximum': _compile_maximum,
     'minItems': _compile_min_items,
     'minLength': _compile_min_length,
+    'minProperties': _compile_min_properties,
+    'propertyNames': _compile_property_names,
     'dependentRequired': _compile_dependent_required,
 }

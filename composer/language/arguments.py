@@ -99,7 +99,7 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if not argument.name.isidentifier() or argument.name in _RESERVED:
+    if not is_usable_name(argument.name):
         yield (), f"'{argument.name}' cannot stand in an expression as a name"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
@@ -111,6 +111,11 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
         yield ('default',), f'the default {default!r} is none of the choices'
 
 
+def is_usable_name(name: str) -> bool:
+    """Return whether an expression can use a name."""
+    return name.isidentifier() and name not in _RESERVED
+
+
 def _find_value_fault(value: Any, type_name: str) -> str | None:
     if isinstance(value, list | dict):
         return None  # the schema says so
@@ -119,8 +124,10 @@ def _find_value_fault(value: Any, type_name: str) -> str | None:
     return find_type_fault(value, type_name)
 
 
-def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) -> dict[str, Any]:
-    """Return the values of a file's arguments.
+def parse_arguments(
+    declared: Mapping[str, ArgumentSpec], words: Sequence[str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the values of a file's arguments, and the names of those that the words give.
 
     Args:
         words: `name:=value`, or values alone in the order of the declarations.
@@ -148,7 +155,7 @@ def parse_arguments(declared: Mapping[str, ArgumentSpec], words: Sequence[str]) 
             faults.append(f"'{name}' is missing")
     if faults:
         raise UsageError('; '.join(faults), help=describe_arguments(declared))
-    return values
+    return values, list(given)
 
 
 def describe_arguments(declared: Mapping[str, ArgumentSpec]) -> str:

@@ -14,6 +14,8 @@ MAX_DEPTH = 100
 # Five times what a file of a thousand nodes with five thousand entities has.
 MAX_VALUES = 300_000
 
+_QUOTES = ("'", '"')
+
 # libyaml's parser is ten times faster; wheels of PyYAML bring it, source builds may not.
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
@@ -26,6 +28,7 @@ class ScalarNode:
     tag: str | None
     plain: bool
     span: Span
+    quoted: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -62,14 +65,19 @@ class CompositionError(Exception):
         self.diagnostic = diagnostic
 
 
-def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
+def compose_tree(
+    text: str, source: SourceFile, *, alias_rule: str | None = None
+) -> TreeNode | None:
     """Return the one document of a text, or `None` if it is empty.
+
+    Args:
+        alias_rule: The rule that aliases break, where the reader of the file takes none.
 
     Raises:
         CompositionError: The text is not YAML, nests too deep, holds several documents, or an
             alias that is unknown or contains itself.
     """
-    composer = _TreeBuilder(source)
+    composer = _TreeBuilder(source, alias_rule)
     try:
         for event in yaml.parse(text, Loader=_Loader):
             composer.take(event)
@@ -87,9 +95,10 @@ def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
 class _TreeBuilder:
     """Takes the parser's events one by one."""
 
-    def __init__(self, source: SourceFile) -> None:
+    def __init__(self, source: SourceFile, alias_rule: str | None) -> None:
         self.root: TreeNode | None = None
         self._source = source
+        self._alias_rule = alias_rule
         self._open: list[SequenceNode | MappingNode] = []
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
@@ -99,7 +108,9 @@ class _TreeBuilder:
         if isinstance(event, yaml.ScalarEvent):
             plain = event.implicit[0] and not event.style
             tag = None if event.implicit[0] or event.implicit[1] else event.tag
-            self._add(ScalarNode(event.value, tag, plain, self._span(event)), event.anchor)
+            quoted = event.style in _QUOTES
+            node = ScalarNode(event.value, tag, plain, self._span(event), quoted)
+            self._add(node, event.anchor)
         elif isinstance(event, yaml.MappingStartEvent):
             self._enter(MappingNode(event.tag, self._span(event)), event)
         elif isinstance(event, yaml.SequenceStartEvent):
@@ -139,6 +150,9 @@ class _TreeBuilder:
             parent.pending_key = None
 
     def _aliased(self, event: Any) -> TreeNode:
+        if self._alias_rule is not None:
+            message = f'ROS takes no aliases here: write what *{event.anchor} stands for'
+            self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
             self._stop(

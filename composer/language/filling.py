@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.language.positions import DataPath
 
+# The sections whose entries may be repeated, and how many they may have unless a file says more.
+SECTIONS = ('nodes', 'include', 'processes')
+MAX_ENTRIES = 10_000
+
 
 @dataclass(slots=True)
 class FilledDocument:
@@ -18,6 +22,8 @@ class FilledDocument:
         failed: The paths of the scalars that could not be evaluated.
         sampled: The paths of the scalars whose values hang on samples, and are not the real ones.
         sampled_spans: Where these and such keys are written.
+        left_out: The paths of entries whose `when` does not hold.
+        notes: Where the values that the expressions of a scalar use come from, by its path.
     """
 
     data: dict[str, Any]
@@ -25,3 +31,5 @@ class FilledDocument:
     failed: list[DataPath] = field(default_factory=list)
     sampled: list[DataPath] = field(default_factory=list)
     sampled_spans: list[Span] = field(default_factory=list)
+    left_out: set[DataPath] = field(default_factory=set)
+    notes: dict[DataPath, str] = field(default_factory=dict)

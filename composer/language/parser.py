@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.language.parameters import convert_parameter_value, infer_parameter_type
+from composer.language.processes import parse_conditions, parse_process, write_scalar
 from composer.language.qos import DEFAULT_PROFILE, SERVICES_PROFILE
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
@@ -60,6 +62,12 @@ def parse_system(data: Data, name: str) -> SystemSpec:
             'nodes',
             lambda name, node, path: _NodeParser(defaults, node, path).parse(name),
         ),
+        environment=MappingProxyType(
+            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+        ),
+        processes=_parse_entries(
+            data, (), 'processes', partial(parse_process, defaults.given_namespace, defaults.node)
+        ),
     )
 
 
@@ -86,6 +94,7 @@ def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as 
 
 @dataclass(frozen=True, slots=True)
 class _Defaults:
+    given_namespace: str | None
     namespace: str
     qos: QosSpec
     node: Data
@@ -93,6 +102,7 @@ class _Defaults:
 
 def _parse_defaults(data: Data) -> _Defaults:
     return _Defaults(
+        given_namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         namespace=expand_namespace(data.get('namespace', '')),
         qos=_parse_qos(data['qos'], ('defaults', 'qos'))
         if 'qos' in data
@@ -110,11 +120,12 @@ class _NodeParser:
         self._path = path
         self._on_error: OnError = self._data.get('on_error', 'log')
 
-    def parse(self, name: str) -> NodeSpec:
+    def parse(self, key: str) -> NodeSpec:
         data, path = self._data, self._path
+        namespace, name = self._split(key)
         return NodeSpec(
             name=name,
-            namespace=expand_namespace(data.get('namespace', ''), self._defaults.namespace),
+            namespace=namespace,
             description=data.get('description', ''),
             log_level=data.get('log_level'),
             use_sim_time=data.get('use_sim_time', False),
@@ -139,8 +150,17 @@ class _NodeParser:
             on_start=self._parse_hook('on_start'),
             on_stop=self._parse_hook('on_stop'),
             on_parameters=self._parse_hook('on_parameters'),
+            wait_for=parse_conditions(data, path),
+            parameter_files=tuple(data.get('parameter_files', ())),
             path=path,
         )
+
+    def _split(self, key: str) -> tuple[str, str]:
+        """Return the namespace and the name of a node; its key may be both in one."""
+        if key.startswith('/'):
+            namespace, _, name = key.rpartition('/')
+            return namespace or '/', name
+        return expand_namespace(self._data.get('namespace', ''), self._defaults.namespace), key
 
     def _parse_publisher(self, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
         if isinstance(data, str):

@@ -11,6 +11,14 @@ Key: TypeAlias = str | int
 DataPath: TypeAlias = tuple[Key, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """The positions of one entry and of all below it, by their paths from there."""
+
+    keys: tuple[tuple[DataPath, Span], ...]
+    values: tuple[tuple[DataPath, Span], ...]
+
+
 @dataclass(slots=True)
 class SourceMap:
     """The positions of a document.
@@ -61,3 +69,54 @@ class SourceMap:
         self._inner.clear()
         for path in dict.fromkeys([*self.keys, *self.values]):
             self._inner.setdefault(path[:-1], []).append(path)
+
+    def branches(self, path: DataPath) -> dict[Key, Branch]:
+        """Return the positions of all entries of the mapping at `path`, by their keys."""
+        depth = len(path)
+        keys = _grouped(self.keys, path, depth)
+        values = _grouped(self.values, path, depth)
+        return {
+            key: Branch(tuple(keys.get(key, ())), tuple(values.get(key, ())))
+            for key in {**keys, **values}
+        }
+
+    def branch(self, path: DataPath) -> Branch:
+        """Return the positions of the entry at `path`."""
+        return self.branches(path[:-1])[path[-1]]
+
+    def copy(self) -> SourceMap:
+        """Return a map that can be changed apart from this one."""
+        return SourceMap(self.source, dict(self.keys), dict(self.values))
+
+    def sources(self) -> set[SourceFile]:
+        """Return all files that a position lies in."""
+        return {span.source for span in self.values.values()} | {self.source}
+
+    def remove(self, path: DataPath) -> None:
+        """Forget what is at `path` and below it."""
+        self._indexed = -1
+        depth = len(path)
+        for spans in (self.keys, self.values):
+            for at in [at for at in spans if at[:depth] == path]:
+                del spans[at]
+
+    def replace(self, path: DataPath, other: SourceMap) -> None:
+        """Let what is at `path`, and all below it, be where another map says."""
+        self.remove(path)
+        self.graft(path, other.branch(path))
+
+    def graft(self, path: DataPath, branch: Branch) -> None:
+        """Let the positions of a branch be found at `path` as well."""
+        self._indexed = -1
+        self.keys.update((path + rest, span) for rest, span in branch.keys)
+        self.values.update((path + rest, span) for rest, span in branch.values)
+
+
+def _grouped(
+    spans: dict[DataPath, Span], path: DataPath, depth: int
+) -> dict[Key, list[tuple[DataPath, Span]]]:
+    groups: dict[Key, list[tuple[DataPath, Span]]] = {}
+    for at, span in spans.items():
+        if len(at) > depth and at[:depth] == path:
+            groups.setdefault(at[depth], []).append((at[depth + 1 :], span))
+    return groups

@@ -17,6 +17,7 @@ from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 from composer.language import bounds
 from composer.language.bounds import Budget
 from composer.language.evaluation import evaluate_expression
+from composer.language.functions import FUNCTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -78,12 +79,12 @@ _PLAIN = (str, bytes, list, tuple, dict, range, int, float, type(None), Undefine
 
 
 class Sandbox(SandboxedEnvironment):
-    """Evaluates the expressions of one file; their globals are `range` alone."""
+    """Evaluates the expressions of one file."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.budget = Budget()
-        self.globals: dict[str, Any] = {'range': self.globals['range']}
+        self.globals: dict[str, Any] = {'range': self.globals['range'], **FUNCTIONS}
         self.filters = {name: self.filters[name] for name in sorted(_FILTERS)}
         self._parsed: dict[str, nodes.Expr] = {}
         self._context = new_context(self, None, {}, globals=self.globals)
@@ -108,7 +109,10 @@ class Sandbox(SandboxedEnvironment):
             TemplateError: It is none.
         """
         expression = self._parse_once(code)
-        found = {each.name for each in expression.find_all(nodes.Name)}
+        try:
+            found = {each.name for each in expression.find_all(nodes.Name)}
+        except RecursionError:
+            raise _too_deep() from None
         return found | ({expression.name} if isinstance(expression, nodes.Name) else set())
 
     def measure(self, text: str) -> int:

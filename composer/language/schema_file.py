@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 
+# `importlib.resources` takes a twentieth of a check's time to import.
+_PACKAGE = Path(__file__).resolve().parent.parent
 SCHEMA_NAME = 'composer.schema.json'
 
 
 def schema_path() -> Path:
     """Return where the schema lies: beside the package in a checkout, inside it in a wheel."""
-    packaged = Path(str(resources.files('composer'))) / 'schemas' / SCHEMA_NAME
+    packaged = _PACKAGE / 'schemas' / SCHEMA_NAME
     return packaged if packaged.exists() else packaged.parents[2] / 'schemas' / SCHEMA_NAME

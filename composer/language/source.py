@@ -38,21 +38,30 @@ def read_document(path: Path, name: str | None = None) -> Document:
         name: How the file is called in findings; by default as `path` is written.
     """
     name = name or str(path)
+    content = read_content(path, name)
+    return (
+        _without_data(content)
+        if isinstance(content, Diagnostic)
+        else parse_document(content, name)
+    )
+
+
+def read_content(path: Path, name: str) -> bytes | Diagnostic:
+    """Return what is in a file, or why it cannot be read."""
     try:
         with path.open('rb') as file:
-            content = file.read(MAX_BYTES + 1)
+            return file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         return _unreadable(name, f'cannot read the file: {reason}')
-    return parse_document(content, name)
 
 
-def parse_document(content: bytes, name: str) -> Document:
-    """Read the text of a file: UTF-8, one YAML document, a mapping at its top."""
+def decode_content(content: bytes, name: str) -> str | Diagnostic:
+    """Return the text of a file, or why it has none: it is UTF-8, and not too large."""
     if len(content) > MAX_BYTES:
         return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
     try:
-        text = content.decode('utf-8-sig')
+        return content.decode('utf-8-sig')
     except UnicodeDecodeError as error:
         line = content.count(b'\n', 0, error.start) + 1
         return _unreadable(
@@ -60,6 +69,13 @@ def parse_document(content: bytes, name: str) -> Document:
             f'the file is not UTF-8: byte {content[error.start]:#04x} in line {line}',
             help='save the file as UTF-8',
         )
+
+
+def parse_document(content: bytes, name: str) -> Document:
+    """Read the text of a file: UTF-8, one YAML document, a mapping at its top."""
+    text = decode_content(content, name)
+    if isinstance(text, Diagnostic):
+        return _without_data(text)
     positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
     try:
         tree = compose_tree(text, positions.source)
@@ -69,7 +85,9 @@ def parse_document(content: bytes, name: str) -> Document:
     if isinstance(data, dict):
         return Document(data, positions, faults)
     if tree is None:
-        return _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
+        return _without_data(
+            _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
+        )
     top = Diagnostic(
         'wrong-type',
         'a file is a mapping with the keys version and nodes',
@@ -80,6 +98,9 @@ def parse_document(content: bytes, name: str) -> Document:
     return Document(None, positions, (*faults, top))
 
 
-def _unreadable(name: str, message: str, help: str | None = None) -> Document:  # noqa: A002
-    finding = Diagnostic('unreadable-file', message, name, help=help)
-    return Document(None, SourceMap(SourceFile(name, ())), (finding,))
+def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:  # noqa: A002
+    return Diagnostic('unreadable-file', message, name, help=help)
+
+
+def _without_data(finding: Diagnostic) -> Document:
+    return Document(None, SourceMap(SourceFile(finding.file, ())), (finding,))

@@ -21,7 +21,12 @@ OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
+ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
+
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
+DEFAULT_WAIT_SEC = 30.0
+DEFAULT_RESTART_DELAY_SEC = 1.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
@@ -212,6 +217,69 @@ class ActionClientSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class ConditionSpec:
+    """Something that must be there before a node or process starts.
+
+    Attributes:
+        kind: What sort of thing it is.
+        name: Its name as written; a relative one lies in the namespace of who waits.
+        timeout_sec: After this the start fails.
+    """
+
+    kind: ConditionKind
+    name: str
+    timeout_sec: float
+    path: DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSpec:
+    """A program that runs beside the nodes.
+
+    Attributes:
+        command: The program and its arguments; empty if it is an executable of a package.
+        arguments: Those of the executable.
+        node_name: The name of the node in it; `None` for the one that the program gives itself.
+        namespace: The namespace of the nodes in it; `None` if the program has none.
+        cwd: The folder it runs in; `None` for that of Composer.
+        required: Whether the system ends when it ends.
+        restart: When it is started again.
+        most_restarts: How many times; `None` for no end.
+        stop_signal: The signal that asks it to end.
+        stop_timeout_sec: After this it is killed; `None` for the system's own.
+    """
+
+    name: str
+    description: str
+    command: tuple[str, ...]
+    package: str | None
+    executable: str | None
+    arguments: tuple[str, ...]
+    node_name: str | None
+    namespace: str | None
+    parameters: Mapping[str, Any]
+    parameter_files: tuple[str, ...]
+    remap: tuple[tuple[str, str], ...]
+    log_level: LogLevel | None
+    env: Mapping[str, str]
+    cwd: str | None
+    required: bool
+    restart: RestartRule
+    restart_delay_sec: float
+    most_restarts: int | None
+    stop_signal: str
+    stop_timeout_sec: float | None
+    wait_for: tuple[ConditionSpec, ...]
+    path: DataPath
+
+    @property
+    def is_ros(self) -> bool:
+        """Whether it takes arguments for ROS: an executable of a package does."""
+        given = (self.node_name, self.namespace, self.parameters, self.parameter_files)
+        return self.package is not None or any((*given, self.remap, self.log_level))
+
+
+@dataclass(frozen=True, slots=True)
 class NodeSpec:
     """A node and all that it has.
 
@@ -223,6 +291,8 @@ class NodeSpec:
         logger_services: Whether others can read and set its loggers' levels.
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
+        wait_for: What must be there before it starts.
+        parameter_files: In ROS's own format; later ones win.
     """
 
     name: str
@@ -249,7 +319,14 @@ class NodeSpec:
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
+    wait_for: tuple[ConditionSpec, ...]
+    parameter_files: tuple[str, ...]
     path: DataPath
+
+    @property
+    def key(self) -> str:
+        """What the file calls it: its name, or its full name."""
+        return str(self.path[-1])
 
     @property
     def full_name(self) -> str:
@@ -287,6 +364,8 @@ class SystemSpec:
         qos: The named profiles of the file.
         threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
+        environment: Environment variables that are set before ROS starts.
+        nodes: By their keys in the file: the name, or the full name.
         diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
     """
 
@@ -296,5 +375,14 @@ class SystemSpec:
     qos: Mapping[str, QosSpec]
     threads: int | None
     shutdown_timeout_sec: float
+    environment: Mapping[str, str]
     diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]
+    processes: Mapping[str, ProcessSpec]
+
+    @property
+    def longest_stop_sec(self) -> float:
+        """What callbacks, and the processes after them, get to end when the system stops."""
+        own = self.shutdown_timeout_sec
+        given = [process.stop_timeout_sec for process in self.processes.values()]
+        return own + max((own if each is None else each for each in given), default=0.0)

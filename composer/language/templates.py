@@ -2,11 +2,13 @@
 
 A scalar that is one whole expression keeps the type of its value; in any other the values become
 text. Names that are not in scope are errors. Source: https://jinja.palletsprojects.com/en/3.1.x/.
+`here`, in scope everywhere, is the folder of the file that the expression stands in.
 """
 
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import (
@@ -21,7 +23,7 @@ from jinja2.exceptions import SecurityError
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
 from composer.language.filling import FilledDocument
 from composer.language.sandbox import Sandbox
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -38,34 +40,45 @@ _MOST_LINES_SEARCHED = 100
 _MAX_BITS = 1024
 
 
-def fill_templates(
-    data: dict[str, Any],
-    values: Mapping[str, Any],
-    positions: SourceMap,
-    samples: Collection[str] = (),
-) -> FilledDocument:
-    """Evaluate all expressions of a document.
+class Filler:
+    """Evaluates the expressions of one document.
 
     Args:
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
+        origins: Where the values come from, in words.
     """
-    filler = _Filler(values, positions, frozenset(samples))
-    filler.filled.data = filler.fill_mapping(data, ())
-    return filler.filled
 
-
-class _Filler:
     def __init__(
-        self, values: Mapping[str, Any], positions: SourceMap, samples: frozenset[str]
+        self,
+        values: Mapping[str, Any],
+        positions: SourceMap,
+        samples: Collection[str] = (),
+        origins: Mapping[str, str] | None = None,
+        filled: FilledDocument | None = None,
     ) -> None:
-        self.filled = FilledDocument({})
+        self.filled = filled or FilledDocument({})
+        self.positions = positions
+        self._origins = origins or {}
         self._values = values
-        self._positions = positions
-        self._samples = samples
+        self._samples = frozenset(samples)
         self._sandbox = Sandbox(undefined=StrictUndefined)
 
+    def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Filler:
+        """Return a filler with one more name in scope, for the same document."""
+        samples = self._samples | {name} if is_sample else self._samples - {name}
+        inner = Filler(
+            {**self._values, name: value},
+            self.positions,
+            samples,
+            {**self._origins, name: origin},
+            self.filled,
+        )
+        inner._sandbox = self._sandbox
+        return inner
+
     def fill(self, data: Any, path: DataPath) -> Any:
+        """Return data with the values of all expressions in place."""
         if isinstance(data, dict):
             return self.fill_mapping(data, path)
         if isinstance(data, list):
@@ -75,30 +88,41 @@ class _Filler:
         return data
 
     def fill_mapping(self, data: dict[str, Any], path: DataPath) -> dict[str, Any]:
+        """Return a mapping with the values of the expressions in its keys and values in place."""
         filled: dict[str, Any] = {}
         for written, value in data.items():
-            key = written
-            if _OPEN in written:
-                value_path = (*path, written)
-                key = str(_as_text(self._evaluate(written, value_path, is_key=True)))
+            key = self.fill_key((*path, written))
             if key != written and (key in data or key in filled):
-                self._report_duplicate(key, (*path, written), (*path, key))
+                self.report_duplicate(key, (*path, written), (*path, key))
                 continue
             if key != written:
-                self._positions.move((*path, written), (*path, key))
+                self.positions.move((*path, written), (*path, key))
             filled[key] = self.fill(value, (*path, key))
         return filled
 
+    def fill_key(self, path: DataPath) -> str:
+        """Return the key at the end of a path with the values of its expressions in place."""
+        written = str(path[-1])
+        if _OPEN not in written:
+            return written
+        return str(_as_text(self._evaluate(written, path, is_key=True)))
+
+    def is_sampled(self, path: DataPath) -> bool:
+        """Return whether the value at a path hangs on samples."""
+        return path in self.filled.sampled
+
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
-        span = self._positions.key(path) if is_key else self._positions.value(path)
+        span = self.positions.key(path) if is_key else self.positions.value(path)
         sampled = False
         try:
             expressions = list(_find_expressions(text, self._sandbox))
-            sampled = self._hangs_on_samples(text, expressions)
+            names = self._names_in(text, expressions)
+            self.filled.notes[path] = self._note(names)
+            sampled = not self._samples.isdisjoint(names)
             if sampled:
                 self.filled.sampled_spans.append(span)
                 self.filled.sampled += [] if is_key else [path]
-            return self._compute(text, expressions)
+            return self._compute(text, expressions, span)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
             self.filled.failed.append(path)
             # With the real value it may succeed.
@@ -106,34 +130,43 @@ class _Filler:
                 self.filled.faults.append(self._explain(error, span))
             return text
 
-    def _compute(self, text: str, expressions: list[slice]) -> Any:
+    def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
         first, last = expressions[0], expressions[-1]
         outside = text[: first.start], text[last.stop :]
         if first is last and not ''.join(outside).strip():
-            return self._value_of(text, first)
+            return self._value_of(text, first, span)
         parts = []
         start = 0
         for expression in expressions:
             parts.append(text[start : expression.start])
-            parts.append(str(_as_text(self._value_of(text, expression))))
+            parts.append(str(_as_text(self._value_of(text, expression, span))))
             start = expression.stop
         return ''.join([*parts, text[start:]])
 
-    def _value_of(self, text: str, expression: slice) -> Any:
-        return _as_data(self._sandbox.evaluate(_code(text, expression), self._values))
+    def _value_of(self, text: str, expression: slice, span: Span) -> Any:
+        scope = {'here': str(span.source.folder.resolve()), **self._values}
+        return _as_data(self._sandbox.evaluate(_code(text, expression), scope))
 
-    def _hangs_on_samples(self, text: str, expressions: list[slice]) -> bool:
-        return bool(self._samples) and any(
-            self._samples & self._sandbox.names_in(_code(text, expression))
-            for expression in expressions
-        )
+    def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
+        names: set[str] = set()
+        for expression in expressions:
+            # What is wrong with it is said when it is evaluated.
+            with suppress(TemplateError):
+                names |= self._sandbox.names_in(_code(text, expression))
+        return frozenset(names)
+
+    def _note(self, names: frozenset[str]) -> str:
+        used = sorted(names & self._origins.keys())
+        return ', '.join(f'{name} = {self._values[name]} ({self._origins[name]})' for name in used)
 
     def _explain(self, error: Exception, span: Span) -> Diagnostic:
         if isinstance(error, UndefinedError) and (
             found := _UNDEFINED_NAME.fullmatch(str(error.message))
         ):
             name = found.group(1)
-            help_text = did_you_mean(name, self._values, 'in scope are')
+            scope = {*self._values, 'here', *self._sandbox.globals}
+            declared = self._values or suggest(name, scope)
+            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
             return diagnostic_at(
                 _locate(name, span),
                 'undefined-name',
@@ -142,13 +175,14 @@ class _Filler:
             )
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
-    def _report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
+    def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
+        """Say that two keys of one mapping come out the same."""
         self.filled.faults.append(
             diagnostic_at(
-                self._positions.key(path),
+                self.positions.key(path),
                 'duplicate-key',
                 f"the key '{key}' stands twice in one mapping",
-                related=[Related('it stands here too', self._positions.key(other))],
+                related=[Related('it stands here too', self.positions.key(other))],
             )
         )
 

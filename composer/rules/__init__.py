@@ -14,8 +14,10 @@ from composer.rules.deadlock import DEADLOCK
 from composer.rules.definitions import DEFINITIONS
 from composer.rules.expressions import EXPRESSIONS
 from composer.rules.fields import FIELDS
+from composer.rules.includes import INCLUDES
 from composer.rules.names import NAMES
 from composer.rules.parameters import PARAMETERS
+from composer.rules.processes import PROCESSES
 from composer.rules.references import REFERENCES
 from composer.rules.structure import STRUCTURE
 from composer.rules.wiring import WIRING
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 FAMILIES: tuple[Family, ...] = (
     STRUCTURE,
     EXPRESSIONS,
+    INCLUDES,
     NAMES,
     REFERENCES,
     BEHAVIOURS,
@@ -33,6 +36,7 @@ FAMILIES: tuple[Family, ...] = (
     PARAMETERS,
     WIRING,
     DEADLOCK,
+    PROCESSES,
     DEFINITIONS,
     COMMENTS,
 )

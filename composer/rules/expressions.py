@@ -27,5 +27,20 @@ EXPRESSIONS = Family(
             'It has no value, so neither has the key.',
             _JINJA,
         ),
+        Rule(
+            'bad-foreach',
+            '`foreach:` is no mapping of variables to lists.',
+            'Nobody knows how often the entry is wanted.',
+        ),
+        Rule(
+            'bad-when',
+            '`when:` is neither true nor false.',
+            'What counts as true differs between languages; a comparison says what is meant.',
+        ),
+        Rule(
+            'too-many-entries',
+            '`foreach:` makes more entries than the file asks for.',
+            'A mistake in an expression would use up the machine.',
+        ),
     ),
 )

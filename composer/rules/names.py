@@ -18,6 +18,12 @@ NAMES = Family(
             _NAMES,
         ),
         Rule(
+            'duplicate-node',
+            'Two nodes have one full name.',
+            'Tools could not tell them apart, and their parameters and logs would be mixed up.',
+            'https://docs.ros.org/en/jazzy/Concepts/Basic/About-Nodes.html',
+        ),
+        Rule(
             'bad-remap',
             'A remapping rule renames what is not remapped, or has an unknown scheme.',
             'ROS refuses the rule, or it would be without effect.',

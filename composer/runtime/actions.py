@@ -170,7 +170,7 @@ class _Execution:
         behaviour = node.function(spec.behaviour)
         self._node = node
         self._queue = queue
-        self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
+        self._begin = node.bind(spec.behaviour)
         self._kind = kind_of(behaviour)
         self._result_class = action_class.Result
         self._feedback_class = action_class.Feedback

@@ -42,9 +42,9 @@ def create_entities(node: LiveNode) -> None:
         try:
             create(node)
         except ComposerError as error:
-            message = f"node '{node.spec.name}': {error}"
+            message = f"node '{node.spec.key}': {error}"
             raise StartError(message, help=error.help) from error
         except Exception as error:
             # rclpy and the middleware raise many kinds; none of them may leave half a system.
-            message = f"node '{node.spec.name}': {type(error).__name__}: {error}"
+            message = f"node '{node.spec.key}': {type(error).__name__}: {error}"
             raise StartError(message) from error

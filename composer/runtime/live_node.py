@@ -49,7 +49,7 @@ class SystemServices:
     Attributes:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
-        act_on_error: Takes a node's name and what to do after an error in it.
+        act_on_error: Takes a node's full name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
         executor: Runs the callbacks of all nodes.
         stop: Whether the system is to stop.
@@ -143,6 +143,10 @@ class LiveNode:
         """Return a behaviour as a function of its positional arguments."""
         return self.services.functions[behaviour.name]
 
+    def bind(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
+        """Return the function of a behaviour with the node and its constant arguments given."""
+        return partial(self.function(behaviour), self.face.for_entity(), **behaviour.arguments)
+
     def health(self, owner: str) -> EntityHealth | None:
         """Return the health of an entity in words, `None` if it is not measured."""
         board = self.services.health
@@ -189,7 +193,7 @@ class LiveNode:
             if health is not None:
                 health.note_error(error)
             self.errors.report(owner, place, error)
-            self.services.act_on_error(self.spec.name, own.on_error)
+            self.services.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
             owner,

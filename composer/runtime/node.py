@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
@@ -87,6 +88,9 @@ class Node:
         parameters: The values of its parameters, always those of now.
         state: What the behaviours of the node share; starts as the file's `state:`. Behaviours of
             one callback group never run at the same time, so it needs no lock.
+        own_state: What the behaviour of one timer, subscription, service or action keeps for
+            itself from call to call; empty at the start. Two uses of a behaviour in one node have
+            one each.
         ros: The rclpy node beneath, for what is not here.
     """
 
@@ -97,6 +101,7 @@ class Node:
         '_service_clients',
         '_shutdown',
         'name',
+        'own_state',
         'parameters',
         'ros',
         'state',
@@ -112,6 +117,7 @@ class Node:
         self.name: str = ros.get_name()
         self.ros = ros
         self.state = state
+        self.own_state: dict[str, Any] = {}
         self.parameters = Parameters(ros)
         self._publishers = publishers
         self._shutdown = shutdown
@@ -126,6 +132,12 @@ class Node:
         self._service_clients = service_clients
         self._action_clients = action_clients
         self._remote_parameters = remote_parameters
+
+    def for_entity(self) -> Node:
+        """Return the same node with an `own_state` of its own; for Composer itself."""
+        face = copy.copy(self)
+        face.own_state = {}
+        return face
 
     @property
     def logger(self) -> RcutilsLogger:

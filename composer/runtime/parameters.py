@@ -24,10 +24,9 @@ from composer.runtime.behaviours import kind_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rclpy.node import Node as RosNode
-
     from composer.language.specs import BehaviourSpec, ParameterSpec
     from composer.runtime.live_node import LiveNode
+    from composer.runtime.ros_node import ComposedRosNode
 
 _FLOAT_MAX = 1.7976931348623157e308
 _POLL_SEC = 0.001
@@ -37,7 +36,8 @@ def create_parameters(node: LiveNode) -> None:
     """Declare the node's parameters.
 
     Raises:
-        StartError: The command line gives one a value that its declaration refuses.
+        StartError: The command line or a parameter file gives one a value that its declaration
+            refuses.
     """
     refusing = partial(_refuse_unless_chosen, node.spec.parameters)
     node.ros.add_on_set_parameters_callback(refusing)
@@ -46,7 +46,7 @@ def create_parameters(node: LiveNode) -> None:
             _declare(node.ros, spec)
         except ParameterException as error:
             reason = str(error).removesuffix(f': {spec.name}')
-            message = f"parameter '{spec.name}' from the command line: {reason}"
+            message = f"parameter '{spec.name}' from {_origin(node.ros, spec.name)}: {reason}"
             raise StartError(message) from error
     if node.spec.on_parameters:
         # rclpy asks the callback first that was added last, and a behaviour need not hear of what
@@ -85,18 +85,28 @@ def create_descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     return descriptor
 
 
-def _declare(ros: RosNode, spec: ParameterSpec) -> None:
+def _origin(ros: ComposedRosNode, name: str) -> str:
+    entry = ros.from_files.get(name)
+    return str(entry.value_span) if entry else 'the command line'
+
+
+def _declare(ros: ComposedRosNode, spec: ParameterSpec) -> None:
     kind = Parameter.Type[(spec.type or '').upper()]
     descriptor = create_descriptor(spec)
-    if spec.value is None:
-        ros.declare_parameter(spec.name, kind, descriptor)
-    elif spec.value == []:
+    entry = ros.from_files.get(spec.name)
+    if entry is not None and entry.value == [] and not kind.name.endswith('_ARRAY'):
+        message = f"parameter '{spec.name}' from {entry.value_span}: {kind.name} is no list"
+        raise StartError(message)
+    if spec.value == [] or (entry is not None and entry.value == []):
         # To rclpy every empty list is one of bytes, so it is set when the type is known already.
+        # The empty list of a parameter file has no type, and would leave the parameter unset.
         declared = ros.declare_parameter(spec.name, kind)
         if declared.type_ is Parameter.Type.NOT_SET:
             ros.set_parameters([Parameter(spec.name, kind, [])])
         descriptor.type = kind.value
         ros.set_descriptor(spec.name, descriptor)
+    elif spec.value is None:
+        ros.declare_parameter(spec.name, kind, descriptor)
     elif kind is Parameter.Type.BYTE_ARRAY:
         ros.declare_parameter(spec.name, [bytes([item]) for item in spec.value], descriptor)
     else:

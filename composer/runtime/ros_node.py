@@ -25,28 +25,39 @@ So a node has
 - no logger services, which rclpy leaves out, too.
 
 The file turns each of them on or off.
+
+Parameter files are read by rcl itself. What `-p` of the command line says wins over them: rcl
+would let a value win that a file gives to this node by name, or one whose type comes first (see
+`composer.language.parameter_overrides`).
 """
 
 from __future__ import annotations
 
 import threading
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
+from composer.language.parameter_files import read_parameter_file
+from composer.language.parameter_overrides import find_overrides, parse_command_line
+from composer.language.paths import resolve_path
 from composer.runtime.logs import has_rosout_publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from rcl_interfaces.msg import ParameterEvent
     from rclpy.context import Context
     from rclpy.publisher import Publisher
 
+    from composer.language.parameter_files import ParameterEntry
     from composer.language.specs import NodeSpec
 
 _PARAMETER_EVENTS = '/parameter_events'
+_TYPE_DESCRIPTION = 'start_type_description_service'
 _POLL_SEC = 0.001
 
 
@@ -55,9 +66,15 @@ class ComposedRosNode(Node):
 
     Args:
         ros_arguments: The arguments after `--ros-args` of the command line.
+
+    Attributes:
+        from_files: What the node takes from its parameter files, by the parameters' names.
     """
 
     def __init__(self, spec: NodeSpec, context: Context, ros_arguments: Sequence[str]) -> None:
+        files = [str(resolve_path(text, Path())) for text in spec.parameter_files]
+        by_hand = parse_command_line(ros_arguments, spec.full_name) if files else {}
+        self.from_files = _read_files(files, spec.full_name, by_hand)
         self._late_events: _LatePublisher | None = None
         self._events_are_late = not (spec.parameter_services or spec.parameters)
         # Global arguments hold for every node of the process, where a __node rule would give all
@@ -66,7 +83,11 @@ class ComposedRosNode(Node):
             spec.name,
             context=context,
             namespace=spec.namespace,
-            cli_args=_node_arguments(spec, ros_arguments),
+            cli_args=_node_arguments(spec, files, self.from_files, ros_arguments),
+            parameter_overrides=[
+                Parameter(name, Parameter.Type[type_name.upper()], value)
+                for name, (value, type_name) in by_hand.items()
+            ],
             use_global_arguments=False,
             enable_rosout=spec.rosout,
             start_parameter_services=spec.parameter_services,
@@ -128,14 +149,29 @@ class _LatePublisher:
         self._publisher.publish(event)
 
 
-def _node_arguments(spec: NodeSpec, ros_arguments: Sequence[str]) -> list[str]:
+def _node_arguments(
+    spec: NodeSpec,
+    files: Sequence[str],
+    from_files: Mapping[str, ParameterEntry],
+    ros_arguments: Sequence[str],
+) -> list[str]:
     """Return the node's arguments: of remapping rules the first wins, of parameters the last."""
     arguments = ['--ros-args']
-    if spec.use_sim_time:
+    for file in files:
+        arguments += ['--params-file', file]
+    if spec.use_sim_time and 'use_sim_time' not in from_files:
         arguments += ['-p', 'use_sim_time:=true']
-    if not spec.type_description_service:
-        arguments += ['-p', 'start_type_description_service:=false']
+    if not spec.type_description_service and _TYPE_DESCRIPTION not in from_files:
+        arguments += ['-p', f'{_TYPE_DESCRIPTION}:=false']
     arguments += ros_arguments
     for old, new in spec.remap:
         arguments += ['-r', f'{old}:={new}']
     return arguments
+
+
+def _read_files(
+    files: Sequence[str], full_name: str, by_hand: Collection[str]
+) -> dict[str, ParameterEntry]:
+    read = [read_parameter_file(Path(file)) for file in files]
+    found = find_overrides(read, full_name)
+    return {name: entry for name, entry in found.items() if name not in by_hand}

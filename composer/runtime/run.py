@@ -46,12 +46,12 @@ def run_system(
         UsageError: The ROS arguments are wrong.
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
-        system = System(spec, positions, functions, ros_arguments)
+        system = System(spec, positions, functions, ros_arguments, log_level_requests)
         with _stopped_by_signals(system, spec):
             try:
                 system.start()
                 system.wait()
-                last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+                last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
                 code, ended = system.stop()
             except ComposerError as error:
                 if system.has_ended:
@@ -74,9 +74,10 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
         if system.stop_requested:
+            system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
-        last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+        last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
         for number in _SIGNALS:
             last_resort.let_kernel_act_after_next(number)
 

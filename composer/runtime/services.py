@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
@@ -34,8 +33,7 @@ def create_services(node: LiveNode) -> None:
 def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     service_class: Any = import_interface(spec.type)
     convert = converter_for(service_class.Response).convert
-    behaviour = node.function(spec.behaviour)
-    function = partial(behaviour, node.face, **spec.behaviour.arguments)
+    function = node.bind(spec.behaviour)
     owner = f"service '{spec.name}'"
     call = node.call(owner, spec.path, function, rules=spec, admits=node.gate.lets_requests)
     full_name = node.ros.resolve_service_name(spec.service)
@@ -50,10 +48,10 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
             return responses[0]
         if node.gate.serves:
             failures.note(full_name)
-        message = f'{owner} of {node.spec.name} has no response'
+        message = f'{owner} of {node.spec.key} has no response'
         raise NoResponseError(message)
 
-    if kind_of(behaviour) is FunctionKind.COROUTINE:
+    if kind_of(function) is FunctionKind.COROUTINE:
 
         async def serve_async(request: Any, _response: Any) -> Any:
             responses: list[Any] = []

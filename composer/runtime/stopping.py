@@ -127,7 +127,7 @@ def _wait_until_idle(node: LiveNode, deadline: float) -> bool:
         return True
     for call in node.ledger.running():
         system_logger.error(
-            f"node '{node.spec.name}': {call.owner} did not end in time; it is at\n"
+            f"node '{node.spec.key}': {call.owner} did not end in time; it is at\n"
             f'{call.format_stack()}'
         )
     return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
@@ -43,7 +42,7 @@ def create_subscriptions(node: LiveNode) -> None:
 def _create_function(node: LiveNode, spec: SubscriptionSpec) -> Callable[[Any], Any]:
     if spec.behaviour is None:
         return _pass_on
-    return partial(node.function(spec.behaviour), node.face, **spec.behaviour.arguments)
+    return node.bind(spec.behaviour)
 
 
 def _pass_on(message: Any) -> Any:

@@ -22,6 +22,8 @@ from composer.runtime.live_node import LiveNode, SystemServices, create_live_nod
 from composer.runtime.logs import system_logger
 from composer.runtime.matching import GraphWatch
 from composer.runtime.ownership import release, reserve
+from composer.runtime.processes import Processes
+from composer.runtime.readiness import Readiness, describe_parts, list_waiters
 from composer.runtime.stopping import stop_node, stop_nodes
 from composer.runtime.supervision import Supervisor
 from composer.runtime.system_executor import SystemExecutor
@@ -49,6 +51,7 @@ class System:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
+        log_levels: What the command line says of these, for foreign processes.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class System:
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str] = (),
+        log_levels: Sequence[str] = (),
     ) -> None:
         self._spec = spec
         self.has_ended = False
@@ -93,6 +97,13 @@ class System:
             health=None if spec.diagnostics_period_sec is None else HealthBoard(),
         )
         self._health_publisher: HealthPublisher | None = None
+        self._processes = Processes(
+            spec.processes.values(),
+            self._end,
+            spec.shutdown_timeout_sec,
+            ros_arguments,
+            log_levels,
+        )
 
     @property
     def stop_requested(self) -> bool:
@@ -110,10 +121,16 @@ class System:
         self._stop_signal.set()
         self._wake_ups.put(None)
 
+    def abandon(self) -> None:
+        """Kill all foreign processes; a signal handler may call it before it ends this one."""
+        self._processes.abandon()
+
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
-        Nodes that have begun hear their `on_stop` if a later one cannot.
+        Foreign processes come before any `on_start`; what waits for something comes after all
+        that does not, whose behaviours run by then. Nodes that have begun hear their `on_stop`
+        if a later one cannot.
 
         Raises:
             StartError: One of them failed; all has been torn down again.
@@ -128,20 +145,18 @@ class System:
             self._watch.start()
             self._graph_watch.start()
             for node in self._nodes.values():
-                node.gate.serves = node.spec.on_start is None
+                node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
-            for node in list(self._nodes.values()):
-                self._run_on_start(node)
+            prompt = self._start_all()
         except BaseException:
             self.stop()
             raise
         if self.stop_requested:
             return
-        count = len(self._nodes)
-        nodes = '1 node' if count == 1 else f'{count} nodes'
         elapsed = time.monotonic() - self._begun
-        system_logger.info(f'{self._spec.name}: {nodes} ready in {elapsed:.2f} s')
-        self._open(list(self._nodes.values()))
+        parts = describe_parts(self._nodes, self._processes.by_name)
+        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        self._open(prompt)
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -160,6 +175,9 @@ class System:
         self._supervisor.stop()
         with self._rebuilding:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+        # An `on_stop` may have needed them.
+        if not self._processes.stop() and self._exit_code == ExitCode.DONE:
+            self._exit_code = ExitCode.FAILED
         if not ended and self._exit_code == ExitCode.DONE:
             self._exit_code = ExitCode.FAILED
         for node in self._nodes.values():
@@ -169,13 +187,41 @@ class System:
         self.has_ended = ended
         return self._exit_code, ended
 
+    def _start_all(self) -> list[LiveNode]:
+        """Start all processes and nodes; return those nodes whose gates are yet to be opened."""
+        for process in self._processes.by_name.values():
+            if not (process.spec.wait_for or self.stop_requested):
+                self._processes.start(process)
+        prompt = [node for node in self._nodes.values() if not node.spec.wait_for]
+        for node in prompt:
+            self._run_on_start(node)
+        waiters = list_waiters(self._nodes, self._processes, self._start_late)
+        if not waiters or self.stop_requested:
+            return prompt
+        self._open(prompt)
+        readiness = Readiness(
+            self._context, self._nodes, self._processes.by_name, self._services.positions
+        )
+        readiness.start_all(waiters, self._stop_signal)
+        return []
+
+    def _start_late(self, node: LiveNode) -> None:
+        self._run_on_start(node)
+        if not self.stop_requested:
+            self._open([node])
+
+    def _end(self, code: int) -> None:
+        """End the system because of a process, unless it ends already."""
+        if not self.stop_requested:
+            self.request_stop(code)
+
     def _create(self, spec: NodeSpec) -> LiveNode:
         try:
             node = create_live_node(spec, self._services)
         except Exception as error:
-            message = f"node '{spec.name}' cannot be created: {error}"
+            message = f"node '{spec.key}' cannot be created: {error}"
             raise StartError(message) from error
-        self._nodes[spec.name] = node
+        self._nodes[spec.full_name] = node
         create_entities(node)
         return node
 
@@ -196,7 +242,7 @@ class System:
         if failures:
             # What has not begun has nothing to stop.
             node.has_begun = False
-            message = f"node '{node.spec.name}': on_start raised {represent(failures[0])}"
+            message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]
         node.gate.serves = not self.stop_requested
         self._executor.wake()
@@ -210,10 +256,11 @@ class System:
                     timer.reset()
         self._executor.wake()
 
-    def _restart(self, name: str) -> None:
+    def _restart(self, full_name: str) -> None:
         """Rebuild a node: its entities, parameters and state are as at the start again."""
         with self._rebuilding:
-            old = self._nodes[name]
+            old = self._nodes[full_name]
+            name = old.spec.key
             if self.stop_requested:
                 return
             timeout_sec = self._spec.shutdown_timeout_sec
@@ -238,7 +285,7 @@ class System:
                 self._run_on_start(node)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
-                self._supervisor.act(name, 'restart')
+                self._supervisor.act(full_name, 'restart')
                 return
             self._open([node])
         system_logger.warn(f"node '{name}' was restarted")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
@@ -73,7 +72,7 @@ class _Ticker:
             self.function: Callable[[], Any] = lambda: message
             return
         behaviour = node.function(spec.behaviour)
-        self._begin = partial(behaviour, node.face, **spec.behaviour.arguments)
+        self._begin = node.bind(spec.behaviour)
         kind = kind_of(behaviour)
         self._node, self._spec = node, spec
         self._generator: Generator[Any, Any, Any] | None = None

@@ -57,7 +57,10 @@ def test_a_right_file_has_no_faults():
     ('text', 'fault'),
     [
         ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', None)),
-        ('version: 1', ('missing-key', "the key 'nodes' is missing", '1:1', None)),
+        (
+            'version: 1',
+            ('missing-key', "'nodes' or 'processes' or 'include' is missing", '1:1', None),
+        ),
         (
             'version: 2\nnodes: {}',
             (

@@ -137,8 +137,11 @@ def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
 
 def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
     helps = [each.help for each in load('{x: "{{ nmae }}", y: "{{ zzz }}"}').diagnostics]
-    assert helps == ["did you mean 'name'?", 'in scope are: count, loud, name, rate']
-    (finding,) = load_system_text('version: 1\nnodes: {}\nx-a: "{{ a }}"').diagnostics
+    assert helps == [
+        "did you mean 'name'?",
+        'in scope are: count, env, find, here, loud, name, range, rate',
+    ]
+    (finding,) = load_system_text('version: 1\nnodes: {}\ndescription: "{{ a }}"').diagnostics
     assert finding.help == "declare it as an argument, under 'args'"
 
 

@@ -1,0 +1,151 @@
+"""What stands between two topics: relay, throttle, drop, mux and transform, for any message type.
+
+Bind them to subscriptions that `publish:`. They do what ROS's `topic_tools` do, in the process of
+the nodes around them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import StrictUndefined
+
+from composer.errors import ComposerError
+from composer.language.bounds import Budget
+from composer.language.sandbox import Sandbox
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer import Node
+
+
+class TransformError(ComposerError):
+    """An expression of `transform` has no value for a message."""
+
+
+def relay(_node: Node, message: Any) -> Any:
+    """Pass every message on, as a subscription with `publish:` and no behaviour does by itself.
+
+    ```yaml
+    subscriptions:
+      scan: {type: sensor_msgs/msg/LaserScan, behaviour: behaviours.topics:relay, publish: copy}
+    ```
+    """
+    return message
+
+
+def throttle(node: Node, message: Any, rate: float) -> Any | None:
+    """Pass on at most `rate` messages a second of the node's clock.
+
+    ```yaml
+    subscriptions:
+      scan:
+        type: sensor_msgs/msg/LaserScan
+        behaviour: behaviours.topics:throttle
+        with: {rate: 5.0}
+        publish: slow_scan
+    ```
+    """
+    period_ns = 1e9 / rate
+    now_ns = node.now().nanoseconds
+    due_ns = node.own_state.get('due_ns', now_ns)
+    # Simulated time may begin again.
+    if now_ns < due_ns <= now_ns + period_ns:
+        return None
+    # Counted from when it was due, or 10 messages a second would make 2.5 of `rate: 3`.
+    is_late = not due_ns <= now_ns < due_ns + period_ns
+    node.own_state['due_ns'] = (now_ns if is_late else due_ns) + period_ns
+    return message
+
+
+def drop(node: Node, message: Any, count: int, of: int) -> Any | None:
+    """Drop the first `count` of every `of` messages, and pass on the others.
+
+    ```yaml
+    subscriptions:
+      image:
+        type: sensor_msgs/msg/Image
+        qos: sensor_data
+        behaviour: behaviours.topics:drop
+        with: {count: 2, of: 3}
+        publish: third_image
+    ```
+    """
+    heard = node.own_state.get('heard', 0)
+    node.own_state['heard'] = heard + 1
+    return message if heard % of >= count else None
+
+
+def mux(node: Node, message: Any, source: str) -> Any | None:
+    """Pass messages on while the node's parameter `selected` names their source.
+
+    `ros2 param set` selects another one while they run.
+
+    ```yaml
+    parameters:
+      selected: {default: autopilot, choices: [autopilot, joystick]}
+    publishers:
+      cmd_vel: geometry_msgs/msg/Twist
+    subscriptions:
+      autopilot/cmd_vel:
+        type: geometry_msgs/msg/Twist
+        behaviour: behaviours.topics:mux
+        with: {source: autopilot}
+        publish: cmd_vel
+      joystick/cmd_vel:
+        type: geometry_msgs/msg/Twist
+        behaviour: behaviours.topics:mux
+        with: {source: joystick}
+        publish: cmd_vel
+    ```
+    """
+    return message if node.parameters.selected == source else None
+
+
+def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, Any]:
+    """Make a message of another type, each field of it from an expression.
+
+    The expressions are those of the language, without its braces: in scope are the fields of the
+    message that is heard, and the message itself as `message`. Fields that are not named keep
+    their defaults.
+
+    ```yaml
+    subscriptions:
+      speed:
+        type: std_msgs/msg/Float64
+        behaviour: behaviours.topics:transform
+        with:
+          fields:
+            header.frame_id: "'base_link'"
+            twist.linear.x: data / 3.6
+        publish: velocity
+    ```
+
+    Raises:
+        TransformError: An expression is none, or has no value.
+    """
+    sandbox = node.own_state.setdefault('sandbox', Sandbox(undefined=StrictUndefined))
+    # What may be done is bounded for each message.
+    sandbox.budget = Budget()
+    scope = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
+    payload: dict[str, Any] = {}
+    for path, expression in fields.items():
+        *outer, last = path.split('.')
+        inner = payload
+        for name in outer:
+            inner = inner.setdefault(name, {})
+        inner[last] = _evaluate(sandbox, expression, {'message': message} | scope, path)
+    return payload
+
+
+def _evaluate(sandbox: Sandbox, expression: str, scope: Mapping[str, Any], path: str) -> Any:
+    try:
+        value = sandbox.evaluate(str(expression), scope)
+        if isinstance(value, StrictUndefined):
+            # Any use of it says which name there is not.
+            str(value)
+    except Exception as error:
+        message = f"'{path}' has no value by '{expression}': {error}"
+        raise TransformError(message, help=f'in scope are {", ".join(scope)}') from error
+    return value

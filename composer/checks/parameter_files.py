@@ -1,0 +1,260 @@
+"""ROS's own parameter files against the nodes that use them.
+
+ROS ignores in silence what matches no node and what no node declares, and it ends a node when a
+value does not suit its declaration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer.ament import list_packages
+from composer.checks.parameters import OF_EVERY_NODE, find_refusal
+from composer.diagnostics import Related, Severity, diagnostic_at
+from composer.language.parameter_files import read_parameter_file
+from composer.language.parameter_overrides import find_overrides
+from composer.language.parameter_patterns import matches_pattern
+from composer.language.paths import PathError, resolve_path
+from composer.language.specs import NodeSpec
+from composer.names import did_you_mean, join_names, with_article
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.parameter_files import ParameterEntry, ParameterFile
+    from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
+
+
+@dataclass(frozen=True, slots=True)
+class _User:
+    """A node or process with the parameter files that it uses.
+
+    Attributes:
+        full_name: `None` if nobody knows how its nodes are called.
+        files: Those that could be found, the first to be read first.
+        node: `None` if it is a process: nobody knows what that declares.
+        overrides: What its files give it, by the parameters' names.
+        is_run: Whether it is part of the system, and not left out by its `when`.
+    """
+
+    full_name: str | None
+    files: tuple[str, ...]
+    node: NodeSpec | None
+    overrides: dict[str, ParameterEntry]
+    is_run: bool
+
+    def may_take(self, entry: ParameterEntry) -> bool:
+        return self.full_name is not None and matches_pattern(entry.pattern, self.full_name)
+
+
+def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check each parameter file once, for all who use it."""
+    library = _Library(context)
+    users = [*_find_users(library, context.spec, is_run=True)]
+    findings = [*library.findings]
+    if context.system.unused is not None:
+        users += _find_users(library, context.system.unused, is_run=False)
+    yield from findings
+    for path, file in library.files.items():
+        of_file = [user for user in users if path in user.files]
+        if all(user.full_name is not None for user in of_file):
+            yield from _check_names(file, of_file)
+            yield from _check_entries(context, path, file, of_file)
+    yield from _check_values(context, users)
+
+
+class _Library:
+    """The parameter files of a system, each read once."""
+
+    def __init__(self, context: CheckContext) -> None:
+        self.files: dict[str, ParameterFile] = {}
+        self.findings: list[Diagnostic] = []
+        self._context = context
+        self._knows_packages = bool(list_packages())
+
+    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
+        """Read the files of a node or process, and yield those that are there."""
+        for index, text in enumerate(owner.parameter_files):
+            at = (*owner.path, 'parameter_files', index)
+            try:
+                path = str(resolve_path(text, Path()))
+            except PathError as error:
+                if self._knows_packages:
+                    self.findings.append(
+                        self._context.at_value(at, 'unknown-package', str(error), help=error.help)
+                    )
+                continue
+            if path not in self.files:
+                self.files[path] = read_parameter_file(Path(path))
+                self.findings += [each for each in self.files[path].faults if each.span]
+            unreadable = [each for each in self.files[path].faults if each.span is None]
+            self.findings += [
+                self._context.at_value(at, each.rule, f'{path}: {each.message}', help=each.help)
+                for each in unreadable
+            ]
+            if not unreadable:
+                yield path
+
+
+def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
+    owners: list[NodeSpec | ProcessSpec] = [*system.nodes.values(), *system.processes.values()]
+    for owner in owners:
+        files = tuple(library.read(owner))
+        if not files:
+            continue
+        name = _full_name(owner)
+        read = [library.files[path] for path in files]
+        overrides = find_overrides(read, name) if name else {}
+        node = owner if isinstance(owner, NodeSpec) else None
+        yield _User(name, files, node, overrides, is_run)
+
+
+def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
+    if isinstance(owner, NodeSpec):
+        return owner.full_name
+    if owner.node_name is None or owner.namespace is None:
+        return None
+    return join_names(owner.namespace, owner.node_name)
+
+
+def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:
+    names = [user.full_name for user in users if user.full_name]
+    for pattern, span in file.patterns:
+        if not any(matches_pattern(pattern, name) for name in names):
+            yield diagnostic_at(
+                span,
+                'unmatched-node-name',
+                f"'{pattern}' is the name of no node that uses this file, and ROS ignores it",
+                help=did_you_mean(pattern, names, 'it is used by'),
+                severity=Severity.WARNING,
+            )
+
+
+def _check_entries(
+    context: CheckContext, path: str, file: ParameterFile, users: list[_User]
+) -> Iterator[Diagnostic]:
+    for entry in file.entries:
+        takers = [user for user in users if user.may_take(entry)]
+        if not takers:
+            continue
+        declaring = [user for user in takers if _may_declare(context, user, entry.name)]
+        if not declaring:
+            yield _explain_undeclared(entry, takers)
+        elif finding := _find_overridden(path, entry, declaring):
+            yield finding
+
+
+def _may_declare(context: CheckContext, user: _User, name: str) -> bool:
+    node = user.node
+    if node is None or name in node.parameters or name in OF_EVERY_NODE:
+        return True
+    section = (*node.path, 'parameters')
+    return any(context.was_dropped(path) for path in ((*section, name), section))
+
+
+def _explain_undeclared(entry: ParameterEntry, takers: list[_User]) -> Diagnostic:
+    declared = {name for user in takers if user.node for name in user.node.parameters}
+    names = sorted({str(user.full_name) for user in takers})
+    who = f"node '{names[0]}'" if len(names) == 1 else f'none of {len(names)} nodes'
+    negation = 'no' if len(names) == 1 else 'a'
+    return diagnostic_at(
+        entry.key_span,
+        'undeclared-parameter',
+        f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
+        help=did_you_mean(entry.name, declared, 'declared are')
+        or "declare it under 'parameters:' of the node",
+        severity=Severity.WARNING,
+    )
+
+
+def _find_overridden(
+    path: str, entry: ParameterEntry, takers: Iterable[_User]
+) -> Diagnostic | None:
+    """Return a finding if nobody takes a value, and what replaces it is no reason to expect so."""
+    lost_to: ParameterEntry | None = None
+    for user in takers:
+        winner = user.overrides.get(entry.name)
+        if winner is None or winner is entry or _is_expected(user, path, entry, winner):
+            return None
+        lost_to = lost_to or winner
+    if lost_to is None:
+        return None
+    return diagnostic_at(
+        entry.key_span,
+        'overridden-parameter',
+        f"'{entry.name}' never has this value: that of {lost_to.value_span.place} wins",
+        help=_help_for_overridden(entry, lost_to),
+        severity=Severity.WARNING,
+        related=[Related('this one wins', lost_to.value_span)],
+    )
+
+
+def _is_expected(user: _User, path: str, entry: ParameterEntry, winner: ParameterEntry) -> bool:
+    """Return whether people mean a value to win: that of a later file, or of a special name."""
+    later = user.files[user.files.index(path) + 1 :]
+    if winner.value_span.source.name in later:
+        return True
+    return winner.pattern != entry.pattern and ('*' in entry.pattern or '*' not in winner.pattern)
+
+
+def _help_for_overridden(entry: ParameterEntry, winner: ParameterEntry) -> str:
+    if entry.pattern != winner.pattern:
+        return 'the last name that matches a node wins: write wildcards above'
+    if entry.type != winner.type:
+        return 'of two types ROS takes one, whichever comes first: give both the same type'
+    return 'remove one of them'
+
+
+def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Diagnostic]:
+    """Yield what the declarations refuse, once for nodes that share declaration and value."""
+    seen: set[tuple[int, str]] = set()
+    for user in users:
+        if user.node is None or not user.is_run:
+            continue
+        for name, entry in user.overrides.items():
+            fault, help_text = _find_fault(user.node.parameters.get(name), entry)
+            if fault is None or (id(entry), fault) in seen:
+                continue
+            seen.add((id(entry), fault))
+            declared = user.node.parameters.get(name)
+            yield diagnostic_at(
+                entry.value_span,
+                'refused-parameter',
+                f"parameter '{name}' of node '{user.full_name}': {fault}",
+                help=help_text,
+                related=[context.related(declared.path, 'declared here')] if declared else [],
+            )
+
+
+def _find_fault(
+    declared: ParameterSpec | None, entry: ParameterEntry
+) -> tuple[str | None, str | None]:
+    """Return why a node would refuse a value, and what to do about it."""
+    if declared is None:
+        wanted: str | None = 'bool' if entry.name in OF_EVERY_NODE else None
+    else:
+        wanted = declared.type
+    if wanted is None or (entry.value == [] and wanted.endswith('_array')):
+        return None, None
+    if wanted == 'byte_array':
+        return 'a parameter file has no bytes', "give them under 'parameters:' of the node"
+    if entry.type != wanted:
+        got = with_article(entry.type) if entry.type else 'an empty list'
+        fault = f'expected {with_article(wanted)}, and ROS takes this for {got}'
+        return fault, _help_for(wanted, entry)
+    refusal = find_refusal(declared, entry.value) if declared else None
+    return refusal, None
+
+
+def _help_for(wanted: str, entry: ParameterEntry) -> str | None:
+    if (wanted, entry.type) == ('double', 'integer'):
+        return f'write {float(entry.value)}'
+    if wanted == 'double_array' and entry.type == 'integer_array':
+        return f'write {[float(item) for item in entry.value]}'
+    if wanted == 'string' and entry.type in ('integer', 'double', 'bool'):
+        return f"put it in quotes: '{entry.value_span.text}'"
+    return None

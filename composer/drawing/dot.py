@@ -1,0 +1,117 @@
+"""A picture in the language of Graphviz.
+
+Source: https://graphviz.org/doc/info/lang.html, https://graphviz.org/doc/info/shapes.html#html
+"""
+
+from __future__ import annotations
+
+import html
+from itertools import count
+from typing import TYPE_CHECKING
+
+from composer.drawing.plan import plan_picture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.drawing.picture import Picture
+    from composer.drawing.plan import Line, Region, Shape
+
+_FONT = 'Helvetica,Arial,sans-serif'
+_SHAPES = {
+    'node': 'shape=ellipse, style=filled, fillcolor="#ddf4ff", color="#0969da"',
+    'process': 'shape=component, style=filled, fillcolor="#eaeef2", color="#57606a"',
+    'topic': 'shape=box, style="rounded,filled", fillcolor="#f6f8fa", color="#8c959f"',
+    'service': 'shape=hexagon, style=filled, fillcolor="#fbefff", color="#8250df"',
+    'action': 'shape=octagon, style=filled, fillcolor="#dafbe1", color="#1a7f37"',
+    'external': 'shape=ellipse, style=dashed, color="#8c959f", fontcolor="#57606a"',
+}
+_LINES = {
+    'topic': 'color="#57606a"',
+    'service': 'color="#8250df"',
+    'action': 'color="#1a7f37"',
+    'external': 'color="#8c959f", style=dashed',
+    'wait': 'color="#8c959f", style=dotted',
+}
+_MARKS = {
+    'error': 'color="#d1242f", penwidth=2.5',
+    'warning': 'color="#bf8700", penwidth=2.5',
+}
+_MARK_COLOURS = {'error': '#d1242f', 'warning': '#9a6700'}
+_SMALL, _GREY = 9, '#57606a'
+
+
+def render_picture(picture: Picture) -> str:
+    """Return a picture as a directed graph; each element has an `id` and a `class` for SVG."""
+    plan = plan_picture(picture)
+    numbers = count()
+    lines = [
+        f'digraph {_quote(picture.name)} {{',
+        f'  graph [rankdir=LR, ranksep=0.7, nodesep=0.2, fontname="{_FONT}", fontsize=11]',
+        f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
+        f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
+        *_region(plan.root, 1, numbers),
+        *(f'  {_line(line)}' for line in plan.lines),
+        '}',
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
+    indent = '  ' * depth
+    for shape in region.shapes:
+        yield f'{indent}{_shape(shape)}'
+    for inner in region.inner.values():
+        number = next(numbers)
+        yield f'{indent}subgraph cluster_{number} {{'
+        yield (
+            f'{indent}  graph [label=<{_text(inner.title)}>, id="g{number}", '
+            f'class="namespace", labeljust=l, style="rounded,dashed", color="#8c959f"]'
+        )
+        yield from _region(inner, depth + 1, numbers)
+        yield f'{indent}}}'
+
+
+def _shape(shape: Shape) -> str:
+    label = ''.join(
+        _label((f'<B>{_text(shape.title)}</B>',), shape.details, shape.remarks, shape.mark)
+    )
+    look = ', '.join(filter(None, [_SHAPES[shape.kind], _MARKS.get(shape.mark)]))
+    return (
+        f'{shape.token} [label=<{label}>, {look}, {_hooks(shape.token, shape.kind, shape.mark)}]'
+    )
+
+
+def _line(line: Line) -> str:
+    label = _label((), line.details, line.remarks, line.mark)
+    look = ', '.join(filter(None, [_LINES[line.kind], _MARKS.get(line.mark)]))
+    text = f'label=<{label}>, ' if label else ''
+    return f'{line.start} -> {line.end} [{text}{look}, {_hooks(line.token, line.kind, line.mark)}]'
+
+
+def _hooks(token: str, kind: str, mark: str) -> str:
+    return f'id="{token}", class="{" ".join(filter(None, [kind, mark]))}"'
+
+
+def _label(
+    titles: tuple[str, ...], details: tuple[str, ...], remarks: tuple[str, ...], mark: str
+) -> str:
+    lines = [*titles]
+    lines += [_font(line, _GREY) for line in details]
+    lines += [_font(line, _MARK_COLOURS.get(mark, _GREY)) for line in remarks]
+    return '<BR/>'.join(lines)
+
+
+def _font(line: str, colour: str) -> str:
+    return f'<FONT POINT-SIZE="{_SMALL}" COLOR="{colour}">{_text(line)}</FONT>'
+
+
+def _text(text: str) -> str:
+    # A backslash begins an escape in these labels, too.
+    text = text.replace('\\', '\\\\')
+    return html.escape(text)
+
+
+def _quote(text: str) -> str:
+    escaped = text.replace('\\', '\\\\').replace('"', '\\"').replace('\n', ' ')
+    return f'"{escaped}"'

@@ -1,0 +1,91 @@
+"""The lines in which a part of a system was written."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from composer.reports.report import relative_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from composer.diagnostics import SourceFile, Span
+    from composer.language.positions import DataPath, SourceMap
+
+# Of `nodes: {<name>: …}`; all that is asked for lies below such an entry.
+_BOX = 2
+_MOST_EXCERPTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Excerpt:
+    """Lines that stand together in a file.
+
+    Attributes:
+        file: As reports show it; for a `--set`, that.
+        first: The number of the first line, counted from 1.
+    """
+
+    file: str
+    first: int
+    lines: tuple[str, ...]
+
+
+class Excerpts:
+    """Finds the lines of entries."""
+
+    def __init__(self, positions: SourceMap) -> None:
+        self._positions = positions
+        self._spans: dict[DataPath, list[tuple[DataPath, Span]]] = defaultdict(list)
+        for path, span in positions.values.items():
+            self._spans[path[:_BOX]].append((path, span))
+
+    def of(self, path: DataPath) -> list[Excerpt]:
+        """Return the lines of an entry: where its key stands, then what other places add to it."""
+        key = self._positions.key(path)
+        spans = [span for at, span in self._spans[path[:_BOX]] if at[: len(path)] == path]
+        last = _last_line(key, spans)
+        found = [_excerpt(key.source, range(key.line, last + 1))]
+        elsewhere: dict[SourceFile, set[int]] = defaultdict(set)
+        for span in spans:
+            if span.source is not key.source or not key.line <= span.line <= last:
+                elsewhere[span.source].add(span.line)
+        for source, numbers in elsewhere.items():
+            found += [_excerpt(source, run) for run in _runs(sorted(numbers))]
+        return found[:_MOST_EXCERPTS]
+
+
+def _last_line(key: Span, spans: Iterable[Span]) -> int:
+    """Return the line in which an entry ends: all that is indented below its key belongs to it."""
+    lines = key.source.lines
+    if lines and key.source.line(key.line)[: key.column - 1].strip(' -?'):
+        # It stands within brackets, where indentation means nothing.
+        below = [span.line for span in spans if span.source is key.source]
+        return max([key.line, *below])
+    last = number = key.line
+    while number < len(lines):
+        text = key.source.line(number + 1)
+        if text.strip() and len(text) - len(text.lstrip(' ')) < key.column:
+            break
+        number += 1
+        last = number if text.strip() else last
+    return last
+
+
+def _runs(numbers: Iterable[int]) -> Iterator[range]:
+    start = end = 0
+    for number in numbers:
+        if number != end:
+            if start:
+                yield range(start, end)
+            start = number
+        end = number + 1
+    if start:
+        yield range(start, end)
+
+
+def _excerpt(source: SourceFile, numbers: range) -> Excerpt:
+    name = relative_path(source.name) if source.home is None else source.name
+    return Excerpt(name, numbers.start, tuple(map(source.line, numbers)))

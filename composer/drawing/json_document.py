@@ -1,0 +1,132 @@
+"""A picture as one JSON document, for other programs.
+
+```
+{
+  "version": 1,                what follows; it grows when a key is removed or changes its meaning
+  "name", "description",       of the system
+  "nodes": [                   nodes, and processes that are not Composer's own
+    {"id": "node:/robot/arm", "kind": "node" | "process", "name", "namespace", "description",
+     "findings": [0], "file", "line"}],
+  "channels": [                topics, services, actions
+    {"id": "topic:/robot/scan", "kind": "topic" | "service" | "action", "name",
+     "types": ["sensor_msgs/msg/LaserScan"],
+     "external": ["providers" | "users"],   who is in no file: publishers and servers, or
+                                            subscriptions and clients
+     "findings", "file", "line"}],
+  "edges": [                   an end each
+    {"id": "publisher:/robot/arm:scan", "role": "publisher" | "subscription" | "service server" |
+     "service client" | "action server" | "action client", "name", "node": <id>, "channel": <id>,
+     "from": <id>, "to": <id>,              as messages, requests and goals go
+     "type", "qos": {"depth": 5},           what differs from the default; durations in seconds
+     "findings", "file", "line"}],
+  "waits": [{"node": <id>, "for": <id>, "file", "line"}],
+  "findings": [                those of `composer check`; above they are indices into this list
+    {"rule", "severity": "error" | "warning", "message", "help", "file", "line", "column"}]
+}
+```
+
+Everything is in the order of the files. `file` is relative to the working folder if it lies in
+it; `line` and `column` count from 1, and are null where a finding has none.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from composer.reports.report import relative_path
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic, Span
+    from composer.drawing.picture import Box, Edge, Hub, Picture
+    from composer.language.positions import DataPath
+
+_VERSION = 1
+
+
+def render_picture(picture: Picture) -> str:
+    """Return a picture as one JSON document."""
+    return json.dumps(describe_picture(picture), indent=2) + '\n'
+
+
+def describe_picture(picture: Picture) -> dict[str, Any]:
+    """Return a picture as plain data, of the form that this module's docstring gives."""
+    return {
+        'version': _VERSION,
+        'name': picture.name,
+        'description': picture.description,
+        'nodes': [_box(picture, box) for box in picture.boxes],
+        'channels': [_hub(picture, hub) for hub in picture.hubs],
+        'edges': [_edge(picture, edge) for edge in picture.edges],
+        'waits': [
+            {'node': wait.box, 'for': wait.target, **_place_of(picture, wait.path)}
+            for wait in picture.waits
+        ],
+        'findings': [describe_finding(finding) for finding in picture.findings],
+    }
+
+
+def _box(picture: Picture, box: Box) -> dict[str, Any]:
+    return {
+        'id': box.id,
+        'kind': box.kind,
+        'name': box.name,
+        'namespace': box.namespace,
+        'description': box.description,
+        'findings': list(box.findings),
+        **_place_of(picture, box.path),
+    }
+
+
+def _hub(picture: Picture, hub: Hub) -> dict[str, Any]:
+    return {
+        'id': hub.id,
+        'kind': hub.kind,
+        'name': hub.name,
+        'types': list(hub.types),
+        'external': list(hub.external),
+        'findings': list(hub.findings),
+        **_place_of(picture, hub.path),
+    }
+
+
+def _edge(picture: Picture, edge: Edge) -> dict[str, Any]:
+    start, end = edge.ends
+    return {
+        'id': edge.id,
+        'role': edge.role,
+        'name': edge.name,
+        'node': edge.box,
+        'channel': edge.hub,
+        'from': start,
+        'to': end,
+        'type': edge.type,
+        'qos': dict(edge.qos),
+        'findings': list(edge.findings),
+        **_place_of(picture, edge.path),
+    }
+
+
+def describe_finding(finding: Diagnostic) -> dict[str, Any]:
+    """Return a finding as plain data."""
+    span = finding.span
+    return {
+        'rule': finding.rule,
+        'severity': finding.severity.value,
+        'message': finding.message,
+        'help': finding.help,
+        'file': relative_path(finding.file),
+        'line': span.line if span else None,
+        'column': span.column if span else None,
+    }
+
+
+def _place_of(picture: Picture, path: DataPath) -> dict[str, Any]:
+    return _place(picture.positions.key(path))
+
+
+def _place(span: Span) -> dict[str, Any]:
+    # What a --set says lies in no file.
+    is_file = span.source.home is None
+    name = relative_path(span.source.name) if is_file else span.source.name
+    return {'file': name, 'line': span.line}

@@ -1,0 +1,81 @@
+"""A picture as a mermaid flowchart, which GitHub, GitLab and many editors draw.
+
+Source: https://mermaid.js.org/syntax/flowchart.html
+"""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import TYPE_CHECKING
+
+from composer.drawing.plan import plan_picture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.drawing.picture import Picture
+    from composer.drawing.plan import Line, Region, Shape
+
+_SHAPES = {
+    'node': ('([', '])'),
+    'process': ('[/', '/]'),
+    'topic': ('[', ']'),
+    'service': ('{{', '}}'),
+    'action': ('[[', ']]'),
+    'external': ('((', '))'),
+}
+_ARROWS = {'topic': '-->', 'service': '-->', 'action': '==>', 'external': '-.->', 'wait': '-.->'}
+_CLASSES = (
+    'classDef node stroke-width:2px',
+    'classDef process stroke-width:2px,stroke-dasharray:6 3',
+    'classDef external stroke-dasharray:3 3',
+    'classDef error stroke:#d1242f,stroke-width:3px',
+    'classDef warning stroke:#bf8700,stroke-width:3px',
+)
+_LINE_STYLES = {
+    'error': 'stroke:#d1242f,stroke-width:3px,color:#d1242f',
+    'warning': 'stroke:#bf8700,stroke-width:2px,color:#bf8700',
+}
+# What stands for itself in a quoted text; all else is written by its number.
+_PLAIN = frozenset(" _/.,:()=+-'")
+
+
+def render_picture(picture: Picture) -> str:
+    """Return a picture as a flowchart."""
+    plan = plan_picture(picture)
+    lines = ['flowchart LR', *_region(plan.root, 1, count())]
+    lines += [f'  {_line(line)}' for line in plan.lines]
+    marked = [(index, line.mark) for index, line in enumerate(plan.lines) if line.mark]
+    lines += [f'  linkStyle {index} {_LINE_STYLES[mark]}' for index, mark in marked]
+    lines += [f'  {each}' for each in _CLASSES]
+    return '\n'.join(lines) + '\n'
+
+
+def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
+    indent = '  ' * depth
+    for shape in region.shapes:
+        yield f'{indent}{_shape(shape)}'
+    for inner in region.inner.values():
+        yield f'{indent}subgraph s{next(numbers)}["{_escape(inner.title)}"]'
+        yield from _region(inner, depth + 1, numbers)
+        yield f'{indent}end'
+
+
+def _shape(shape: Shape) -> str:
+    opening, closing = _SHAPES[shape.kind]
+    text = _label((shape.title, *shape.details, *shape.remarks))
+    return f'{shape.token}{opening}"{text}"{closing}:::{shape.mark or shape.kind}'
+
+
+def _line(line: Line) -> str:
+    text = _label((*line.details, *line.remarks))
+    label = f'|"{text}"|' if text else ''
+    return f'{line.start} {_ARROWS[line.kind]}{label} {line.end}'
+
+
+def _label(lines: tuple[str, ...]) -> str:
+    return '<br/>'.join(map(_escape, lines))
+
+
+def _escape(text: str) -> str:
+    return ''.join(each if each.isalnum() or each in _PLAIN else f'#{ord(each)};' for each in text)

@@ -1,0 +1,137 @@
+"""A picture as one HTML page that needs nothing else: to move in, to search, to look things up.
+
+The page holds the drawing as SVG, the data as JSON, and `page.css` and `page.js` of this package.
+A Content-Security-Policy lets it run this script only, and load nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from collections import defaultdict
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from composer.drawing import svg
+from composer.drawing.excerpts import Excerpts
+from composer.drawing.json_document import describe_finding
+from composer.drawing.plan import tokens_of
+from composer.drawing.policies import describe_policies
+from composer.names import join_names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.drawing.excerpts import Excerpt
+    from composer.drawing.picture import Box, Edge, Hub, Picture
+
+_OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
+# Of a topic with many ends, the lines of the first ones.
+_MOST_ENDS = 6
+_PLACEHOLDER = re.compile('@([a-z_]+)@')
+
+
+def render_picture(picture: Picture) -> str:
+    """Return a picture as an HTML page.
+
+    Raises:
+        DrawingError: There is no Graphviz, or it fails.
+    """
+    style, script = _asset('page.css'), _asset('page.js')
+    texts = {
+        'title': html.escape(picture.name),
+        'description': html.escape(picture.description),
+        'style': style,
+        'style_hash': _hash(style),
+        'script': script,
+        'script_hash': _hash(script),
+        'drawing': _inlined(svg.render_picture(picture)),
+        'system': _json(_describe(picture)),
+    }
+    return _PLACEHOLDER.sub(lambda match: texts[match[1]], _asset('page.html'))
+
+
+def _asset(name: str) -> str:
+    return resources.files('composer.drawing').joinpath(name).read_text(encoding='utf-8')
+
+
+def _hash(text: str) -> str:
+    digest = hashlib.sha256(text.encode()).digest()
+    return f'sha256-{base64.b64encode(digest).decode()}'
+
+
+def _inlined(document: str) -> str:
+    """Return an SVG document as an element of HTML, which needs no namespaces."""
+    return _OPENING.sub(r'<svg viewBox="\1" role="group">', document, count=1).rstrip()
+
+
+def _json(data: Any) -> str:
+    """Return data as JSON that no parser of HTML takes for markup."""
+    text = json.dumps(data, separators=(',', ':'))
+    return text.replace('<', '\\u003c').replace('>', '\\u003e').replace('&', '\\u0026')
+
+
+def _describe(picture: Picture) -> dict[str, Any]:
+    parts = dict(_parts(picture))
+    owners: dict[int, str] = {}
+    for token, part in parts.items():
+        for index in part['findings']:
+            owners.setdefault(index, token)
+    findings = [
+        {**describe_finding(finding), 'part': owners.get(index)}
+        for index, finding in enumerate(picture.findings)
+    ]
+    return {'parts': parts, 'findings': findings}
+
+
+def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield what the page says of each node, channel and end, by its token."""
+    tokens = tokens_of(picture)
+    excerpts = Excerpts(picture.positions)
+    ends = _ends(picture)
+    names = {box.id: box.name for box in picture.boxes}
+    for box in picture.boxes:
+        near = [tokens[edge.id] for edge in ends[box.id]]
+        yield tokens[box.id], _part(_box_words(box), box, near, excerpts.of(box.path))
+    for hub in picture.hubs:
+        near = [tokens[edge.id] for edge in ends[hub.id]]
+        shown = [each for edge in ends[hub.id][:_MOST_ENDS] for each in excerpts.of(edge.path)]
+        yield tokens[hub.id], _part(_hub_words(hub), hub, near, list(dict.fromkeys(shown)))
+    for edge in picture.edges:
+        near = [tokens[edge.box], tokens[edge.hub]]
+        words = _edge_words(edge, names[edge.box])
+        yield tokens[edge.id], _part(words, edge, near, excerpts.of(edge.path))
+
+
+def _ends(picture: Picture) -> dict[str, list[Edge]]:
+    """Return the ends of each node and channel, by its id."""
+    ends: dict[str, list[Edge]] = defaultdict(list)
+    for edge in picture.edges:
+        ends[edge.box].append(edge)
+        ends[edge.hub].append(edge)
+    return ends
+
+
+def _part(
+    words: dict[str, Any], part: Box | Hub | Edge, near: list[str], excerpts: list[Excerpt]
+) -> dict[str, Any]:
+    shown = [{'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts]
+    return {**words, 'findings': part.findings, 'near': near, 'excerpts': shown}
+
+
+def _box_words(box: Box) -> dict[str, Any]:
+    name = join_names(box.namespace, box.name) if box.kind == 'node' else box.name
+    return {'kind': box.kind, 'name': name, 'facts': [box.description] if box.description else []}
+
+
+def _hub_words(hub: Hub) -> dict[str, Any]:
+    elsewhere = [f'{side} elsewhere, too' for side in hub.external]
+    return {'kind': hub.kind, 'name': hub.name, 'facts': [*hub.types, *elsewhere]}
+
+
+def _edge_words(edge: Edge, owner: str) -> dict[str, Any]:
+    qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
+    return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': [edge.type, *qos]}

@@ -1,0 +1,44 @@
+"""QoS in words: only what differs from what ROS does by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.language.qos import BUILTIN_PROFILES, DEFAULT_PROFILE, QosError, resolve_qos
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.language.specs import QosSpec
+
+_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
+# Their values say which policy is meant.
+_SPEAKING = ('reliability', 'durability', 'history')
+
+
+def differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
+    """Return the policies that are not those of the profile `default`; none of a broken QoS.
+
+    Topics and services have the same ones by themselves (`rmw/qos_profiles.h`).
+
+    Args:
+        profiles: The named profiles of the file.
+    """
+    try:
+        policies = resolve_qos(spec, profiles) if spec else {}
+    except QosError:
+        return {}
+    usual = BUILTIN_PROFILES[DEFAULT_PROFILE]
+    return {key: value for key, value in policies.items() if value != usual.get(key, 'infinite')}
+
+
+def describe_policies(policies: Mapping[str, Any]) -> str:
+    """Return `best_effort, depth 5, deadline 0.1 s`."""
+    return ', '.join(_describe(key, value) for key, value in policies.items())
+
+
+def _describe(key: str, value: Any) -> str:
+    if key in _SPEAKING and value not in ('system_default', 'best_available'):
+        return str(value)
+    unit = ' s' if key in _DURATIONS and not isinstance(value, str) else ''
+    return f'{key.replace("_", " ")} {value}{unit}'

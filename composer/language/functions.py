@@ -1,0 +1,48 @@
+"""The functions that expressions may call beside those of jinja2."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import TemplateRuntimeError
+
+from composer.ament import find_share, list_packages
+from composer.names import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+
+def read_environment(name: str, default: str | None = None) -> str:
+    """Return a variable of the environment, or the default.
+
+    Raises:
+        TemplateRuntimeError: There is neither.
+    """
+    value = os.environ.get(name, default)
+    if value is None:
+        message = f"the environment has no '{name}'; give a default, as in env('{name}', 'none')"
+        raise TemplateRuntimeError(message)
+    return value
+
+
+def find_package_share(package: str) -> str:
+    """Return the share folder of a ROS package.
+
+    Raises:
+        TemplateRuntimeError: It is not installed.
+    """
+    share = find_share(package)
+    if share is None:
+        near = suggest(package, list_packages())
+        hint = f"; did you mean '{near}'?" if near else ''
+        message = f"no package '{package}' is installed{hint}"
+        raise TemplateRuntimeError(message)
+    return str(share)
+
+
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    'env': read_environment,
+    'find': find_package_share,
+}

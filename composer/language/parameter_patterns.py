@@ -1,0 +1,54 @@
+"""The names of nodes in parameter files, with their wildcards.
+
+`*` is one part of a full name, `**` any number of them, as in `/**/arm`; a part is a wildcard or a
+name, never a mixture of both.
+Sources: `_validate_name` in rcl (`rcl_yaml_param_parser/src/parse.c`), `Node::get_parameters` in
+rclpy (`rclpy/src/rclpy/node.cpp`).
+"""
+
+from __future__ import annotations
+
+from composer.names import find_namespace_fault, find_node_name_fault
+
+_ONE, _ANY = '*', '**'
+
+
+def find_pattern_fault(pattern: str) -> str | None:
+    """Return why rcl refuses a file for such a name, or `None` if it does not."""
+    if pattern in ('/**', '/*'):
+        return None
+    namespace, _, name = pattern.rpartition('/')
+    for part in namespace.removeprefix('/').split('/') if namespace.strip('/') else ():
+        if not part:
+            return 'a name has no two slashes in a row'
+        fault = None if part in (_ONE, _ANY) else find_namespace_fault(f'/{part}')
+        if fault:
+            return _add_wildcards(fault, part)
+    if namespace and not namespace.strip('/'):
+        return 'a name has no two slashes in a row'
+    fault = None if name in (_ONE, _ANY) else find_node_name_fault(name)
+    return _add_wildcards(fault, name) if fault else None
+
+
+def matches_pattern(pattern: str, full_name: str) -> bool:
+    """Return whether rclpy takes parameters that stand below `pattern` for a node."""
+    parts = pattern.removeprefix('/').split('/')
+    names = full_name.removeprefix('/').split('/')
+    # Which numbers of the name's first parts are matched by those of the pattern so far.
+    reached = {0}
+    for part in parts:
+        if part == _ANY:
+            reached = set(range(min(reached), len(names) + 1))
+        else:
+            reached = {
+                count + 1
+                for count in reached
+                if count < len(names) and part in (_ONE, names[count])
+            }
+        if not reached:
+            return False
+    return len(names) in reached
+
+
+def _add_wildcards(fault: str, part: str) -> str:
+    return f"{fault}; '*' and '**' stand alone between slashes" if '*' in part else fault

@@ -1,0 +1,76 @@
+"""Paths in a file: relative to it, absolute, or in the share folder of a ROS package."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.ament import find_share, list_packages
+from composer.errors import ComposerError
+from composer.names import suggest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from composer.language.positions import DataPath, SourceMap
+
+_PACKAGE = 'package://'
+
+
+class PathError(ComposerError):
+    """A path leads into a package that is not installed."""
+
+
+def resolve_path(text: str, folder: Path) -> Path:
+    """Return the path that a text means in a file of `folder`.
+
+    Raises:
+        PathError: The package of `package://name/path` is not installed.
+    """
+    if not text.startswith(_PACKAGE):
+        return folder / text
+    package, _, rest = text.removeprefix(_PACKAGE).partition('/')
+    share = find_share(package)
+    if share is None:
+        near = suggest(package, list_packages())
+        message = f"no package '{package}' is installed"
+        raise PathError(message, help=f"did you mean '{near}'?" if near else None)
+    return share / rest
+
+
+def resolve_paths(data: dict[str, Any], positions: SourceMap) -> dict[str, Any]:
+    """Return a file's data with paths that hold wherever the data go.
+
+    Paths into packages stay as they are: what is wrong with them is for the checks to say.
+    """
+    resolved = dict(data)
+    if 'interfaces' in data:
+        resolved['interfaces'] = {
+            package: _resolved(folder, ('interfaces', package), positions)
+            for package, folder in data['interfaces'].items()
+        }
+    for section in ('nodes', 'processes'):
+        if section in data:
+            resolved[section] = {
+                name: _with_paths(entry, (section, name), positions)
+                for name, entry in data[section].items()
+            }
+    return resolved
+
+
+def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:
+    changed: dict[str, Any] = {}
+    if 'cwd' in entry:
+        changed['cwd'] = _resolved(entry['cwd'], (*path, 'cwd'), positions)
+    if 'parameter_files' in entry:
+        at = (*path, 'parameter_files')
+        changed['parameter_files'] = [
+            _resolved(text, (*at, index), positions)
+            for index, text in enumerate(entry['parameter_files'])
+        ]
+    return entry | changed if changed else entry
+
+
+def _resolved(text: str, path: DataPath, positions: SourceMap) -> str:
+    if text.startswith(_PACKAGE):
+        return text
+    return str(positions.value(path).source.folder / text)

@@ -1,0 +1,342 @@
+"""`wait_for`: nodes and processes start when what they need is there.
+
+The graph is only asked while somebody waits, at most twenty times a second.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+from rclpy.node import Node as RosNode
+from rclpy.node import NodeNameNonExistentError
+from rclpy.parameter import Parameter
+
+from composer.errors import StartError
+from composer.names import did_you_mean, expand_name, join_names, remap_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Mapping
+
+    from rclpy.context import Context
+
+    from composer.language.positions import SourceMap
+    from composer.language.specs import ConditionKind, ConditionSpec, ProcessSpec
+    from composer.runtime.live_node import LiveNode
+    from composer.runtime.processes import LiveProcess, Processes
+    from composer.runtime.waiting import StopSignal
+
+_POLL_SEC = 0.05
+_NODE_NAME = '_composer_waiting'
+# An action is there when the service is that takes its goals
+# (https://design.ros2.org/articles/actions.html).
+_GOALS = '/_action/send_goal'
+# What nearly every node has, and hardly anybody waits for.
+_COMMON_TOPICS = ('/rosout', '/parameter_events', '/diagnostics')
+_COMMON_SERVICES = (
+    '/describe_parameters',
+    '/get_parameter_types',
+    '/get_parameters',
+    '/get_type_description',
+    '/list_parameters',
+    '/set_parameters',
+    '/set_parameters_atomically',
+)
+_TROUBLES = {
+    'topic': 'nobody publishes it',
+    'service': 'nobody serves it',
+    'action': 'nobody serves it',
+    'node': 'it is not there',
+}
+_INTRODUCTIONS = {
+    'topic': 'published are',
+    'service': 'served are',
+    'action': 'served are',
+    'node': 'there are',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Waiter:
+    """A node or process that starts when its conditions hold.
+
+    Attributes:
+        label: As in `node 'arm'`.
+        resolve: Returns the full name of what a condition names.
+        start: Starts it; returns when it has started.
+    """
+
+    label: str
+    conditions: tuple[ConditionSpec, ...]
+    resolve: Callable[[ConditionSpec], str]
+    start: Callable[[], None]
+
+
+class Readiness:
+    """Starts those who wait, each as soon as what it waits for is there.
+
+    Args:
+        nodes: The nodes of the system, by any names; those whose gates are closed do not count.
+        processes: The processes of the system, by their names.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        nodes: Mapping[str, LiveNode],
+        processes: Mapping[str, LiveProcess],
+        positions: SourceMap,
+    ) -> None:
+        self._context = context
+        self._nodes = nodes
+        self._processes = processes
+        self._positions = positions
+
+    def start_all(self, waiters: Iterable[Waiter], stop: StopSignal) -> None:
+        """Start all; a stop request ends the waiting.
+
+        Raises:
+            StartError: Something did not come in time.
+        """
+        pending = list(waiters)
+        if not pending:
+            return
+        node = _create_graph_node(self._context)
+        woken = threading.Event()
+        begun = time.monotonic()
+        try:
+            with stop.waking(woken.set):
+                while pending and not stop.is_set:
+                    started = self._start_ready(pending, node, time.monotonic() - begun, stop)
+                    pending = [each for each in pending if each not in started]
+                    if not started:
+                        woken.wait(_POLL_SEC)
+        finally:
+            node.destroy_node()
+
+    def _start_ready(
+        self, pending: list[Waiter], node: RosNode, waited_sec: float, stop: StopSignal
+    ) -> list[Waiter]:
+        """Start those who need not wait any more, and return them."""
+        graph = _Graph(node, self._hidden())
+        ready = []
+        for waiter in pending:
+            missing = [each for each in waiter.conditions if not self._holds(waiter, each, graph)]
+            if not missing:
+                ready.append(waiter)
+            for condition in missing:
+                if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
+                    raise self._error(waiter, condition, graph)
+        for waiter in ready:
+            if not stop.is_set:
+                waiter.start()
+        return ready
+
+    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: _Graph) -> bool:
+        if condition.kind == 'process':
+            return self._processes[condition.name].is_ready
+        return graph.has(condition.kind, waiter.resolve(condition))
+
+    def _is_hopeless(self, condition: ConditionSpec) -> bool:
+        """Return whether a process has ended badly, and is not started again."""
+        return condition.kind == 'process' and self._processes[condition.name].is_done
+
+    def _hidden(self) -> frozenset[str]:
+        """Return the nodes of the system that have not started."""
+        closed = [node for node in list(self._nodes.values()) if not node.gate.is_open]
+        return frozenset(node.full_name for node in closed)
+
+    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: _Graph) -> StartError:
+        span = self._positions.value(condition.path)
+        who = f'{waiter.label} ({span.source.name}:{span.line})'
+        waited = f'waited {condition.timeout_sec:g} s for the {condition.kind}'
+        if condition.kind == 'process':
+            process = self._processes[condition.name]
+            waited = 'waits for the process' if process.is_done else waited
+            return StartError(f"{who} {waited} '{condition.name}': {process.state}")
+        name = waiter.resolve(condition)
+        late = [
+            node.spec.name
+            for node in self._nodes.values()
+            if node.full_name in graph.hidden and name in graph.names_of(node, condition.kind)
+        ]
+        message = f"{who} {waited} '{name}': {_TROUBLES[condition.kind]}"
+        if late:
+            nodes = ' and '.join(f"'{each}'" for each in late)
+            verb = 'has' if len(late) == 1 else 'have'
+            message += f' but {nodes} of this system, which {verb} not started'
+        return StartError(message, help=_describe_graph(condition.kind, name, graph))
+
+
+class _Graph:
+    """What is there now, without what nodes bring that have not started.
+
+    Attributes:
+        hidden: The full names of these nodes.
+    """
+
+    def __init__(self, node: RosNode, hidden: frozenset[str]) -> None:
+        self._node = node
+        self.hidden = hidden
+
+    def has(self, kind: ConditionKind, name: str) -> bool:
+        """Return whether something of a kind is there, by its full name."""
+        if kind == 'topic':
+            return self._is_published(name)
+        if kind == 'node':
+            return name in self._nodes
+        service = name + _GOALS if kind == 'action' else name
+        # This list is fast, but has those services, too, that only have clients.
+        listed = any(name == service for name, _ in self._node.get_service_names_and_types())
+        return listed and service in self._served
+
+    def names(self, kind: ConditionKind) -> Collection[str]:
+        """Return the full names of all that is there of a kind."""
+        found: Collection[str] = getattr(self, f'_{kind}s')
+        return found
+
+    def names_of(self, node: LiveNode, kind: ConditionKind) -> Collection[str]:
+        """Return what a node brings, started or not."""
+        if kind == 'node':
+            return [node.full_name]
+        where = node.ros.get_name(), node.ros.get_namespace()
+        if kind == 'topic':
+            return [name for name, _ in self._node.get_publisher_names_and_types_by_node(*where)]
+        return _select(kind, self._services_of(*where))
+
+    @cached_property
+    def _nodes(self) -> set[str]:
+        found = {join_names(namespace, name) for name, namespace in self._present}
+        return found - {f'/{_NODE_NAME}'}
+
+    @cached_property
+    def _topics(self) -> set[str]:
+        return {
+            topic
+            for topic, _ in self._node.get_topic_names_and_types()
+            if self._is_published(topic)
+        }
+
+    @cached_property
+    def _services(self) -> set[str]:
+        return set(_select('service', self._served))
+
+    @cached_property
+    def _actions(self) -> set[str]:
+        return set(_select('action', self._served))
+
+    @cached_property
+    def _present(self) -> list[tuple[str, str]]:
+        return [
+            (name, namespace)
+            for name, namespace in self._node.get_node_names_and_namespaces()
+            if join_names(namespace, name) not in self.hidden
+        ]
+
+    @cached_property
+    def _served(self) -> set[str]:
+        found: set[str] = set()
+        for name, namespace in self._present:
+            found.update(self._services_of(name, namespace))
+        return found
+
+    def _is_published(self, topic: str) -> bool:
+        return any(
+            join_names(each.node_namespace, each.node_name) not in self.hidden
+            for each in self._node.get_publishers_info_by_topic(topic)
+        )
+
+    def _services_of(self, name: str, namespace: str) -> list[str]:
+        # A node may leave between two questions.
+        with suppress(NodeNameNonExistentError):
+            services = self._node.get_service_names_and_types_by_node(name, namespace)
+            return [service for service, _ in services]
+        return []
+
+
+def list_waiters(
+    nodes: Mapping[str, LiveNode],
+    processes: Processes,
+    start_node: Callable[[LiveNode], None],
+) -> list[Waiter]:
+    """Return the nodes and processes of a system that wait for something."""
+    waiting_processes = [each for each in processes.by_name.values() if each.spec.wait_for]
+    waiting_nodes = [each for each in nodes.values() if each.spec.wait_for]
+    return [
+        *(
+            Waiter(
+                f"process '{process.spec.name}'",
+                process.spec.wait_for,
+                partial(_resolve_of_process, process.spec),
+                partial(processes.start, process),
+            )
+            for process in waiting_processes
+        ),
+        *(
+            Waiter(
+                f"node '{node.spec.name}'",
+                node.spec.wait_for,
+                partial(_resolve_of_node, node),
+                partial(start_node, node),
+            )
+            for node in waiting_nodes
+        ),
+    ]
+
+
+def describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
+    """Return `2 nodes and 1 process`, without what there is none of."""
+    counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
+    parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
+    return ' and '.join(parts) or '0 nodes'
+
+
+def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:
+    """Return the full name of what a node waits for, as if the node used it."""
+    if condition.kind == 'topic':
+        return str(node.ros.resolve_topic_name(condition.name))
+    if condition.kind == 'service':
+        return str(node.ros.resolve_service_name(condition.name))
+    return expand_name(condition.name, node.ros.get_name(), node.ros.get_namespace())
+
+
+def _resolve_of_process(spec: ProcessSpec, condition: ConditionSpec) -> str:
+    name, namespace = spec.node_name or spec.name, spec.namespace or '/'
+    full = expand_name(condition.name, name, namespace)
+    if condition.kind not in ('topic', 'service'):
+        return full
+    return remap_name(full, spec.remap, name, namespace, f'ros{condition.kind}')
+
+
+def _create_graph_node(context: Context) -> RosNode:
+    """Return a node to ask; those of the system may be built anew at any time."""
+    return RosNode(
+        _NODE_NAME,
+        context=context,
+        use_global_arguments=False,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=[Parameter('start_type_description_service', value=False)],
+    )
+
+
+def _select(kind: ConditionKind, services: Iterable[str]) -> list[str]:
+    if kind == 'action':
+        return [name.removesuffix(_GOALS) for name in services if name.endswith(_GOALS)]
+    return [name for name in services if '/_' not in name]
+
+
+def _describe_graph(kind: ConditionKind, name: str, graph: _Graph) -> str:
+    """Return what was there instead of a name."""
+    names = [
+        each
+        for each in graph.names(kind)
+        if not (each in _COMMON_TOPICS or '/_' in each or each.endswith(_COMMON_SERVICES))
+    ]
+    nearest = did_you_mean(name, names, _INTRODUCTIONS[kind])
+    every = ' but those that every node has' if kind in ('topic', 'service') else ' at all'
+    return nearest or f'there is no {kind}{every}'

@@ -1,0 +1,20 @@
+"""What the nodes of my_system do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from std_msgs.msg import String
+
+    from composer import Node
+
+
+def greet(node: Node) -> str:
+    """Return the greeting that is published next."""
+    return f'Hello {node.parameters.who}!'
+
+
+def hear(node: Node, message: String) -> None:
+    """Say what was heard."""
+    node.logger.info(f'I heard: {message.data}')

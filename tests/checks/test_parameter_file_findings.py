@@ -1,0 +1,226 @@
+"""Parameter files against the nodes that use them."""
+
+from textwrap import dedent, indent
+
+import pytest
+
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch):
+    """Return a function that checks a system with parameter files.
+
+    It returns `place rule: message` of each finding, and its help after an arrow.
+    """
+    monkeypatch.chdir(tmp_path)
+
+    def run(nodes, *, more='', before='', **files):
+        for name, text in files.items():
+            (tmp_path / f'{name}.yaml').write_text(dedent(text).lstrip('\n'))
+        path = tmp_path / 'system.yaml'
+        path.write_text(f'version: 1\n{before}nodes:\n{indent(dedent(nodes), "  ")}{dedent(more)}')
+        found = check_system(load_system(path), InterfaceCatalogue())
+        return [
+            f'{finding.span or finding.file} {finding.rule}: {finding.message}'
+            + (f' → {finding.help}' if finding.help else '')
+            for finding in found
+        ]
+
+    def relative(*arguments, **options):
+        return [line.replace(f'{tmp_path}/', '') for line in run(*arguments, **options)]
+
+    return relative
+
+
+ARM = """
+  arm:
+    namespace: robot
+    parameter_files: [p.yaml]
+    parameters:
+      speed: {default: 1.0, maximum: 2.0}
+      mode: {default: slow, choices: [slow, fast]}
+      gains: [1.0]
+      names: {type: string_array}
+      octets: {default: [1], type: byte_array}
+      count: {default: 1, minimum: 0, maximum: 10}
+"""
+
+
+def test_a_file_that_suits_is_left_alone(check):
+    text = """
+        /**:
+          ros__parameters: {use_sim_time: true, speed: 0.5}
+        /robot/*:
+          ros__parameters: {mode: fast, gains: [1.0, 2.0], names: [], count: 0x5}
+        """
+    assert check(ARM, p=text) == []
+
+
+def test_what_matches_no_node_is_a_warning_at_its_name(check):
+    text = '/robot/amr: {ros__parameters: {speed: 1.0}}\n/*: {ros__parameters: {speed: 1.0}}\n'
+    assert check(ARM, p=text) == [
+        "p.yaml:1:1 unmatched-node-name: '/robot/amr' is the name of no node that uses this file, "
+        "and ROS ignores it → did you mean '/robot/arm'?",
+        "p.yaml:2:1 unmatched-node-name: '/*' is the name of no node that uses this file, "
+        'and ROS ignores it → it is used by: /robot/arm',
+    ]
+
+
+def test_what_no_node_declares_is_a_warning_at_its_key(check):
+    text = '/**:\n  ros__parameters:\n    speeed: 1.0\n    sub: {deep: 1}\n'
+    assert check('  arm: {parameter_files: [p.yaml]}\n', p=text)[0] == (
+        "p.yaml:3:5 undeclared-parameter: node '/arm' declares no parameter 'speeed', "
+        "and ROS ignores it → declare it under 'parameters:' of the node"
+    )
+    assert check(ARM, p=text)[0].endswith("→ did you mean 'speed'?")
+    assert check(ARM, p=text)[1].startswith('p.yaml:4:11 undeclared-parameter: ')
+
+
+@pytest.mark.parametrize(
+    ('written', 'said'),
+    {
+        'speed: 1': 'expected a double, and ROS takes this for an integer → write 1.0',
+        'speed: 1e400': 'expected a double, and ROS takes this for a string',
+        'speed: 2.5': '2.5 is above the maximum 2.0',
+        'mode: quick': "'quick' is none of its choices: slow, fast",
+        'mode: on': "expected a string, and ROS takes this for a bool → put it in quotes: 'on'",
+        'gains: [1, 2]': (
+            'expected a double_array, and ROS takes this for an integer_array → write [1.0, 2.0]'
+        ),
+        'octets: [1]': "a parameter file has no bytes → give them under 'parameters:' of the node",
+        'count: 11': '11 is above the maximum 10',
+        'count: 9223372036854775808': 'expected an integer, and ROS takes this for a double',
+        'count: []': 'expected an integer, and ROS takes this for an empty list',
+        'use_sim_time: 1': 'expected a bool, and ROS takes this for an integer',
+    }.items(),
+)
+def test_a_value_that_its_declaration_refuses_is_an_error_at_the_value(check, written, said):
+    name, value = written.split(': ')
+    assert check(ARM, p=f'/**:\n  ros__parameters:\n    {written}\n') == [
+        f"p.yaml:3:{len(name) + 7} refused-parameter: parameter '{name}' of node '/robot/arm': "
+        f'{said}'
+    ]
+    assert value
+
+
+def test_a_value_that_a_later_file_replaces_is_not_held_against_the_declaration(check):
+    nodes = ARM.replace('[p.yaml]', '[p.yaml, q.yaml]')
+    texts = ['/**: {ros__parameters: {speed: 9.0}}', '/**: {ros__parameters: {speed: 1.0}}']
+    assert check(nodes, p=texts[0], q=texts[1]) == []
+
+
+def test_a_file_that_several_nodes_use_is_spoken_of_once(check):
+    nodes = """
+      "arm_{{ i }}":
+        foreach: {i: "{{ range(3) }}"}
+        parameter_files: [p.yaml]
+        parameters: {speed: 1.0}
+    """
+    text = """
+        /**:
+          ros__parameters: {speed: 1, sped: 1.0}
+        arm_1: {ros__parameters: {speed: 1.0}}
+        arm_3: {ros__parameters: {speed: 1.0}}
+        arm_2: {ros_parameters: {}}
+        """
+    assert [line.split(': ')[0] for line in check(nodes, p=text)] == [
+        'p.yaml:2:28 refused-parameter',
+        'p.yaml:2:31 undeclared-parameter',
+        'p.yaml:4:1 unmatched-node-name',
+        'p.yaml:5:9 bad-parameter-file',
+    ]
+
+
+def test_what_one_of_several_nodes_declares_is_not_undeclared(check):
+    nodes = """
+      a: {parameter_files: [p.yaml], parameters: {speed: 1.0}}
+      b: {parameter_files: [p.yaml], parameters: {mode: x}}
+    """
+    assert check(nodes, p='/**: {ros__parameters: {speed: 2.0, mode: z}}') == []
+
+
+def test_what_is_for_a_node_left_out_by_its_when_is_not_unmatched(check):
+    nodes = """
+      a: {parameter_files: [p.yaml], parameters: {speed: 1.0}}
+      b: {when: false, parameter_files: [p.yaml], parameters: {mode: x}}
+    """
+    text = 'a: {ros__parameters: {speed: 2.0}}\nb: {ros__parameters: {mode: y}}\n'
+    assert check(nodes, p=text) == []
+    assert check(nodes, p=text.replace('mode', 'mood'))[0].startswith('p.yaml:2:23 undeclared-')
+
+
+def test_a_value_that_never_counts_is_a_warning(check):
+    def said(text):
+        return check(ARM, p=text)
+
+    head = '/robot/arm:\n  ros__parameters:\n    mode: fast\n'
+    assert said(head + '    mode: slow\n') == [
+        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: that of p.yaml:4 wins "
+        '→ remove one of them'
+    ]
+    assert said(head + '/**: {ros__parameters: {mode: slow}}\n') == [
+        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: that of p.yaml:4 wins "
+        '→ the last name that matches a node wins: write wildcards above'
+    ]
+    assert said('/**: {ros__parameters: {mode: slow}}\n' + head) == []
+
+
+def test_a_later_file_that_loses_by_its_type_is_a_warning(check):
+    nodes = ARM.replace('[p.yaml]', '[p.yaml, q.yaml]')
+    texts = ['/**: {ros__parameters: {count: 1}}', '/**: {ros__parameters: {count: 1.5}}']
+    assert check(nodes, p=texts[0], q=texts[1]) == [
+        "q.yaml:1:25 overridden-parameter: 'count' never has this value: that of p.yaml:1 wins "
+        '→ of two types ROS takes one, whichever comes first: give both the same type'
+    ]
+
+
+def test_a_missing_file_is_an_error_where_it_is_named(check):
+    (line,) = check(ARM)
+    assert line == (
+        'system.yaml:6:23 unreadable-file: p.yaml: cannot read the file: No such file or directory'
+    )
+
+
+@pytest.mark.ros
+def test_an_unknown_package_is_an_error_where_it_is_named(check):
+    nodes = ARM.replace('p.yaml', 'package://std_msg/p.yaml')
+    assert check(nodes) == [
+        "system.yaml:6:23 unknown-package: no package 'std_msg' is installed "
+        "→ did you mean 'std_msgs'?"
+    ]
+
+
+def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
+    more = """
+        processes:
+          driver: {command: [driver], parameter_files: [p.yaml]}
+        """
+    text = '/some/node: {ros__parameters: {anything: 1, other: }}'
+    nodes = '  arm: {parameter_files: [p.yaml]}\n'
+    assert [line.split(': ')[0] for line in check(nodes, more=more, p=text)] == [
+        'p.yaml:1:52 bad-parameter-file'
+    ]
+
+
+def test_the_name_of_a_programs_node_is_matched(check):
+    more = """
+        processes:
+          driver: {command: [x], name: lidar, namespace: /robot, parameter_files: [p.yaml]}
+        """
+    text = '/robot/lidar: {ros__parameters: {a: 1}}\n/robot/lidr: {ros__parameters: {a: 1}}\n'
+    (line,) = check('  arm: {}\n', more=more, p=text)
+    assert line.startswith('p.yaml:2:1 unmatched-node-name')
+    assert line.endswith("→ did you mean '/robot/lidar'?")
+
+
+def test_a_comment_in_the_parameter_file_silences_a_warning(check):
+    text = '/**:\n  ros__parameters:\n    sped: 1.0  # composer: ignore[undeclared-parameter]\n'
+    assert check(ARM, p=text) == []
+
+
+def test_a_file_named_by_an_argument_without_a_default_is_not_missed(check):
+    nodes = ARM.replace('[p.yaml]', '["{{ site }}.yaml"]')
+    assert check(nodes, before='args: {site: {type: string}}\n') == []

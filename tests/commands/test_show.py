@@ -1,0 +1,102 @@
+"""`composer show`."""
+
+import json
+import textwrap
+
+import pytest
+
+from composer.cli import run
+
+ROBOT = """
+    version: 1
+    args: {arms: 2, side: {type: string, default: left}}
+    x-anchors: {depth: 5}
+    include:
+      arm: {file: parts/arm.yaml, namespace: arm, args: {joints: "{{ arms }}"}}
+    nodes:
+      brain: {when: "{{ side == 'left' }}", description: "{{ side }} brain"}
+      other: {when: "{{ side != 'left' }}"}
+"""
+ARM = """
+    version: 1
+    args: {joints: {type: integer}}
+    interfaces: {my_msgs: msgs}
+    nodes:
+      "joint_{{ j }}": {foreach: {j: "{{ range(joints) }}"}, parameters: {index: "{{ j }}"}}
+"""
+
+
+@pytest.fixture
+def robot(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'parts').mkdir()
+    (tmp_path / 'robot.yaml').write_text(textwrap.dedent(ROBOT).lstrip())
+    (tmp_path / 'parts' / 'arm.yaml').write_text(textwrap.dedent(ARM).lstrip())
+    return tmp_path
+
+
+def test_it_prints_the_final_system(robot, capsys):
+    assert run(['show', 'robot.yaml', 'arms:=1']) == 0
+    assert capsys.readouterr().out == textwrap.dedent(
+        f"""\
+        version: 1
+        nodes:
+          brain:
+            description: "left brain"
+          joint_0:
+            namespace: arm
+            parameters:
+              index: 0
+        interfaces:
+          my_msgs: {robot}/parts/msgs
+        """
+    )
+
+
+def test_what_it_prints_is_the_same_system_elsewhere(robot, capsys, tmp_path_factory):
+    run(['show', 'robot.yaml'])
+    first = capsys.readouterr().out
+    path = tmp_path_factory.mktemp('elsewhere') / 'flat.yaml'
+    path.write_text(first)
+    run(['show', str(path)])
+    assert capsys.readouterr().out == first
+
+
+def test_it_prints_json(robot, capsys):
+    run(['show', 'robot.yaml', '--format', 'json'])
+    assert list(json.loads(capsys.readouterr().out)['nodes']) == ['brain', 'joint_0', 'joint_1']
+
+
+def test_it_says_where_each_value_comes_from(robot, capsys):
+    (robot / 'site.yaml').write_text('nodes: {brain: {log_level: debug}}\n')
+    arguments = ['show', 'robot.yaml', 'site.yaml', 'arms:=1', '--origin']
+    run([*arguments, '--set', 'nodes.brain.use_sim_time=true'])
+    origins = dict(
+        (part.strip() for part in line.split('  # '))
+        for line in capsys.readouterr().out.splitlines()
+        if '  # ' in line
+    )
+    assert origins == {
+        'version: 1': 'robot.yaml:1',
+        'description: "left brain"': 'robot.yaml:7, side = left (default, robot.yaml:2)',
+        'log_level: debug': 'site.yaml:1',
+        'use_sim_time: true': '--set nodes.brain.use_sim_time=true',
+        'namespace: arm': 'robot.yaml:5',
+        'index: 0': 'parts/arm.yaml:5, j = 0 (foreach)',
+        f'my_msgs: {robot}/parts/msgs': 'parts/arm.yaml:3',
+    }
+
+
+def test_it_lists_the_arguments(robot, capsys):
+    assert run(['show', 'robot.yaml', '--args']) == 0
+    assert capsys.readouterr().out == (
+        'the file declares\n    arms (integer, default 2)\n    side (string, default left)\n'
+    )
+
+
+def test_a_faulty_file_is_not_shown(robot, capsys):
+    (robot / 'robot.yaml').write_text('version: 1\nnodes: {n: {log_levl: debug}}\n')
+    assert run(['show', 'robot.yaml']) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert 'unknown-key' in captured.err

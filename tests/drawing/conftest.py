@@ -1,0 +1,35 @@
+import importlib.util
+import shutil
+import textwrap
+
+import pytest
+
+from composer.checks import check_system, create_context
+from composer.drawing.picture import build_picture
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
+
+
+@pytest.fixture
+def draw(tmp_path, monkeypatch):
+    """Return a function that makes a picture of the text of a file."""
+    monkeypatch.chdir(tmp_path)
+
+    def draw(text, *settings, name='robot', layer=None):
+        path = tmp_path / f'{name}.yaml'
+        path.write_text(textwrap.dedent(text).lstrip())
+        layers = [tmp_path / 'site.yaml'] if layer else []
+        for each in layers:
+            each.write_text(layer)
+        system = load_system(path, layers=layers, settings=settings)
+        catalogue = InterfaceCatalogue()
+        findings = check_system(system, catalogue)
+        return build_picture(create_context(system, catalogue)[0], findings)
+
+    return draw
+
+
+@pytest.fixture
+def needs_graphviz():
+    if not (shutil.which('dot') or importlib.util.find_spec('pygraphviz')):
+        pytest.skip('neither Graphviz nor the extra graph is installed')

@@ -1,0 +1,317 @@
+"""What is drawn of a system, as the JSON form shows it."""
+
+import json
+
+import pytest
+
+from composer.drawing import FORMATS, format_of, render_picture
+from composer.drawing.json_document import describe_picture
+
+TALKER = """
+    version: 1
+    description: One talks, one hears.
+    nodes:
+      talker:
+        namespace: /robot
+        description: Talks.
+        publishers:
+          words: {type: std_msgs/msg/String, qos: sensor_data}
+        timers:
+          t: {rate: 1, publish: words, message: hello}
+      ear:
+        remap: {heard: /robot/words}
+        subscriptions:
+          heard: {type: std_msgs/msg/String, qos: {depth: 1, reliability: best_effort, deadline: 0.5}, publish: echo}
+        publishers:
+          echo: {type: std_msgs/msg/String, external: true}
+"""
+# The behaviours are nowhere, which is no matter of the drawing.
+SERVER = """
+    version: 1
+    nodes:
+      server:
+        services: {add: {type: std_srvs/srv/Trigger, behaviour: parts:add}}
+        actions: {go: {type: test_msgs/action/Fibonacci, behaviour: parts:go}}
+      client:
+        service_clients: {add: std_srvs/srv/Trigger}
+        action_clients: {go: test_msgs/action/Fibonacci}
+"""
+UNMATCHED = """
+    version: 1
+    nodes:
+      talker:
+        publishers:
+          words: {type: std_msgs/msg/String, qos: sensor_data}
+          other: {type: std_msgs/msg/String, external: true}
+        timers:
+          t: {rate: 1, publish: words, message: hello}
+          u: {rate: 1, publish: other, message: hello}
+      ear:
+        subscriptions:
+          words: {type: std_msgs/msg/String, publish: echo}
+        publishers:
+          echo: {type: std_msgs/msg/String, external: true}
+"""
+
+
+def by_id(document, section):
+    return {part['id']: part for part in document[section]}
+
+
+def marked(document):
+    """Return the rules that each marked part is marked for."""
+    rules = [finding['rule'] for finding in document['findings']]
+    return {
+        part['id']: [rules[index] for index in part['findings']]
+        for section in ('nodes', 'channels', 'edges')
+        for part in document[section]
+        if part['findings']
+    }
+
+
+def test_the_whole_document(draw):
+    document = json.loads(render_picture(draw(TALKER), 'json'))
+    assert document == {
+        'version': 1,
+        'name': 'robot',
+        'description': 'One talks, one hears.',
+        'nodes': [
+            {
+                'id': 'node:/robot/talker',
+                'kind': 'node',
+                'name': 'talker',
+                'namespace': '/robot',
+                'description': 'Talks.',
+                'findings': [],
+                'file': 'robot.yaml',
+                'line': 4,
+            },
+            {
+                'id': 'node:/ear',
+                'kind': 'node',
+                'name': 'ear',
+                'namespace': '/',
+                'description': '',
+                'findings': [],
+                'file': 'robot.yaml',
+                'line': 11,
+            },
+        ],
+        'channels': [
+            {
+                'id': 'topic:/robot/words',
+                'kind': 'topic',
+                'name': '/robot/words',
+                'types': ['std_msgs/msg/String'],
+                'external': [],
+                'findings': [],
+                'file': 'robot.yaml',
+                'line': 8,
+            },
+            {
+                'id': 'topic:/echo',
+                'kind': 'topic',
+                'name': '/echo',
+                'types': ['std_msgs/msg/String'],
+                'external': ['users'],
+                'findings': [],
+                'file': 'robot.yaml',
+                'line': 16,
+            },
+        ],
+        'edges': [
+            {
+                'id': 'publisher:/robot/talker:words',
+                'role': 'publisher',
+                'name': 'words',
+                'node': 'node:/robot/talker',
+                'channel': 'topic:/robot/words',
+                'from': 'node:/robot/talker',
+                'to': 'topic:/robot/words',
+                'type': 'std_msgs/msg/String',
+                'qos': {'depth': 5, 'reliability': 'best_effort'},
+                'findings': [0],
+                'file': 'robot.yaml',
+                'line': 8,
+            },
+            {
+                'id': 'subscription:/ear:heard',
+                'role': 'subscription',
+                'name': 'heard',
+                'node': 'node:/ear',
+                'channel': 'topic:/robot/words',
+                'from': 'topic:/robot/words',
+                'to': 'node:/ear',
+                'type': 'std_msgs/msg/String',
+                'qos': {'depth': 1, 'reliability': 'best_effort', 'deadline': 0.5},
+                'findings': [0],
+                'file': 'robot.yaml',
+                'line': 14,
+            },
+            {
+                'id': 'publisher:/ear:echo',
+                'role': 'publisher',
+                'name': 'echo',
+                'node': 'node:/ear',
+                'channel': 'topic:/echo',
+                'from': 'node:/ear',
+                'to': 'topic:/echo',
+                'type': 'std_msgs/msg/String',
+                'qos': {},
+                'findings': [],
+                'file': 'robot.yaml',
+                'line': 16,
+            },
+        ],
+        'waits': [],
+        'findings': [
+            {
+                'rule': 'incompatible-qos',
+                'severity': 'error',
+                'message': "on topic '/robot/words' the QoS of publisher 'words' of node 'talker' and of subscription 'heard' of node 'ear' never match: deadline: infinite is offered, 0.5 s is requested",
+                'help': 'give both the same deadline',
+                'file': 'robot.yaml',
+                'line': 14,
+                'column': 94,
+            }
+        ],
+    }
+
+
+def test_requests_and_goals_go_from_clients_to_servers(draw):
+    edges = describe_picture(draw(SERVER))['edges']
+    assert [(edge['role'], edge['from'], edge['to']) for edge in edges] == [
+        ('service server', 'service:/add', 'node:/server'),
+        ('service client', 'node:/client', 'service:/add'),
+        ('action server', 'action:/go', 'node:/server'),
+        ('action client', 'node:/client', 'action:/go'),
+    ]
+
+
+def test_both_ends_that_never_match_are_marked(draw):
+    assert marked(describe_picture(draw(UNMATCHED))) == {
+        'publisher:/talker:words': ['incompatible-qos'],
+        'subscription:/ear:words': ['incompatible-qos'],
+    }
+
+
+def test_a_lonely_topic_is_marked_itself(draw):
+    lonely = UNMATCHED.replace(', qos: sensor_data', '').replace(', external: true', '')
+    assert marked(describe_picture(draw(lonely))) == {
+        'topic:/other': ['no-subscription'],
+        'topic:/echo': ['no-subscription'],
+    }
+
+
+def test_all_ends_with_another_type_are_marked(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: std_msgs/msg/String}
+            timers: {t: {rate: 1, publish: x, message: hello}}
+          "b_{{ i }}":
+            foreach: {i: [1, 2]}
+            subscriptions: {x: {type: std_msgs/msg/Int32, behaviour: parts:hear}}
+    """
+    marks = marked(describe_picture(draw(text)))
+    assert set(marks) >= {'publisher:/a:x', 'subscription:/b_1:x', 'subscription:/b_2:x'}
+    assert 'topic:/x' not in marks
+
+
+def test_of_repeated_nodes_only_those_meant_are_marked(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x1: std_msgs/msg/String}
+            timers: {t: {rate: 1, publish: x1, message: hello}}
+          "b_{{ i }}":
+            foreach: {i: [1, 2]}
+            subscriptions: {"x{{ i }}": {type: std_msgs/msg/String, publish: y}}
+            publishers: {y: {type: std_msgs/msg/String, external: true}}
+    """
+    assert marked(describe_picture(draw(text))) == {'topic:/x2': ['no-publisher']}
+
+
+def test_what_is_wrong_with_a_behaviour_marks_its_node(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: {type: std_msgs/msg/String, external: true}}
+            subscriptions: {y: {type: std_msgs/msg/String, external: true, behaviour: nowhere:f, publish: x}}
+    """
+    assert marked(describe_picture(draw(text))) == {'node:/a': ['unknown-behaviour']}
+
+
+def test_a_faulty_part_does_not_keep_the_rest_from_being_drawn(draw):
+    document = describe_picture(draw(UNMATCHED.replace('rate: 1', 'rat: 1', 1)))
+    assert 'unknown-key' in marked(document)['node:/talker']
+    assert len(document['edges']) == 4
+
+
+def test_processes_and_what_is_waited_for(draw):
+    text = """
+        version: 1
+        nodes:
+          a: {wait_for: [{process: driver}, {topic: elsewhere}]}
+          b: {wait_for: [{service: add}], namespace: /}
+          c: {services: {add: {type: std_srvs/srv/Trigger, behaviour: parts:add}}}
+        processes:
+          driver: {command: [run], description: Theirs.}
+    """
+    document = describe_picture(draw(text))
+    assert by_id(document, 'nodes')['process:driver']['kind'] == 'process'
+    assert [(wait['node'], wait['for'], wait['line']) for wait in document['waits']] == [
+        ('node:/a', 'process:driver', 3),
+        ('node:/b', 'service:/add', 4),
+    ]
+
+
+def test_two_nodes_of_one_name_are_two(draw):
+    text = 'version: 1\nnodes: {/a/n: {}, n: {namespace: /a}}\n'
+    ids = [node['id'] for node in describe_picture(draw(text))['nodes']]
+    assert ids == ['node:/a/n', "node:/a/n'"]
+
+
+def test_ends_elsewhere_of_either_side(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: {type: std_msgs/msg/String, external: true}}
+            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
+            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
+    """
+    channels = by_id(describe_picture(draw(text)), 'channels')
+    assert {key: each['external'] for key, each in channels.items()} == {
+        'topic:/x': ['users'],
+        'topic:/y': ['providers'],
+        'service:/add': ['providers'],
+    }
+
+
+def test_qos_that_says_the_default_does_not_differ(draw):
+    qos = '{reliability: reliable, depth: 10, deadline: infinite}'
+    edges = describe_picture(draw(TALKER.replace('sensor_data', qos)))['edges']
+    assert edges[0]['qos'] == {}
+
+
+def test_what_a_setting_says_lies_in_no_file(draw):
+    setting = 'nodes.ear.publishers={late: {type: std_msgs/msg/String, external: true}}  # a//b'
+    edges = by_id(describe_picture(draw(TALKER, setting)), 'edges')
+    assert edges['publisher:/ear:late']['file'] == f'--set {setting}'
+
+
+@pytest.mark.parametrize('format_name', ['mermaid', 'dot', 'json'])
+def test_the_same_file_gives_the_same_text(draw, format_name):
+    assert render_picture(draw(TALKER), format_name) == render_picture(draw(TALKER), format_name)
+
+
+def test_the_ending_of_a_file_tells_the_form():
+    endings = ['.svg', '.HTML', '.gv', '.dot', '.json', '.mmd', '.txt', '']
+    assert [format_of(ending) for ending in endings] == [
+        *('svg', 'html', 'dot', 'dot', 'json', 'mermaid', 'mermaid', 'mermaid')
+    ]
+    assert set(map(format_of, endings)) == set(FORMATS)

@@ -1,0 +1,198 @@
+"""The forms that are languages of others: whatever a name holds, it stays text."""
+
+import html
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from composer.drawing import render_picture
+from composer.reports.yaml import render_yaml
+
+SYSTEM = """
+    version: 1
+    nodes:
+      lidar:
+        namespace: /robot/front
+        publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}
+        timers: {t: {rate: 1, publish: scan, message: hello}}
+      mapper:
+        namespace: /robot
+        subscriptions: {front/scan: {type: std_msgs/msg/String, publish: map}}
+        publishers: {map: {type: std_msgs/msg/String, external: true}}
+      alone:
+        publishers: {lonely: std_msgs/msg/String}
+        timers: {t: {rate: 1, publish: lonely, message: hello}}
+        wait_for: [{node: /robot/mapper}]
+"""
+EVIL = 'x"] --> <script>alert(1)</script> & %%{init} `b` \\N \\" |c| ; end #quot; ]]> -->'
+
+
+def test_mermaid(draw):
+    assert render_picture(draw(SYSTEM), 'mermaid').splitlines() == [
+        'flowchart LR',
+        '  n2(["alone"]):::node',
+        '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system hears<br/>\'/lonely\'"]:::warning',
+        '  xc1u(("elsewhere")):::external',
+        '  subgraph s0["/robot"]',
+        '    n1(["mapper"]):::node',
+        '    c0["/robot/front/scan<br/>std_msgs/msg/String"]:::topic',
+        '    c1["/robot/map<br/>std_msgs/msg/String"]:::topic',
+        '    subgraph s1["/robot/front"]',
+        '      n0(["lidar"]):::node',
+        '    end',
+        '  end',
+        "  n0 -->|\"depth 5, best_effort<br/>error: on topic '/robot/front/scan' the QoS<br/>of publisher 'scan' of node 'lidar' and of<br/>subscription 'front/scan' of node 'mapper'<br/>never match: reliability: best_effort is<br/>offered, reliable is requested\"| c0",
+        '  c0 --> n1',
+        '  n1 --> c1',
+        '  n2 --> c2',
+        '  c1 -.-> xc1u',
+        '  n1 -.->|"before"| n2',
+        '  linkStyle 0 stroke:#d1242f,stroke-width:3px,color:#d1242f',
+        '  linkStyle 1 stroke:#d1242f,stroke-width:3px,color:#d1242f',
+        '  classDef node stroke-width:2px',
+        '  classDef process stroke-width:2px,stroke-dasharray:6 3',
+        '  classDef external stroke-dasharray:3 3',
+        '  classDef error stroke:#d1242f,stroke-width:3px',
+        '  classDef warning stroke:#bf8700,stroke-width:3px',
+    ]
+
+
+def test_dot(draw):
+    lines = [line.strip() for line in render_picture(draw(SYSTEM), 'dot').splitlines()]
+    assert [line.partition(' [')[0] for line in lines] == [
+        'digraph "robot" {',
+        *('graph', 'node', 'edge', 'n2', 'c2', 'xc1u', 'subgraph cluster_0 {', 'graph'),
+        *('n1', 'c0', 'c1', 'subgraph cluster_1 {', 'graph', 'n0', '}', '}'),
+        *('n0 -> c0', 'c0 -> n1', 'n1 -> c1', 'n2 -> c2', 'c1 -> xc1u', 'n1 -> n2', '}'),
+    ]
+    assert lines[4] == (
+        'n2 [label=<<B>alone</B>>, shape=ellipse, style=filled, fillcolor="#ddf4ff", '
+        'color="#0969da", id="n2", class="node"]'
+    )
+    assert 'class="topic error"' in lines[17]
+    assert 'class="topic warning"' in lines[5]
+
+
+def test_clients_and_servers_elsewhere_stand_on_their_side(draw):
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: {type: std_msgs/msg/String, external: true}}
+            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
+            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
+    """
+    lines = render_picture(draw(text), 'mermaid').splitlines()
+    assert [line.strip() for line in lines if '-.->' in line] == [
+        'c0 -.-> xc0u',
+        'xc1p -.-> c1',
+        'c2 -.-> xc2p',
+    ]
+
+
+def test_of_many_findings_the_rest_is_counted(draw):
+    text = 'version: 1\nnodes: {n: {a: 1, b: 2, c: 3, d: 4}}\n'
+    label = render_picture(draw(text), 'mermaid').splitlines()[1]
+    assert label.count('error:') == 2
+    assert label.endswith('<br/>and 2 more"]):::error')
+
+
+def with_name(text):
+    """Return a system with a node, a process, a description and a type of this text."""
+    data = {
+        'version': 1,
+        'description': text,
+        'nodes': {text: {'publishers': {'x': text}, 'description': text}},
+        'processes': {text: {'command': ['a']}},
+    }
+    return render_yaml(data)
+
+
+def labels_of_mermaid(text):
+    """Return the quoted texts, and fail if anything else could be one."""
+    for line in text.splitlines():
+        assert line.count('"') in (0, 2)
+    labels = re.findall('"(.*?)"', text)
+    assert not any(set(label.replace('<br/>', '')) & set('<>&"`|[]{}%\\') for label in labels)
+    return [re.sub(r'#(\d+);', lambda match: chr(int(match[1])), label) for label in labels]
+
+
+def test_any_name_stays_text_in_mermaid(draw):
+    labels = labels_of_mermaid(render_picture(draw(with_name(EVIL)), 'mermaid'))
+    assert any(label.split('<br/>error: ')[0] == EVIL for label in labels)
+
+
+# Labels of HTML keep their brackets in pairs, and what they hold is XML.
+LABEL = re.compile(r'label=<((?:[^<>]|<[^<>]*>)*)>')
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(text=st.text(min_size=1, max_size=20))
+def test_any_name_stays_text_in_dot_and_mermaid(draw, text):
+    picture = draw(with_name(text))
+    labels_of_mermaid(render_picture(picture, 'mermaid'))
+    for line in render_picture(picture, 'dot').splitlines():
+        rest = LABEL.sub('', line)
+        assert '<' not in rest
+        for label in LABEL.findall(line):
+            ET.fromstring(f'<label>{label}</label>')
+
+
+def test_the_name_of_a_file_is_text_in_dot(draw):
+    assert render_picture(draw(SYSTEM, name='a"b\\'), 'dot').startswith('digraph "a\\"b\\\\" {\n')
+
+
+def test_svg_is_xml_with_the_names_as_they_are(draw, needs_graphviz):
+    root = ET.fromstring(render_picture(draw(with_name(EVIL)), 'svg'))
+    texts = [each.text or '' for each in root.iter('{http://www.w3.org/2000/svg}text')]
+    assert EVIL in texts
+    titles = [each.text for each in root.iter('{http://www.w3.org/2000/svg}title')]
+    assert any(title.startswith(f'node /{EVIL}\n') for title in titles)
+    assert not list(root.iter('{http://www.w3.org/2000/svg}script'))
+
+
+def test_svg_has_an_element_for_each_part(draw, needs_graphviz):
+    root = ET.fromstring(render_picture(draw(SYSTEM), 'svg'))
+    classes = {each.get('id'): each.get('class') for each in root.iter() if each.get('id')}
+    assert classes['e0'] == 'edge topic error'
+    assert classes['e1'] == 'edge topic error'
+    assert classes['e2'] == 'edge topic'
+    assert classes['c2'] == 'node topic warning'
+    assert classes['n0'] == 'node node'
+    assert {'g0', 'g1', 'n1', 'n2', 'c0', 'c1', 'e3'} <= set(classes)
+
+
+def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
+    text = html.unescape(render_picture(draw(SYSTEM), 'svg'))
+    assert (
+        '<title>publisher scan of node /robot/front/lidar: std_msgs/msg/String, '
+        'depth 5, best_effort\non topic' in text
+    )
+    assert '<title>topic /robot/map: std_msgs/msg/String</title>' in text
+
+
+@pytest.mark.parametrize('format_name', ['svg', 'html'])
+def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch, format_name):
+    from composer.drawing.layout import DrawingError
+
+    monkeypatch.setattr('shutil.which', lambda name: None)
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    with pytest.raises(DrawingError, match='laid out by Graphviz, which is not') as caught:
+        render_picture(draw(SYSTEM), format_name)
+    assert "pip install 'rclpy-composer[graph]'" in caught.value.help
+
+
+def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
+    from composer.drawing.layout import DrawingError, lay_out
+
+    program = tmp_path / 'dot'
+    program.write_text(
+        '#!/bin/sh\necho "<svg></svg>"; echo "Warning: no" >&2; echo "out of paper" >&2; exit 3\n'
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
+    with pytest.raises(DrawingError, match='Graphviz failed with code 3: out of paper'):
+        lay_out('digraph {}')

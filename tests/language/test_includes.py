@@ -1,0 +1,302 @@
+"""Includes: other files as parts of this one."""
+
+import textwrap
+
+import pytest
+
+from composer.language import load_system
+
+ARM = """
+version: 1
+args: {side: {type: string}, joints: 2}
+defaults: {namespace: arm, log_level: debug, qos: fast}
+qos: {fast: {depth: 3}}
+nodes:
+  driver:
+    publishers: {state: std_msgs/msg/String, other: {type: std_msgs/msg/String, qos: 4}}
+    parameters: {side: "{{ side }}"}
+  "joint_{{ j }}": {foreach: {j: "{{ range(joints) }}"}, namespace: /fixed}
+"""
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(**files):
+        for name, text in files.items():
+            (tmp_path / f'{name}.yaml').write_text(textwrap.dedent(text).lstrip())
+        from pathlib import Path
+
+        return Path('robot.yaml')
+
+    return write
+
+
+def robot(include, rest='nodes: {}'):
+    return f'version: 1\ninclude:\n  part: {include}\n{rest}\n'
+
+
+def full_names(system):
+    return [f'{node.namespace}/{node.name}' for node in system.spec.nodes.values()]
+
+
+def findings(system):
+    return [(each.rule, str(each.span), each.message) for each in system.diagnostics]
+
+
+def test_a_file_gets_its_arguments_and_keeps_its_defaults_and_profiles(write):
+    path = write(
+        arm=ARM,
+        robot=robot('{file: arm.yaml, args: {side: left}}', 'nodes: {brain: {}}'),
+    )
+    system = load_system(path)
+    assert not system.diagnostics
+    nodes = system.spec.nodes
+    assert full_names(system) == ['//brain', '/arm/driver', '/fixed/joint_0', '/fixed/joint_1']
+    assert nodes['driver'].parameters['side'].value == 'left'
+    assert (nodes['driver'].log_level, nodes['brain'].log_level) == ('debug', None)
+    assert nodes['driver'].publishers['state'].qos.profile == 'fast'
+    assert nodes['driver'].publishers['other'].qos.policies == {'depth': 4}
+
+
+def test_nothing_leaks_into_an_included_file(write):
+    text = 'defaults: {log_level: error, qos: 9, namespace: outer}\nqos: {slow: {depth: 1}}\n'
+    path = write(
+        part='version: 1\nnodes: {n: {publishers: {a: {type: std_msgs/msg/Empty}}}}',
+        robot=robot('{file: part.yaml}', f'{text}nodes: {{m: {{}}}}'),
+    )
+    system = load_system(path)
+    node = system.spec.nodes['n']
+    assert (node.namespace, node.log_level) == ('/', None)
+    assert node.publishers['a'].qos.policies == {}
+    assert system.spec.nodes['m'].namespace == '/outer'
+
+
+def test_a_file_included_twice_needs_two_namespaces(write):
+    include = """
+        version: 1
+        include:
+          left: {file: arm.yaml, namespace: left, args: {side: left, joints: 0}}
+          right: {file: arm.yaml, namespace: /right, args: {side: right, joints: 0}}
+        nodes: {}
+    """
+    system = load_system(write(arm=ARM, robot=include))
+    assert not system.diagnostics
+    assert full_names(system) == ['/left/arm/driver', '/right/arm/driver']
+
+
+def test_the_same_full_name_twice_is_said_with_the_include(write):
+    include = """
+        version: 1
+        include:
+          left: {file: arm.yaml, args: {side: left, joints: 0}}
+          right: {file: arm.yaml, args: {side: right, joints: 0}}
+        nodes: {}
+    """
+    (finding,) = load_system(write(arm=ARM, robot=include)).diagnostics
+    assert (finding.rule, str(finding.span)) == ('duplicate-node', 'arm.yaml:6:3')
+    assert [str(each.span) for each in finding.related] == ['robot.yaml:4:17']
+
+
+def test_profiles_of_one_name_stay_apart(write):
+    path = write(
+        arm=ARM,
+        robot=robot(
+            '{file: arm.yaml, args: {side: l, joints: 0}}',
+            'qos: {fast: {depth: 8}}\nnodes: {n: {publishers: {a: {type: a/msg/B, qos: fast}}}}',
+        ),
+    )
+    spec = load_system(path).spec
+    own = spec.nodes['n'].publishers['a'].qos.profile
+    other = spec.nodes['driver'].publishers['state'].qos.profile
+    assert spec.qos[own].policies == {'depth': 8}
+    assert spec.qos[other].policies == {'depth': 3}
+
+
+def test_rules_of_the_include_come_first(write):
+    path = write(
+        part='version: 1\nnodes: {n: {remap: {a: inner, b: inner}}}',
+        robot=robot('{file: part.yaml, remap: {b: outer, c: outer}}'),
+    )
+    rules = load_system(path).spec.nodes['n'].remap
+    assert rules == (('b', 'outer'), ('c', 'outer'), ('a', 'inner'))
+
+
+def test_includes_are_repeated_and_left_out(write):
+    include = """
+        version: 1
+        args: {count: 2}
+        include:
+          "robot_{{ i }}":
+            foreach: {i: "{{ range(count) }}"}
+            file: part.yaml
+            namespace: "robot_{{ i }}"
+          real: {file: no_such.yaml, when: false}
+        nodes: {}
+    """
+    system = load_system(write(part='version: 1\nnodes: {n: {}}', robot=include))
+    assert not system.diagnostics
+    assert full_names(system) == ['/robot_0/n', '/robot_1/n']
+
+
+def test_paths_are_relative_to_the_file_that_includes(write, tmp_path):
+    (tmp_path / 'deep').mkdir()
+    (tmp_path / 'deep' / 'mid.yaml').write_text(robot('{file: leaf.yaml}'))
+    (tmp_path / 'deep' / 'leaf.yaml').write_text('version: 1\nnodes: {leaf: {}}')
+    system = load_system(write(robot=robot('{file: deep/mid.yaml}')))
+    assert full_names(system) == ['//leaf']
+
+
+def test_a_fault_in_the_deepest_file_comes_with_the_chain_of_includes(write):
+    path = write(
+        leaf='version: 1\nnodes: {leaf: {log_levl: debug}}',
+        mid=robot('{file: leaf.yaml}'),
+        robot=robot('{file: mid.yaml}'),
+    )
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, str(finding.span)) == ('unknown-key', 'leaf.yaml:2:16')
+    assert [str(each.span) for each in finding.related] == ['mid.yaml:3:16', 'robot.yaml:3:16']
+
+
+@pytest.mark.parametrize(
+    ('include', 'expected'),
+    [
+        (
+            '{file: amr.yaml, args: {side: l}}',
+            ('missing-include', 'robot.yaml:3:16', "there is no file 'amr.yaml'"),
+        ),
+        (
+            '{file: "package://no_such/x.yaml"}',
+            ('missing-include', 'robot.yaml:3:16', "no package 'no_such' is installed"),
+        ),
+        (
+            '{file: arm.yaml, args: {side: l, jonts: 3}}',
+            ('unknown-argument', 'robot.yaml:3:42', "'arm.yaml' takes no argument 'jonts'"),
+        ),
+        (
+            '{file: arm.yaml}',
+            ('missing-argument', 'robot.yaml:3:16', "'arm.yaml' wants the argument 'side'"),
+        ),
+        (
+            '{file: arm.yaml, args: {side: l, joints: many}}',
+            ('argument-type', 'robot.yaml:3:50', "'joints': expected an integer, got 'many'"),
+        ),
+        (
+            '{file: robot.yaml}',
+            ('include-cycle', 'robot.yaml:3:16', "'robot.yaml' includes itself"),
+        ),
+    ],
+)
+def test_what_is_wrong_with_an_include_is_said_at_its_place(write, include, expected):
+    (finding,) = findings(load_system(write(arm=ARM, robot=robot(include))))
+    assert finding == expected
+
+
+def test_a_cycle_over_two_files_names_the_way(write):
+    path = write(a=robot('{file: robot.yaml}'), robot=robot('{file: a.yaml}'))
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, str(finding.span)) == ('include-cycle', 'a.yaml:3:16')
+    assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
+
+
+def test_a_missing_file_comes_with_the_nearest_one(write):
+    path = write(arm=ARM, robot=robot('{file: amr.yaml}'))
+    assert load_system(path).diagnostics[0].help == "did you mean 'arm.yaml'?"
+
+
+# Includes in includes
+
+MIDDLE = """
+version: 1
+include:
+  left: {file: leaf.yaml, namespace: left}
+  right: {file: leaf.yaml, namespace: right}
+nodes: {}
+"""
+
+
+def test_a_relative_namespace_stays_relative_through_all_includes(write):
+    path = write(
+        leaf='version: 1\nnodes: {t: {}}\n',
+        middle=MIDDLE,
+        robot='version: 1\ninclude: {a: {file: middle.yaml, namespace: a}, b: {file: middle.yaml, '
+        'namespace: b}}\nnodes: {}\n',
+    )
+    system = load_system(path)
+    assert not system.diagnostics
+    names = [node.full_name for node in system.spec.nodes.values()]
+    assert names == ['/a/left/t', '/a/right/t', '/b/left/t', '/b/right/t']
+
+
+def test_profiles_that_start_from_others_of_one_name_stay_apart(write):
+    path = write(
+        leaf='version: 1\nqos: {base: {depth: 2}, fast: {profile: base}}\nnodes: {}\n',
+        robot=robot(
+            '{file: leaf.yaml}',
+            'qos: {base: {depth: 1}, fast: {profile: base}}\nnodes: {}',
+        ),
+    )
+    assert load_system(path).data['qos'] == {
+        'base': {'depth': 1},
+        'fast': {'profile': 'base'},
+        'part_base': {'depth': 2},
+        'part_fast': {'profile': 'part_base'},
+    }
+
+
+@pytest.mark.parametrize('who', ['robot', 'leaf'])
+def test_the_profiles_of_one_file_are_not_those_of_another(write, who):
+    user = 'nodes: {n: {publishers: {c: {type: std_msgs/msg/String, qos: fast}}}}'
+    owner = 'qos: {fast: {depth: 1}}\nnodes: {}'
+    rest = {'robot': owner, 'leaf': owner} | {who: user}
+    path = write(
+        leaf=f'version: 1\n{rest["leaf"]}', robot=robot('{file: leaf.yaml}', rest['robot'])
+    )
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, finding.message) == (
+        'unknown-qos-profile',
+        "no QoS profile is called 'fast'",
+    )
+    assert finding.span.source.name == f'{who}.yaml'
+    assert len(finding.related) == (who == 'leaf')
+
+
+def test_a_node_that_is_left_out_takes_no_name(write):
+    path = write(
+        leaf='version: 1\nnodes: {lidar: {log_level: info}}\n',
+        robot=robot('{file: leaf.yaml}', 'nodes: {lidar: {when: false}}'),
+    )
+    system = load_system(path)
+    assert not system.diagnostics
+    assert [node.log_level for node in system.spec.nodes.values()] == ['info']
+
+
+def test_files_that_include_each_other_over_and_over_are_bounded(write):
+    again = '{file: FILE, namespace: "n_{{ i }}", foreach: {i: "{{ range(10) }}"}}'
+    files = {
+        f'f{number}': f'version: 1\ninclude: {{"x_{{{{ i }}}}": {again}}}\nnodes: {{}}\n'.replace(
+            'FILE', f'f{number + 1}.yaml'
+        )
+        for number in range(6)
+    }
+    path = write(
+        **files,
+        f6='version: 1\nnodes: {n: {}}\n',
+        robot=robot('{file: f0.yaml}', 'max_nodes: 50\nnodes: {}'),
+    )
+    (finding,) = load_system(path).diagnostics
+    assert finding.rule == 'too-many-entries'
+    assert finding.message == 'there are more than 50 entries in include of all files'
+
+
+def test_what_is_ignored_may_hold_variables_of_foreach(write):
+    text = """
+    version: 1
+    x-wheel: &wheel {parameters: {index: "{{ i }}"}}
+    nodes:
+      "wheel_{{ i }}": {<<: *wheel, foreach: {i: [1, 2]}}
+    """
+    system = load_system(write(robot=text))
+    assert not system.diagnostics
+    assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]

@@ -1,0 +1,165 @@
+"""Several files as one, and settings on the command line."""
+
+import textwrap
+
+import pytest
+
+from composer.errors import UsageError
+from composer.language import load_system
+
+BASE = """
+    version: 1
+    args: {robots: 1}
+    nodes:
+      talker:
+        log_level: info
+        parameters: {rate: 1.0, a.b: 2}
+        publishers: {chatter: std_msgs/msg/String}
+        timers: {tick: {period: 1.0, publish: chatter, message: hello}}
+      listener: {}
+"""
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(**files):
+        paths = []
+        for name, text in files.items():
+            path = tmp_path / f'{name}.yaml'
+            path.write_text(textwrap.dedent(text).lstrip())
+            paths.append(path.relative_to(tmp_path))
+        return paths
+
+    return write
+
+
+def load(paths, *settings, words=None):
+    return load_system(paths[0], words, layers=paths[1:], settings=settings)
+
+
+def test_mappings_merge_and_all_else_replaces(write):
+    site = """
+        nodes:
+          talker: {log_level: debug, timers: {tick: {period: 0.5}}}
+          extra: {}
+    """
+    system = load(write(base=BASE, site=site))
+    assert not system.diagnostics
+    talker = system.spec.nodes['talker']
+    assert talker.log_level == 'debug'
+    assert (talker.timers['tick'].period_sec, talker.timers['tick'].message) == (0.5, 'hello')
+    assert list(system.spec.nodes) == ['talker', 'listener', 'extra']
+
+
+def test_null_removes(write):
+    system = load(write(base=BASE, site='nodes: {listener: null, talker: {log_level: null}}'))
+    assert list(system.spec.nodes) == ['talker']
+    assert system.spec.nodes['talker'].log_level is None
+
+
+def test_a_later_layer_wins_over_an_earlier_one(write):
+    layers = {name: f'nodes: {{talker: {{log_level: {name}}}}}' for name in ('debug', 'error')}
+    assert load(write(base=BASE, **layers)).spec.nodes['talker'].log_level == 'error'
+
+
+def test_a_fault_in_a_layer_is_said_at_the_layer(write):
+    (finding,) = load(write(base=BASE, site='nodes: {talker: {log_levl: debug}}')).diagnostics
+    assert str(finding.span) == 'site.yaml:1:18'
+
+
+def test_a_layer_that_cannot_be_read_stops_all(write):
+    paths = write(base=BASE)
+    system = load([*paths, paths[0].with_name('none.yaml')])
+    assert system.spec is None
+    assert system.diagnostics[0].rule == 'unreadable-file'
+
+
+def test_a_layer_may_change_arguments(write):
+    system = load(write(base=BASE, site='args: {robots: 3}'))
+    assert system.arguments['robots'].default == 3
+
+
+@pytest.mark.parametrize(
+    ('setting', 'read'),
+    [
+        ('nodes.talker.log_level=debug', lambda talker: talker.log_level == 'debug'),
+        ('nodes.talker.timers.tick.period=0.1', lambda t: t.timers['tick'].period_sec == 0.1),
+        ('nodes.talker.parameters.rate=2', lambda t: t.parameters['rate'].value == 2),
+        ('nodes.talker.parameters.a.b=5', lambda t: t.parameters['a.b'].value == 5),
+        ('nodes.talker.log_level=null', lambda talker: talker.log_level is None),
+        ('nodes.talker.remap={a: b}', lambda talker: talker.remap == (('a', 'b'),)),
+        ('nodes.talker.description="{{ robots }} robots"', lambda t: t.description == '1 robots'),
+    ],
+)
+def test_a_setting_is_the_last_layer_and_typed_as_in_a_file(write, setting, read):
+    system = load(write(base=BASE), setting)
+    assert not system.diagnostics
+    assert read(system.spec.nodes['talker'])
+
+
+@pytest.mark.parametrize(
+    ('setting', 'message', 'help_text'),
+    [
+        ('nodes.talkr.log_level=debug', "there is no 'talkr' in nodes", "did you mean 'talker'?"),
+        (
+            'nodes.talker.parameters.rat=2',
+            "there is no 'rat' in nodes.talker.parameters",
+            "did you mean 'rate'?",
+        ),
+        (
+            'nodes.talker.log_level.x=1',
+            "'nodes.talker.log_level' is a value, and has no 'x' in it",
+            None,
+        ),
+        (
+            'nodes.talker',
+            "'nodes.talker' sets nothing",
+            'write path=value, as in executor.threads=4',
+        ),
+    ],
+)
+def test_a_setting_that_leads_nowhere_is_refused(write, setting, message, help_text):
+    with pytest.raises(UsageError) as caught:
+        load(write(base=BASE), setting)
+    assert str(caught.value).endswith(message)
+    assert caught.value.help == help_text
+
+
+def test_a_fault_in_a_setting_is_said_at_the_setting(write):
+    (finding,) = load(write(base=BASE), 'nodes.talker.log_level=loud').diagnostics
+    assert finding.span.source.name == '--set nodes.talker.log_level=loud'
+    assert finding.span.text == 'loud'
+
+
+def test_null_is_a_value_of_warn_after(write):
+    base = 'version: 1\nnodes: {talker: {warn_after: 3}, other: {warn_after: 3}}\n'
+    site = 'nodes: {talker: {warn_after: null}, new: {warn_after: null, state: {x: null}}}'
+    system = load(write(base=base, site=site), 'nodes.other.warn_after=null')
+    assert [each.warn_after_sec for each in system.spec.nodes.values()] == [None] * 3
+    assert system.spec.nodes['new'].state == {'x': None}
+
+
+def test_names_of_sections_are_names_like_others(write):
+    system = load(
+        write(base='version: 1\nnodes: {timers: {description: x}}\n'),
+        'nodes.timers.log_level=debug',
+    )
+    assert system.spec.nodes['timers'].log_level == 'debug'
+
+
+def test_a_setting_of_one_item_of_a_list_says_how_to_set_the_list(write):
+    paths = write(base='version: 1\nnodes: {a: {parameter_files: [x.yaml]}}\n')
+    with pytest.raises(UsageError) as caught:
+        load(paths, 'nodes.a.parameter_files.0=y.yaml')
+    assert caught.value.help == (
+        'give the whole list, as in --set "nodes.a.parameter_files=[first, second]"'
+    )
+
+
+def test_a_wrong_key_in_a_setting_is_said_at_the_setting(write):
+    system = load(write(base='version: 1\nnodes: {a: {}}\n'), 'nodes.a.parametrs.x=3')
+    (finding,) = system.diagnostics
+    assert finding.rule == 'unknown-key'
+    assert str(finding.span) == '--set nodes.a.parametrs.x=3:1:1'

@@ -1,0 +1,239 @@
+"""What tests of running systems share: a ROS domain, Composer in a child process, a plain peer."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DEADLINE_SEC = 40.0
+PATIENCE_SEC = 8.0
+
+# Domains of DDS whose ports lie below the range that Linux gives to outgoing connections.
+_FIRST_DOMAIN, _DOMAINS = 10, 91
+_domain_offsets = count(os.getpid() * 7)
+
+
+def wait_for(condition, what):
+    """Return the first true result of `condition`; fail after a deadline."""
+    deadline = time.monotonic() + DEADLINE_SEC
+    while not (result := condition()):
+        if time.monotonic() > deadline:
+            pytest.fail(f'in vain waited for {what}')
+        time.sleep(0.01)
+    return result
+
+
+def allocate_domain():
+    """Return a ROS domain that no process of this machine is in."""
+    for offset in _domain_offsets:
+        domain = _FIRST_DOMAIN + offset % _DOMAINS
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                # The port that the first participant of a domain listens on.
+                probe.bind(('', 7400 + 250 * domain + 10))
+            except OSError:
+                continue
+        return domain
+    raise AssertionError
+
+
+class Child:
+    """A command of Composer in a process of its own, with all that it has printed so far."""
+
+    def __init__(self, arguments, folder, domain_id, log_folder):
+        environment = os.environ | {
+            'ROS_DOMAIN_ID': str(domain_id),
+            'ROS_LOG_DIR': str(log_folder),
+            'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
+            'RCUTILS_COLORIZED_OUTPUT': '0',
+            'PYTHONUNBUFFERED': '1',
+            'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]),
+        }
+        self.lines = []
+        self._grown = threading.Condition()
+        self._ended = False
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'composer', *map(str, arguments)],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    @property
+    def output(self):
+        return '\n'.join(self.lines)
+
+    def matching(self, part):
+        return [line for line in self.lines if part in line]
+
+    def wait_for_line(self, part, *, times=1):
+        """Return the line that contains `part`, or the last of as many as are wanted."""
+
+        def arrived():
+            return len(self.matching(part)) >= times
+
+        with self._grown:
+            self._grown.wait_for(lambda: arrived() or self._ended, DEADLINE_SEC)
+        if not arrived():
+            pytest.fail(f'{times} x {part!r} did not come; the output was\n{self.output}')
+        return self.matching(part)[times - 1]
+
+    def wait_until_ready(self):
+        return self.wait_for_line(' ready in ')
+
+    def send(self, number):
+        self._process.send_signal(number)
+
+    def wait(self):
+        """Return the exit code."""
+        try:
+            code = self._process.wait(DEADLINE_SEC)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f'it did not end; the output was\n{self.output}')
+        self._reader.join(DEADLINE_SEC)
+        return code
+
+    def stop(self, number=signal.SIGINT):
+        """Send a signal and return the exit code."""
+        self.send(number)
+        return self.wait()
+
+    def end(self):
+        """End it as a user does, if need be by force, which leaves shared memory behind."""
+        for number in (signal.SIGINT, signal.SIGKILL):
+            self._process.send_signal(number)
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(PATIENCE_SEC)
+        self._reader.join()
+        self._process.stdout.close()
+
+    def _read(self):
+        for line in self._process.stdout:
+            with self._grown:
+                self.lines.append(line.rstrip('\n'))
+                self._grown.notify_all()
+        with self._grown:
+            self._ended = True
+            self._grown.notify_all()
+
+
+class Composing:
+    """Writes systems into a folder and runs them; `domain_id` is theirs."""
+
+    def __init__(self, folder, domain_id):
+        self.folder = folder
+        self.domain_id = domain_id
+        self._children = []
+
+    def write(self, text, code='', name='system'):
+        """Write `<name>.yaml` and the behaviours `parts`; return the path of the first."""
+        (self.folder / 'parts.py').write_text(dedent(code))
+        path = self.folder / f'{name}.yaml'
+        path.write_text(dedent(text))
+        return path
+
+    def run(self, path, *arguments, folder=None):
+        """Run `composer up` on a file that is there already."""
+        child = Child(
+            ['up', path, *arguments],
+            folder or self.folder,
+            self.domain_id,
+            self.folder / 'log',
+        )
+        self._children.append(child)
+        return child
+
+    def __call__(self, text, code='', *arguments):
+        """Run `composer up` on a file of this text, with behaviours of the module `parts`."""
+        return self.run(self.write(text, code).name, *arguments)
+
+    def end(self):
+        for child in self._children:
+            child.end()
+
+
+class Peer:
+    """A plain rclpy node in a context of its own, spun by a thread."""
+
+    def __init__(self, domain_id):
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain_id)
+        self.node = rclpy.create_node('peer', context=self.context, use_global_arguments=False)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin)
+        self._spinning = True
+        self._thread.start()
+
+    def listen(self, message_class, topic, qos=10):
+        """Return a list that grows by each message."""
+        heard = []
+        self.node.create_subscription(message_class, topic, heard.append, qos)
+        self._executor.wake()
+        return heard
+
+    def advertise(self, message_class, topic, qos=10):
+        """Return a publisher that has met its first subscription."""
+        publisher = self.node.create_publisher(message_class, topic, qos)
+        wait_for(publisher.get_subscription_count, f'a subscription to {topic}')
+        return publisher
+
+    def call(self, service_class, name, /, **fields):
+        """Call a service and return its response."""
+        (response,) = self.call_all(service_class, [name], **fields)
+        return response
+
+    def call_all(self, service_class, names, /, **fields):
+        """Call several services at the same time and return their responses."""
+        clients = [self.node.create_client(service_class, name) for name in names]
+        for client in clients:
+            assert client.wait_for_service(DEADLINE_SEC), f'there is no {client.srv_name}'
+        request = service_class.Request(**fields)
+        calls = [client.call_async(request) for client in clients]
+        sent = time.monotonic()
+
+        def all_done():
+            nonlocal sent
+            # A server that has not found the client's end yet answers into the void.
+            if time.monotonic() > sent + PATIENCE_SEC:
+                sent = time.monotonic()
+                for index, client in enumerate(clients):
+                    if not calls[index].done():
+                        calls[index] = client.call_async(request)
+            return all(call.done() for call in calls)
+
+        self._executor.wake()
+        wait_for(all_done, f'the responses of {names}')
+        for client in clients:
+            self.node.destroy_client(client)
+        return [call.result() for call in calls]
+
+    def close(self):
+        self._spinning = False
+        self._executor.wake()
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+        self.context.destroy()
+
+    def _spin(self):
+        while self._spinning:
+            self._executor.spin_once(timeout_sec=0.1)

@@ -1,0 +1,103 @@
+"""`environment:` holds for ROS, for behaviours and for foreign processes, and is taken back."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.errors import StartError
+from composer.runtime.environment import check_middleware, environment_set
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = """
+import os
+
+print('imported in', os.environ.get('ROS_DOMAIN_ID'), os.environ.get('MODE'), flush=True)
+
+def tell(node):
+    node.logger.info(f'domain {node.ros.context.get_domain_id()}')
+    node.shutdown()
+"""
+SYSTEM = """
+version: 1
+environment: {{ROS_DOMAIN_ID: {domain}, MODE: fast, RCUTILS_CONSOLE_OUTPUT_FORMAT: '<{{message}}>'}}
+nodes: {{n: {{timers: {{t: {{period: 0.5, behaviour: 'parts:tell'}}}}}}}}
+processes: {{driver: {{command: [sh, -c, 'echo "$ROS_DOMAIN_ID $MODE"']}}}}
+"""
+
+
+def test_variables_hold_for_ros_behaviours_and_processes(compose, domain_id):
+    other = domain_id + 1
+    child = compose(SYSTEM.format(domain=other), CODE)
+
+    assert child.wait() == 0
+    assert f'imported in {other} fast' in child.lines
+    assert f'[driver] {other} fast' in child.lines
+    # The form of the log shows that it was set before ROS was loaded.
+    assert f'<domain {other}>' in child.lines
+
+
+def test_variables_are_as_before_when_a_system_has_ended_in_process(compose, domain_id):
+    path = compose.write(SYSTEM.format(domain=domain_id + 1), CODE)
+    program = """
+import os, sys
+import composer
+
+os.environ['MODE'] = 'slow'
+os.environ.pop('RCUTILS_CONSOLE_OUTPUT_FORMAT', None)
+before = dict(os.environ)
+code = composer.up(sys.argv[1])
+print(code, before == dict(os.environ))
+"""
+    result = subprocess.run(
+        [sys.executable, '-c', program, path.name],
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=100,
+        check=True,
+    )
+
+    assert result.stdout.splitlines()[-1] == '0 True'
+
+
+def read(*names):
+    return [os.environ.get(name) for name in names]
+
+
+def test_variables_are_taken_back_after_an_error(monkeypatch):
+    monkeypatch.setenv('KEPT', 'before')
+    monkeypatch.delenv('NEW', raising=False)
+    seen = []
+
+    def fail():
+        with environment_set({'KEPT': 'now', 'NEW': '1'}):
+            seen.append(read('KEPT', 'NEW'))
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        fail()
+    assert seen == [['now', '1']]
+    assert read('KEPT', 'NEW') == ['before', None]
+
+
+def test_another_middleware_than_the_one_loaded_before_is_said():
+    from rclpy.utilities import get_rmw_implementation_identifier
+
+    loaded = get_rmw_implementation_identifier()
+    check_middleware({'RMW_IMPLEMENTATION': loaded})
+    check_middleware({})
+    with pytest.raises(StartError) as caught:
+        check_middleware({'RMW_IMPLEMENTATION': 'rmw_other_cpp'})
+
+    assert str(caught.value) == (
+        f"RMW_IMPLEMENTATION is 'rmw_other_cpp', but this process has loaded '{loaded}' before"
+    )
+    assert caught.value.help == 'a process has one middleware: run this system in another'

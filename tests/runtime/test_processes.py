@@ -1,0 +1,713 @@
+"""Foreign processes: what they are given, what is heard of them, and that none is left."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Programs that are hard to get rid of; all carry the path of this file in their command lines.
+STUBBORN = """
+import os, signal, sys, time
+
+def stay():
+    print(kind, 'is there', flush=True)
+    while True:
+        time.sleep(1)
+
+kind = sys.argv[1]
+if kind == 'family' and os.fork() == 0 and os.fork() == 0:
+    stay()
+if kind == 'daemon':
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            stay()
+        os._exit(0)
+    os.wait()
+    os._exit(0)
+if kind == 'nameless':
+    if os.fork() == 0:
+        os.setsid()
+        os.execve(sys.executable, [sys.executable, '-I', '-S', __file__, 'plain'], {})
+    kind = 'parent of nameless'
+if kind == 'deaf':
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+if kind == 'asleep':
+    print(kind, 'is there', flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+if kind == 'mute':
+    print(kind, 'is there', flush=True)
+    for descriptor in (0, 1, 2):
+        os.close(descriptor)
+    while True:
+        time.sleep(1)
+stay()
+"""
+KINDS = ('plain', 'family', 'daemon', 'nameless', 'deaf', 'asleep', 'mute')
+
+
+class Stubborn:
+    """Systems of stubborn programs, and what is left of them."""
+
+    def __init__(self, folder):
+        self.path = folder / 'stubborn.py'
+        self.path.write_text(STUBBORN)
+
+    def process(self, kind, **keys):
+        command = [sys.executable, '-I', '-S', str(self.path), kind]
+        return {kind: {'command': command, **keys}}
+
+    def left(self):
+        return {
+            pid: words
+            for pid, words in command_lines().items()
+            if str(self.path).encode() in words
+        }
+
+
+def command_lines():
+    found = {}
+    for entry in Path('/proc').iterdir():
+        if entry.name.isdecimal():
+            try:
+                found[int(entry.name)] = (entry / 'cmdline').read_bytes()
+            except OSError:
+                continue
+    return found
+
+
+def children(pid):
+    found = []
+    for entry in Path(f'/proc/{pid}/task').iterdir():
+        found += map(int, (entry / 'children').read_text().split())
+    return found
+
+
+def guardians(parent):
+    """Return the guardians among the children of a process."""
+    lines = command_lines()
+    return [pid for pid in children(parent) if b'runtime/guardian.py' in lines.get(pid, b'')]
+
+
+def system(processes, nodes=None, **keys):
+    """Return a system in JSON, which is YAML."""
+    data = {'version': 1, 'diagnostics': False, 'processes': processes, **keys}
+    if nodes is not None:
+        data['nodes'] = nodes
+    return json.dumps(data, ensure_ascii=False)
+
+
+def shell(command):
+    return ['sh', '-c', command]
+
+
+@pytest.fixture
+def scratch(tmp_path, monkeypatch):
+    """Return the folder for what is temporary."""
+    folder = tmp_path / 'scratch'
+    folder.mkdir()
+    monkeypatch.setenv('TMPDIR', str(folder))
+    return folder
+
+
+@pytest.fixture
+def stubborn(tmp_path, wait_for):
+    stubborn = Stubborn(tmp_path)
+    yield stubborn
+    for pid in stubborn.left():
+        os.kill(pid, signal.SIGKILL)
+
+
+def compose_stubborn(compose, stubborn, kinds=KINDS, **keys):
+    processes = {}
+    for kind in kinds:
+        processes |= stubborn.process(kind)
+    child = compose(system(processes, **keys))
+    for kind in kinds:
+        child.wait_for_line('plain is there' if kind == 'nameless' else f'{kind} is there')
+    child.wait_until_ready()
+    assert len(stubborn.left()) >= len(kinds)
+    return child
+
+
+def test_nothing_is_left_after_a_clean_stop(compose, stubborn):
+    child = compose_stubborn(compose, stubborn, executor={'shutdown_timeout': 1.0})
+
+    assert child.stop() == 1, 'one had to be killed'
+    assert stubborn.left() == {}
+    (killed,) = child.matching('is killed')
+    assert killed == (
+        "[ERROR] [composer]: process 'deaf' did not end within 1 s of SIGINT, and is killed"
+    )
+    assert child.matching("process 'asleep' was ended by SIGINT")
+
+
+def test_nothing_is_left_after_a_second_signal(compose, stubborn):
+    child = compose_stubborn(compose, stubborn, executor={'shutdown_timeout': 3600})
+    child.send(signal.SIGINT)
+    child.wait_for_line("process 'plain' was ended by SIGINT")
+    child.send(signal.SIGTERM)
+
+    # Nobody is left to hold its output by the time that it ends itself.
+    assert child._process.wait() == 1
+    assert stubborn.left() == {}
+
+
+def test_nothing_is_left_after_the_death_of_composer(compose, stubborn, wait_for, scratch):
+    child = compose_stubborn(compose, stubborn)
+    (guardian,) = guardians(child._process.pid)
+    helpers = [guardian, *guardians(guardian)]
+    assert len(helpers) == 2
+    child.stop(signal.SIGKILL)
+
+    wait_for(lambda: not stubborn.left(), 'the end of all processes')
+    wait_for(lambda: not {*helpers} & {*command_lines()}, 'the end of the guardians')
+    assert list(scratch.iterdir()) == []
+
+
+def test_nothing_is_left_after_the_death_of_composer_and_the_guardian(
+    compose, stubborn, wait_for, scratch
+):
+    # What has left its session and emptied its environment is known to the guardian alone.
+    kinds = [kind for kind in KINDS if kind != 'nameless']
+    child = compose_stubborn(compose, stubborn, kinds)
+    (guardian,) = guardians(child._process.pid)
+    os.kill(guardian, signal.SIGSTOP)
+    child.send(signal.SIGSTOP)
+    os.kill(guardian, signal.SIGKILL)
+    child.stop(signal.SIGKILL)
+
+    wait_for(lambda: not stubborn.left(), 'the end of all processes')
+    wait_for(lambda: not list(scratch.iterdir()), 'the end of what is temporary')
+
+
+def test_a_process_dies_with_composer_and_both_guardians(compose, stubborn, wait_for):
+    child = compose_stubborn(compose, stubborn, ['plain', 'deaf', 'asleep', 'mute'])
+    (guardian,) = guardians(child._process.pid)
+    (second,) = guardians(guardian)
+    child.send(signal.SIGSTOP)
+    for pid in (guardian, second):
+        os.kill(pid, signal.SIGSTOP)
+    for pid in (second, guardian):
+        os.kill(pid, signal.SIGKILL)
+    child.stop(signal.SIGKILL)
+
+    wait_for(lambda: not stubborn.left(), 'the end of all processes')
+
+
+def test_the_death_of_the_guardian_ends_the_system(compose, stubborn):
+    kinds = [kind for kind in KINDS if kind != 'nameless']
+    child = compose_stubborn(compose, stubborn, kinds)
+    (guardian,) = guardians(child._process.pid)
+    os.kill(guardian, signal.SIGKILL)
+
+    assert child.wait() == 1
+    assert child.matching('the guardian of the processes was killed, and so were they')
+    assert stubborn.left() == {}
+
+
+def test_the_second_guardian_is_not_needed_for_a_clean_stop(compose, stubborn):
+    child = compose_stubborn(compose, stubborn, ['plain', 'daemon'])
+    (guardian,) = guardians(child._process.pid)
+    (second,) = guardians(guardian)
+    os.kill(second, signal.SIGKILL)
+
+    assert child.stop() == 0
+    assert stubborn.left() == {}
+
+
+def test_nothing_is_left_after_a_start_that_fails(compose, stubborn):
+    code = """
+        import time
+
+        def fail(node, path):
+            while sum(path.encode() in line.read_bytes() for line in command_lines()) < 3:
+                time.sleep(0.01)
+            raise OSError('no such device')
+
+        def command_lines():
+            from pathlib import Path
+
+            return [p / 'cmdline' for p in Path('/proc').glob('[0-9]*') if (p / 'cmdline').exists()]
+    """
+    nodes = {
+        'bad': {'on_start': {'behaviour': 'parts:fail', 'with': {'path': str(stubborn.path)}}}
+    }
+    child = compose(system(stubborn.process('family'), nodes), code)
+
+    assert child.wait() == 1
+    assert child.lines[-1] == "error: node 'bad': on_start raised OSError('no such device')"
+    assert stubborn.left() == {}
+
+
+def test_processes_stop_after_on_stop_of_the_nodes(compose):
+    code = """
+        def tell(node):
+            node.logger.info('on_stop')
+    """
+    command = shell('trap "echo asked; exit 0" INT; echo here; while :; do sleep 0.05; done')
+    child = compose(
+        system({'driver': {'command': command}}, {'n': {'on_stop': 'parts:tell'}}), code
+    )
+    child.wait_until_ready()
+    child.wait_for_line('[driver] here')
+
+    assert child.stop() == 0
+    assert child.lines[-3:] == [
+        '[INFO] [n]: on_stop',
+        '[driver] asked',
+        "[INFO] [composer]: process 'driver' has ended with exit code 0",
+    ]
+
+
+@pytest.mark.parametrize('name', ['SIGTERM', 'SIGHUP', 'SIGUSR2', 'SIGKILL'])
+def test_a_process_is_stopped_by_the_signal_that_it_wants(compose, name):
+    processes = {
+        'driver': {'command': shell('echo here; exec sleep 3600'), 'stop': {'signal': name}}
+    }
+    child = compose(system(processes))
+    child.wait_for_line('[driver] here')
+
+    assert child.stop() == 0
+    assert child.lines[-1] == f"[INFO] [composer]: process 'driver' was ended by {name}"
+
+
+def test_signals_that_composer_ignores_reach_the_process(compose):
+    # Python ignores SIGPIPE, and the guardian SIGINT and SIGTERM.
+    command = shell('grep -E "^Sig(Ign|Blk)" /proc/self/status')
+    child = compose(system({'driver': {'command': command}}))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == [
+        '[driver] SigBlk:\t0000000000000000',
+        '[driver] SigIgn:\t0000000000000000',
+    ]
+
+
+def test_every_line_of_the_output_has_the_name_in_front(compose):
+    printing = r"""
+        printf 'one\ntwo\r\n\nbin\377ary\303\244\n' >&2
+        printf 'begun '; sleep 0.2; printf 'and ended\nlast words'
+    """
+    child = compose(system({'driver': {'command': shell(dedent(printing))}}))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == [
+        '[driver] one',
+        '[driver] two',
+        '[driver] ',
+        '[driver] bin\\xffaryä',
+        '[driver] begun and ended',
+        '[driver] last words',
+    ]
+
+
+def test_a_flood_of_output_without_end_of_line_is_not_kept(compose):
+    code = """
+        import resource
+
+        def tell(node):
+            node.logger.info(f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB')
+    """
+    million = 40
+    flood = shell(f"head -c {million}000000 /dev/zero | tr '\\0' '#'")
+    nodes = {'n': {'on_start': 'parts:tell', 'on_stop': 'parts:tell'}}
+    child = compose(system({'driver': {'command': flood}}, nodes), code)
+    child.wait_for_line("process 'driver' has ended with exit code 0")
+
+    assert child.stop() == 0
+    assert child.output.count('#') == million * 1_000_000
+    before, after = (int(line.split()[-2]) for line in child.matching(' MB'))
+    assert after - before < 20
+
+
+def test_output_that_nobody_takes_does_not_keep_the_system_from_stopping(compose):
+    code = """
+        def tell(node):
+            node.logger.info('tick')
+    """
+    nodes = {'n': {'timers': {'t': {'period': 0.05, 'behaviour': 'parts:tell'}}}}
+    path = compose.write(system({'flood': {'command': ['yes', 'flood']}}, nodes), code)
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'composer', 'up', path.name],
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    ticks = 0
+    while ticks < 20:
+        ticks += 'tick' in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+
+    assert process.wait(30) == 0
+    assert process.stdout.readline() == '[flood] flood\n'
+    process.stdout.close()
+    process.stderr.close()
+
+
+def test_exit_codes_and_signals_are_told(compose):
+    processes = {
+        'good': {'command': ['true']},
+        'bad': {'command': shell('exit 3')},
+        'crash': {'command': shell('kill -SEGV $$')},
+    }
+    child = compose(system(processes))
+
+    child.wait_for_line("[INFO] [composer]: process 'good' has ended with exit code 0")
+    child.wait_for_line("[ERROR] [composer]: process 'bad' has ended with exit code 3")
+    child.wait_for_line("[ERROR] [composer]: process 'crash' was ended by SIGSEGV")
+    assert child.stop() == 0
+    assert len(child.matching('process ')) == 3
+
+
+@pytest.mark.parametrize(('end', 'code'), [('exit 0', 0), ('exit 3', 1), ('kill -9 $$', 1)])
+def test_the_end_of_a_required_process_ends_the_system(compose, end, code):
+    processes = {
+        'mission': {'command': shell(end), 'required': True},
+        'other': {'command': ['sleep', '3600']},
+    }
+    child = compose(system(processes))
+
+    assert child.wait() == code
+    child.wait_for_line("process 'mission' is required: the system ends")
+    child.wait_for_line("process 'other' was ended by SIGINT")
+
+
+def test_a_process_that_keeps_dying_is_started_again_ever_more_slowly(compose):
+    restart = {'when': 'on_failure', 'delay': 0, 'max': 3}
+    processes = {'bad': {'command': shell('exit 1'), 'restart': restart, 'required': True}}
+    child = compose(system(processes))
+
+    assert child.wait() == 1
+    end = "[ERROR] [composer]: process 'bad' has ended with exit code 1"
+    assert child.matching(end) == [
+        f'{end}; it is started again in 0.1 s',
+        f'{end}; it is started again in 0.2 s',
+        f'{end}; it is started again in 0.4 s',
+        f'{end}, and was started again 3 times already',
+    ]
+
+
+def test_restart_waits_for_its_delay(compose):
+    restart = {'when': 'always', 'delay': 0.3, 'max': 3}
+    child = compose(system({'good': {'command': ['true'], 'restart': restart}}))
+    child.wait_for_line('was started again 3 times already')
+
+    end = "[INFO] [composer]: process 'good' has ended with exit code 0"
+    assert child.matching(end) == [
+        f'{end}; it is started again in 0.3 s',
+        f'{end}; it is started again in 0.3 s',
+        f'{end}; it is started again in 0.4 s',
+        f'{end}, and was started again 3 times already',
+    ]
+
+
+@pytest.mark.parametrize(
+    ('when', 'end', 'runs'),
+    [('never', 'exit 1', 1), ('on_failure', 'exit 0', 1), ('on_failure', 'kill -9 $$', 2)],
+)
+def test_restart_is_for_the_ends_that_it_names(compose, when, end, runs):
+    processes = {
+        'driver': {
+            'command': shell(f'echo run; {end}'),
+            'restart': {'when': when, 'max': 1},
+            'required': True,
+        }
+    }
+    child = compose(system(processes))
+    child.wait()
+
+    assert len(child.matching('[driver] run')) == runs
+
+
+@pytest.mark.parametrize(
+    ('process', 'message'),
+    [
+        ({'command': ['no_such_program']}, "there is no program 'no_such_program' on the PATH"),
+        ({'command': ['./missing']}, "there is no program 'missing'"),
+        ({'command': ['./system.yaml']}, "'system.yaml' is not executable"),
+        ({'command': ['true'], 'cwd': 'nowhere'}, "there is no folder 'nowhere' to run in"),
+        (
+            {'command': ['./empty.bin']},
+            "cannot be started: './empty.bin': Exec format error",
+        ),
+        ({'command': ['echo', 'a\0b']}, "'a\\x00b' has a null character in it"),
+    ],
+)
+def test_a_process_that_cannot_be_started_ends_the_start(compose, stubborn, process, message):
+    empty = compose.folder / 'empty.bin'
+    empty.write_bytes(b'\x7fnothing')
+    empty.chmod(0o755)
+    child = compose(system(stubborn.process('plain') | {'driver': process}))
+
+    assert child.wait() == 1
+    (line,) = child.matching('error: ')
+    assert line.startswith("error: process 'driver'")
+    assert message in line
+    assert not child.matching(' ready in ')
+    assert stubborn.left() == {}
+
+
+def test_a_process_runs_in_its_folder_with_its_environment(compose):
+    (compose.folder / 'inner').mkdir()
+    processes = {
+        'driver': {
+            'command': shell('pwd; echo "$MODE $COUNT $SHARED $FLAG"'),
+            'cwd': 'inner',
+            'env': {'MODE': 'fast', 'COUNT': 3, 'FLAG': True},
+        }
+    }
+    child = compose(system(processes, environment={'SHARED': 'all', 'MODE': 'slow'}))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == [
+        f'[driver] {(compose.folder / "inner").resolve()}',
+        '[driver] fast 3 all true',
+    ]
+
+
+def test_python_is_that_of_composer_where_that_has_an_environment_of_its_own(compose):
+    command = ['python3', '-c', 'import sys; print(sys.prefix)']
+    child = compose(system({'driver': {'command': command}}))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == [f'[driver] {sys.prefix}']
+
+
+def test_a_process_has_no_descriptors_of_composer_and_nothing_to_read(compose):
+    code = (
+        'import os, sys; print(sorted(os.listdir("/proc/self/fd"))[:-1], repr(sys.stdin.read()))'
+    )
+    processes = {'driver': {'command': [sys.executable, '-I', '-S', '-c', code]}}
+    child = compose(system(processes))
+    child.wait_for_line('exit code 0')
+
+    assert child.matching('[driver]') == ["[driver] ['0', '1', '2'] ''"]
+
+
+def test_a_behaviour_that_forks_keeps_nothing_from_ending(compose, stubborn):
+    code = """
+        import os
+        import time
+
+        def fork(node):
+            composer = os.getpid()
+            if os.fork() == 0:
+                while os.getppid() == composer:
+                    time.sleep(0.05)
+                os._exit(0)
+            node.logger.info('forked')
+    """
+    nodes = {'n': {'on_start': 'parts:fork'}}
+    processes = stubborn.process('plain') | {
+        'again': {'command': ['true'], 'restart': {'when': 'always', 'delay': 0.1, 'max': 2}}
+    }
+    child = compose(system(processes, nodes), code)
+    child.wait_for_line('forked')
+    child.wait_for_line('2 times already')
+
+    assert child.stop() == 0
+    assert stubborn.left() == {}
+
+
+FOREIGN_NODE = """#!{python}
+import sys
+import rclpy
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
+
+rclpy.init(args=sys.argv)
+node = rclpy.create_node('own_name', automatically_declare_parameters_from_overrides=True)
+node.create_publisher(String, 'chatter', 1)
+node.create_publisher(String, '~/private', 1)
+print('arguments', *sys.argv[1:2], flush=True)
+print('level', node.get_logger().get_effective_level().name, flush=True)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Return the share folder of a package `vendor` with an executable `driver`."""
+    prefix = tmp_path / 'prefix'
+    for folder in ('share/ament_index/resource_index/packages', 'lib/vendor', 'share/vendor'):
+        (prefix / folder).mkdir(parents=True)
+    (prefix / 'share/ament_index/resource_index/packages/vendor').touch()
+    program = prefix / 'lib/vendor/driver'
+    program.write_text(FOREIGN_NODE.format(python=sys.executable))
+    program.chmod(0o755)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    return prefix / 'share/vendor'
+
+
+def parameters_of(peer, node):
+    from rcl_interfaces.srv import GetParameters, ListParameters
+    from rclpy.parameter import parameter_value_to_python
+
+    names = sorted(peer.call(ListParameters, f'{node}/list_parameters').result.names)
+    values = peer.call(GetParameters, f'{node}/get_parameters', names=names).values
+    return {
+        name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)
+    }
+
+
+def plain(value):
+    return value.tolist() if hasattr(value, 'tolist') else value
+
+
+OF_EVERY_NODE = {'use_sim_time', 'start_type_description_service'}
+PARAMETERS = {
+    'flag': True,
+    'count': 3,
+    'negative': -(2**62),
+    'ratio': 1.0,
+    'huge': 1e22,
+    'label': 'twelve',
+    'yes': 'yes',
+    'digits': '012',
+    'float_text': '1e3',
+    'hex_text': '0x1F',
+    'null_text': 'null',
+    'empty_text': '',
+    'colon': 'a: b # c',
+    'lines': 'one\ntwo\t"three"',
+    'smile': 'ä 😀',
+    'flags': [True, False],
+    'counts': [1, 2],
+    'mixed': [1, 2.5],
+    'labels': ['a', 'yes', '3'],
+    'nested': {'deep': {'er': 0.5}},
+    'dotted.name': 'dots',
+}
+
+
+def test_an_executable_of_a_package_gets_all_that_the_file_says(compose, peer, package, wait_for):
+    (package / 'defaults.yaml').write_text(
+        '/**: {ros__parameters: {from_package: 1.5, count: 4, label: package}}'
+    )
+    (compose.folder / 'own.yaml').write_text(
+        '/robot/renamed: {ros__parameters: {label: own file}}\n'
+        '/elsewhere: {ros__parameters: {label: of another}}\n'
+    )
+    driver = {
+        'package': 'vendor',
+        'executable': 'driver',
+        'arguments': ['--fast'],
+        'name': 'renamed',
+        'namespace': 'robot',
+        'parameters': PARAMETERS,
+        'parameter_files': ['package://vendor/defaults.yaml', 'own.yaml'],
+        'remap': {'chatter': '/elsewhere/words'},
+        'log_level': 'warn',
+    }
+    child = compose(system({'driver': driver}))
+
+    assert child.wait_for_line('[driver] arguments') == '[driver] arguments --fast'
+    assert child.wait_for_line('[driver] level') == '[driver] level WARN'
+    values = parameters_of(peer, '/robot/renamed')
+    got = {name: values[name] for name in values.keys() - OF_EVERY_NODE}
+    expected = PARAMETERS | {'count': 4, 'label': 'own file', 'from_package': 1.5}
+    expected |= {'mixed': [1.0, 2.5], 'nested.deep.er': 0.5}
+    del expected['nested']
+    assert {name: plain(value) for name, value in got.items()} == expected
+    assert {name: type(plain(value)) for name, value in got.items()} == {
+        name: type(value) for name, value in expected.items()
+    }
+    topics = dict(peer.node.get_publisher_names_and_types_by_node('renamed', '/robot'))
+    assert {'/elsewhere/words', '/robot/renamed/private'} <= topics.keys()
+    assert child.stop() == 0
+
+
+def test_defaults_hold_for_executables_of_packages_and_not_for_commands(compose, peer, package):
+    processes = {
+        'driver': {'package': 'vendor', 'executable': 'driver'},
+        'echo': {'command': ['echo', 'nothing', 'else']},
+    }
+    defaults = {'namespace': 'fleet', 'use_sim_time': True, 'log_level': 'error'}
+    child = compose(system(processes, defaults=defaults))
+
+    assert child.wait_for_line('[driver] level') == '[driver] level ERROR'
+    assert child.wait_for_line('[echo]') == '[echo] nothing else'
+    assert parameters_of(peer, '/fleet/own_name')['use_sim_time'] is True
+
+
+def test_the_command_line_wins_over_the_file(compose, peer, package):
+    driver = {
+        'package': 'vendor',
+        'executable': 'driver',
+        'cwd': '/',
+        'log_level': 'error',
+        'parameters': {'count': 1, 'label': 'file'},
+        'remap': {'chatter': 'file'},
+    }
+    path = compose.write(system({'driver': driver}))
+    (compose.folder / 'more.yaml').write_text('/**: {ros__parameters: {ratio: 0.5}}')
+    words = ['-p', 'count:=2', '-r', 'chatter:=line', '--params-file', 'more.yaml']
+    child = compose.run(path.name, '--log-level', '/own_name:=debug', '--ros-args', *words)
+
+    assert child.wait_for_line('[driver] level') == '[driver] level DEBUG'
+    values = parameters_of(peer, '/own_name')
+    assert (values['count'], values['label'], values['ratio']) == (2, 'file', 0.5)
+    assert '/line' in dict(peer.node.get_publisher_names_and_types_by_node('own_name', '/'))
+
+
+def test_many_systems_in_a_row_leave_nothing_behind(compose, stubborn, scratch):
+    processes = stubborn.process('daemon') | {
+        'mission': {
+            'command': shell('echo done; sleep 0.2'),
+            'required': True,
+            'parameters': {'a': 1},
+        }
+    }
+    path = compose.write(system(processes))
+    program = """
+        import json, os, sys, tempfile, threading, time
+        import composer
+
+        def count():
+            return [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
+
+        composer.up(sys.argv[1])
+        before = count()
+        codes = [composer.up(sys.argv[1]) for _ in range(5)]
+        # A thread that has been joined may take a moment to leave the kernel's list.
+        deadline = time.monotonic() + 20
+        while any(now > then for now, then in zip(count(), before)):
+            if time.monotonic() > deadline:
+                break
+            time.sleep(0.01)
+        left = [name for name in os.listdir(tempfile.gettempdir()) if name.startswith('composer-')]
+        print(json.dumps([codes, before, count(), left, threading.active_count()]))
+    """
+    result = subprocess.run(
+        [sys.executable, '-c', dedent(program), path.name],
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=100,
+        check=True,
+    )
+    *lines, last = result.stdout.splitlines()
+    codes, before, after, left, threads = json.loads(last)
+
+    assert lines.count('[mission] done') == 6
+    assert codes == [0] * 5
+    assert all(now <= then for now, then in zip(after, before, strict=True)), (before, after)
+    assert left == []
+    assert threads == 1
+    assert stubborn.left() == {}

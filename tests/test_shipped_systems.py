@@ -1,0 +1,281 @@
+"""The shipped systems to copy from, run by `composer up` among plain rclpy peers.
+
+Each shows a part of the language; all are made of shipped behaviours alone.
+"""
+
+import os
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import Image, LaserScan, Range
+from std_msgs.msg import Bool, Float64
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def up(compose):
+    """Run a shipped system, with what is said after it, from the project's root."""
+
+    def run(name, *arguments):
+        child = compose.run(f'configs/{name}.yaml', *arguments, folder=ROOT)
+        child.wait_until_ready()
+        return child
+
+    return run
+
+
+@pytest.fixture
+def publish_until(wait_for):
+    """Publish a message again and again until something comes of it: peers meet one by one."""
+
+    def publish_until(publisher, message, condition, what):
+        def came():
+            publisher.publish(message)
+            return condition()
+
+        wait_for(came, what)
+
+    return publish_until
+
+
+def driving(linear, angular=0.0):
+    return Twist(linear=Vector3(x=linear), angular=Vector3(z=angular))
+
+
+def nodes_of(peer):
+    return {
+        f'{namespace.rstrip("/")}/{name}'
+        for name, namespace in peer.node.get_node_names_and_namespaces()
+        if name != 'peer' and not name.startswith('_')
+    }
+
+
+LAYERS = {
+    'as it is': ([], 'robot', 'front rear', (3.0, 1.0), (13.0, 17.0)),
+    'with an argument': (['robot:=rover'], 'rover', 'front rear', (-9.0,), (-15.0, -15.0)),
+    'in the warehouse': (
+        ['configs/sites/warehouse.yaml'],
+        'forklift',
+        'front rear',
+        (1.0, 1.0),
+        (6.0, 14.0),
+    ),
+    'in the harbour': (
+        ['configs/sites/harbour.yaml'],
+        'carrier',
+        'front middle rear',
+        (3.0, 1.0),
+        (4.0, 8.0),
+    ),
+}
+
+
+@pytest.mark.parametrize('case', LAYERS)
+def test_the_wheels_of_the_robot_follow_the_governed_command(
+    up, peer, wait_for, publish_until, case
+):
+    words, robot, ends, command, speeds = LAYERS[case]
+    expected = {
+        f'/{robot}/{end}_{side}_wheel': speed
+        for end in ends.split()
+        for side, speed in zip(('left', 'right'), speeds, strict=True)
+    }
+    heard = {name: peer.listen(Float64, f'{name}/speed') for name in expected}
+    child = up('robot', *words)
+    names = {*expected, f'/{robot}/governor'}
+    wait_for(lambda: nodes_of(peer) == names, f'the nodes {names}')
+    commands = peer.advertise(Twist, f'/{robot}/cmd_vel')
+    publish_until(commands, driving(*command), lambda: all(heard.values()), 'all wheels')
+
+    assert {name: messages[0].data for name, messages in heard.items()} == pytest.approx(expected)
+    assert child.stop() == 0
+
+
+def test_two_arms_have_the_same_goals_and_limits_of_their_own(up, peer, wait_for, publish_until):
+    heard = {side: peer.listen(Float64, f'/{side}/position') for side in ('left', 'right')}
+    child = up('two_arms')
+    wait_for(lambda: nodes_of(peer) == {'/teacher', '/left/joint', '/right/joint'}, 'the nodes')
+    goals = peer.advertise(Float64, 'goal')
+    publish_until(goals, Float64(data=1.8), lambda: all(heard.values()), 'both arms')
+
+    assert {side: messages[0].data for side, messages in heard.items()} == {
+        'left': 1.0,
+        'right': 1.8,
+    }
+    assert child.stop() == 0
+
+
+def test_the_camera_is_simulated_by_default(up, peer, wait_for):
+    heard = peer.listen(Image, 'preview')
+    child = up('camera')
+    wait_for(lambda: len(heard) > 1, 'two previews')
+
+    assert (heard[0].header.frame_id, list(heard[0].data)) == ('camera', [0, 255])
+    assert nodes_of(peer) == {'/simulated_camera', '/preview'}
+    assert child.stop() == 0
+
+
+DRIVER = f"""\
+#!{sys.executable}
+from contextlib import suppress
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import Image
+
+rclpy.init()
+node = rclpy.create_node('v4l2_camera')
+size = list(node.declare_parameter('image_size', [0, 0]).value)
+publisher = node.create_publisher(Image, 'image_raw', qos_profile_sensor_data)
+image = Image(width=size[0], height=size[1])
+node.create_timer(0.05, lambda: publisher.publish(image))
+with suppress(KeyboardInterrupt, ExternalShutdownException):
+    rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def installed_driver(tmp_path, monkeypatch):
+    """Install a package `v4l2_camera` whose driver is plain rclpy."""
+    prefix = tmp_path / 'prefix'
+    index = prefix / 'share/ament_index/resource_index/packages'
+    index.mkdir(parents=True)
+    (index / 'v4l2_camera').touch()
+    executable = prefix / 'lib/v4l2_camera/v4l2_camera_node'
+    executable.parent.mkdir(parents=True)
+    executable.write_text(DRIVER)
+    executable.chmod(0o755)
+    before = os.environ.get('AMENT_PREFIX_PATH')
+    path = os.pathsep.join(filter(None, [str(prefix), before]))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', path)
+
+
+def test_the_camera_is_a_driver_of_its_own_if_it_is_real(up, peer, wait_for, installed_driver):
+    heard = peer.listen(Image, 'preview')
+    child = up('camera', 'simulation:=false')
+    wait_for(lambda: heard, 'a preview')
+
+    assert (heard[0].width, heard[0].height) == (640, 480)
+    assert nodes_of(peer) == {'/v4l2_camera', '/preview'}
+    assert child.stop() == 0
+
+
+def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for, monkeypatch):
+    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
+    monkeypatch.setenv('PATH', os.pathsep.join(folders))
+    ranges = peer.listen(Range, '/front/range', qos_profile_sensor_data)
+    obstacles = peer.listen(Bool, 'obstacle')
+    child = up('hybrid')
+    wait_for(lambda: {each.data for each in obstacles} == {True, False}, 'near and far things')
+
+    assert ranges[0].header.frame_id == 'range_sensor'
+    assert nodes_of(peer) == {'/front/range_sensor', '/obstacle_detector'}
+    assert child.stop() == 0
+    wait_for(lambda: not nodes_of(peer), 'the end of the program')
+
+
+def scans(publisher):
+    """Publish a scan that is numbered by its `angle_min`."""
+    scan = LaserScan(range_min=0.25, ranges=[3.0, 0.5, 2.0])
+    scan.header.frame_id = 'laser'
+
+    def publish():
+        scan.angle_min += 1.0
+        publisher.publish(scan)
+
+    return publish
+
+
+def test_filters_make_scans_fewer_slower_and_smaller(up, peer, wait_for):
+    heard = {
+        name: peer.listen(kind, name)
+        for name, kind in {
+            'slow_scan': LaserScan,
+            'third_scan': LaserScan,
+            'closest': Range,
+        }.items()
+    }
+    child = up('filters')
+    publish = scans(peer.advertise(LaserScan, 'scan'))
+
+    def came():
+        publish()
+        return len(heard['third_scan']) > 5 and len(heard['slow_scan']) > 1 and heard['closest']
+
+    wait_for(came, 'scans by all filters')
+    numbers = [int(scan.angle_min) for scan in heard['third_scan']]
+    assert {later - earlier for earlier, later in pairwise(numbers)} == {3}
+    assert len(heard['slow_scan']) < len(heard['closest']) / 3
+    nearest = heard['closest'][0]
+    assert (nearest.header.frame_id, nearest.min_range, nearest.range) == ('laser', 0.25, 0.5)
+    assert child.stop() == 0
+
+
+def test_filters_pass_on_the_commands_of_the_source_that_is_selected(up, peer, publish_until):
+    heard = peer.listen(Twist, 'base/cmd_vel')
+    child = up('filters')
+    autopilot = peer.advertise(Twist, 'autopilot/cmd_vel')
+    joystick = peer.advertise(Twist, 'joystick/cmd_vel')
+
+    def drive_both_until(speed):
+        def came():
+            joystick.publish(driving(2.0))
+            return any(each.linear.x == speed for each in heard)
+
+        publish_until(autopilot, driving(1.0), came, f'the speed {speed}')
+
+    drive_both_until(1.0)
+    assert {each.linear.x for each in heard} == {1.0}
+    change = Parameter('selected', value='joystick').to_parameter_msg()
+    peer.call(SetParameters, 'command_mux/set_parameters', parameters=[change])
+    drive_both_until(2.0)
+    wrong = Parameter('selected', value='nobody').to_parameter_msg()
+    answer = peer.call(SetParameters, 'command_mux/set_parameters', parameters=[wrong])
+    assert not answer.results[0].successful
+    assert child.stop() == 0
+
+
+def test_the_monitor_warns_of_silence_and_tells_when_it_is_over(up, peer, wait_for, publish_until):
+    verdicts = peer.listen(Bool, 'scan_ok')
+    diagnostics = peer.listen(DiagnosticArray, '/diagnostics')
+    child = up('monitor')
+
+    def told():
+        return {
+            (status.level, status.message.split(' for ')[0])
+            for array in list(diagnostics)
+            for status in array.status
+            if status.name == '/monitor: odometry'
+        }
+
+    child.wait_for_line('[WARN] [monitor]: scan: 0 messages a second, 5 are expected')
+    child.wait_for_line('[WARN] [monitor]: odometry: nothing heard for ')
+    wait_for(lambda: (b'\x01', 'nothing heard') in told(), 'a warning among the diagnostics')
+    wait_for(lambda: verdicts, 'a verdict')
+    assert {verdict.data for verdict in verdicts} == {False}
+
+    publish = scans(peer.advertise(LaserScan, 'scan'))
+    odometry = peer.advertise(Odometry, 'odometry')
+
+    def is_well():
+        publish()
+        return verdicts[-1].data and (b'\x00', 'OK') in told()
+
+    publish_until(odometry, Odometry(), is_well, 'both topics to be well')
+    child.wait_for_line('[INFO] [monitor]: scan: well again, ')
+    assert child.stop() == 0
