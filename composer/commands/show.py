@@ -63,8 +63,11 @@ def show_arguments(paths: Sequence[Path]) -> int:
 
 def final_data(system: LoadedSystem) -> dict[str, Any]:
     """Return a system as data that `composer up` accepts, wherever they are written to."""
-    data = {key: value for key, value in system.data.items() if key not in _SETTLED}
-    data = {key: value for key, value in data.items() if value != {} or key == 'nodes'}
+    data = {
+        key: value
+        for key, value in system.data.items()
+        if key not in _SETTLED and not key.startswith('x-') and (value != {} or key == 'nodes')
+    }
     return _with_absolute_paths(data)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
 from composer.language.arguments import is_usable_name
+from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.templates import Filler
 
 if TYPE_CHECKING:
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
 
     from composer.language.filling import FilledDocument
     from composer.language.positions import Branch, DataPath, Key, SourceMap
-
-SECTIONS = ('nodes', 'include', 'processes')
-MAX_ENTRIES = 10_000
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
@@ -50,8 +48,9 @@ def expand_document(
         origins: Where the values come from, in words.
     """
     filler = Filler(values, positions, samples, origins)
-    plain = {key: value for key, value in data.items() if key not in SECTIONS}
-    filled = filler.fill_mapping(plain, ())
+    ignored = {key: value for key, value in data.items() if key.startswith('x-')}
+    plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
+    filled = filler.fill_mapping(plain, ()) | ignored
     limit = filled.get('max_nodes', MAX_ENTRIES)
     for section in SECTIONS:
         if isinstance(data.get(section), dict):

@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.language.positions import DataPath
 
+# The sections whose entries may be repeated, and how many they may have unless a file says more.
+SECTIONS = ('nodes', 'include', 'processes')
+MAX_ENTRIES = 10_000
+
 
 @dataclass(slots=True)
 class FilledDocument:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.processes import takes_ros_arguments, with_defaults, with_waits
+from composer.language.profiles import (
+    ProfileRenaming,
+    free_name,
+    rename_profiles,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from composer.language.instances import Instance
-    from composer.language.positions import Branch, DataPath, Key
+    from composer.language.positions import DataPath
 
 # What defaults hold that is not simply a key of each node.
 _SPECIAL_DEFAULTS = ('namespace', 'qos')
@@ -24,68 +28,89 @@ def push_defaults(instance: Instance) -> None:
     defaults = instance.data.pop('defaults', {})
     if not defaults:
         return
-    shared = instance.positions.branches(('defaults',))
-    outer = defaults.get('namespace', '')
-    nodes = instance.data.get('nodes', {})
-    for name in nodes:
-        nodes[name] = _with_defaults(instance, name, nodes[name], defaults, shared)
-    processes = instance.data.get('processes', {})
-    for name, process in processes.items():
-        processes[name] = _in_namespace(outer, with_defaults(process, defaults))
+    pushing = _Pushing(instance, defaults)
+    for section, write in (('nodes', pushing.in_node), ('processes', pushing.in_process)):
+        entries = instance.data.get(section, {})
+        for name in entries:
+            entries[name] = write(name, entries[name])
 
 
-def _in_namespace(outer: str, process: dict[str, Any]) -> dict[str, Any]:
-    """Return a process that lies in a namespace; if it is none of ROS, what it waits for does."""
-    if not takes_ros_arguments(process):
-        return with_waits(process, {}, outer)
-    namespace = _join(outer, process.get('namespace', ''))
-    return process | {'namespace': namespace} if namespace else process
+class _Pushing:
+    """Writes the defaults of one file into its nodes and processes."""
+
+    def __init__(self, instance: Instance, defaults: dict[str, Any]) -> None:
+        self._instance = instance
+        self._defaults = defaults
+        self._branches = instance.positions.branches(('defaults',))
+        self._notes = [(at, note) for at, note in instance.notes.items() if at[0] == 'defaults']
+
+    def in_node(self, name: str, node: dict[str, Any]) -> dict[str, Any]:
+        at = ('nodes', name)
+        plain = {k: v for k, v in self._defaults.items() if k not in _SPECIAL_DEFAULTS}
+        for key in plain.keys() - node.keys():
+            self._graft((*at, key), key)
+        full = plain | node
+        if not name.startswith('/'):
+            full |= self._namespace(at, node)
+        if 'qos' in self._defaults:
+            for section in _WITH_QOS:
+                if section in full:
+                    full[section] = self._with_qos((*at, section), full[section])
+        return full
+
+    def in_process(self, name: str, process: dict[str, Any]) -> dict[str, Any]:
+        if not takes_ros_arguments(process):
+            return with_waits(process, {}, self._defaults.get('namespace', ''))
+        at = ('processes', name)
+        full = with_defaults(process, self._defaults)
+        if 'log_level' in full and 'log_level' not in process:
+            self._graft((*at, 'log_level'), 'log_level')
+        if (
+            'use_sim_time'
+            in full.get('parameters', {}).keys() - process.get('parameters', {}).keys()
+        ):
+            self._graft((*at, 'parameters', 'use_sim_time'), 'use_sim_time')
+        return full | self._namespace(at, process)
+
+    def _namespace(self, at: DataPath, entry: dict[str, Any]) -> dict[str, str]:
+        outer, inner = self._defaults.get('namespace', ''), entry.get('namespace', '')
+        namespace = _join(outer, inner)
+        if namespace != inner:
+            _note_namespace(self._instance, (*at, 'namespace'), ('defaults', 'namespace'))
+        return {'namespace': namespace} if namespace else {}
+
+    def _with_qos(self, at: DataPath, entries: dict[str, Any]) -> dict[str, Any]:
+        changed = {}
+        positions = self._instance.positions
+        for name, entry in entries.items():
+            path = (*at, name)
+            mapping = {'type': entry} if isinstance(entry, str) else entry
+            if isinstance(entry, str):
+                positions.values[*path, 'type'] = positions.value(path)
+            if 'qos' not in mapping:
+                mapping = mapping | {'qos': deepcopy(self._defaults['qos'])}
+                self._graft((*path, 'qos'), 'qos')
+            changed[name] = mapping
+        return changed
+
+    def _graft(self, path: DataPath, key: str) -> None:
+        self._instance.positions.graft(path, self._branches[key])
+        for at, note in self._notes:
+            if at[1] == key:
+                self._instance.notes[path + at[2:]] = note
 
 
-def _with_defaults(
-    instance: Instance,
-    name: str,
-    node: dict[str, Any],
-    defaults: dict[str, Any],
-    shared: dict[Key, Branch],
-) -> dict[str, Any]:
-    at = ('nodes', name)
-    plain = {key: value for key, value in defaults.items() if key not in _SPECIAL_DEFAULTS}
-    for key in plain.keys() - node.keys():
-        instance.positions.graft((*at, key), shared[key])
-    full = plain | node
-    namespace = _join(defaults.get('namespace', ''), node.get('namespace', ''))
-    if namespace and not name.startswith('/'):
-        if 'namespace' not in node:
-            instance.positions.graft((*at, 'namespace'), shared['namespace'])
-        full['namespace'] = namespace
-    if 'qos' in defaults:
-        for section in _WITH_QOS:
-            if section in full:
-                entries = _with_qos(instance, (*at, section), full[section], defaults, shared)
-                full[section] = entries
-    return full
-
-
-def _with_qos(
-    instance: Instance,
-    at: DataPath,
-    entries: dict[str, Any],
-    defaults: dict[str, Any],
-    shared: dict[Key, Branch],
-) -> dict[str, Any]:
-    changed = {}
-    positions = instance.positions
-    for name, entry in entries.items():
-        path = (*at, name)
-        if isinstance(entry, str):
-            positions.values[*path, 'type'] = positions.value(path)
-            changed[name] = {'type': entry, 'qos': defaults['qos']}
-        else:
-            changed[name] = {'qos': defaults['qos']} | entry
-        if isinstance(entry, str) or 'qos' not in entry:
-            positions.graft((*path, 'qos'), shared['qos'])
-    return changed
+def _note_namespace(instance: Instance, path: DataPath, outer: DataPath) -> None:
+    """Note that the namespace at a path lies in the one that is written at another path."""
+    positions, notes = instance.positions, instance.notes
+    place = ', '.join(filter(None, (positions.value(outer).place, notes.get(outer))))
+    if path in positions.values:
+        own = notes.get(path)
+        notes[path] = f'{own}, in that of {place}' if own else f'in that of {place}'
+        return
+    positions.values[path] = positions.value(outer)
+    if outer in notes:
+        notes[path] = notes[outer]
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,116 +144,142 @@ class Inclusion:
 
 
 class Flattening:
-    """Adds what included files declare to the instance of the file that includes them."""
+    """Adds what included files declare to the instance of the file that includes them.
 
-    def __init__(self, instance: Instance) -> None:
+    Args:
+        chain: Where that file is included itself, innermost first.
+    """
+
+    def __init__(self, instance: Instance, chain: tuple[Related, ...] = ()) -> None:
         self._whole = instance
-        nodes = instance.data.get('nodes', {})
-        self._full_names = {_full_name(*_split(name, node)) for name, node in nodes.items()}
+        self._chain = chain
+        self._full_names = {
+            _full_name(*_split(name, node))
+            for name, node in instance.data.get('nodes', {}).items()
+            if ('nodes', name) not in instance.left_out
+        }
 
     def add(self, inclusion: Inclusion) -> None:
         """Add what an included file declares."""
         part = inclusion.part
-        push_defaults(part)
         renaming = self._add_profiles(inclusion)
-        processes = self._process_names(inclusion)
+        keys = self._process_keys(inclusion)
         for name, node in part.data.get('nodes', {}).items():
-            inner, simple = _split(name, node)
+            inner, simple = part.inner_names.get(name) or _split(name, node)
             full = _join(inclusion.namespace, inner)
-            key = self._node_key(simple, full)
+            is_left_out = ('nodes', name) in part.left_out
+            key = self._node_key(simple, full, is_left_out=is_left_out)
             if key is not None:
-                entry = with_waits(renaming.in_node(node), processes)
-                self._add_entry(inclusion, ('nodes', name), key, entry, full)
-            elif ('nodes', name) not in part.left_out:
+                entry = with_waits(renaming.in_node(node), keys)
+                if key.startswith('/'):
+                    # Includes around this one must still find a relative namespace as such.
+                    self._whole.inner_names[key] = full, simple
+                self._add_entry(inclusion, ('nodes', name), key, entry)
+            elif not is_left_out:
                 self._report_duplicate(inclusion, name, _full_name(full, simple))
         for name, process in part.data.get('processes', {}).items():
-            entry = with_waits(_in_namespace(inclusion.namespace, process), processes)
-            namespace = entry.get('namespace', '')
-            self._add_entry(inclusion, ('processes', name), processes[name], entry, namespace)
+            entry = with_waits(process, keys)
+            if not takes_ros_arguments(process):
+                entry = with_waits(entry, {}, inclusion.namespace)
+            self._add_entry(inclusion, ('processes', name), keys[name], entry)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
 
-    def _process_names(self, inclusion: Inclusion) -> dict[str, str]:
-        """Return what the processes of a file are called in the whole."""
-        own = self._whole.data.get('processes', {})
-        names = inclusion.part.data.get('processes', {})
-        return {
-            name: _free_name(f'{inclusion.label}_{name}', {*own, *names}) if name in own else name
-            for name in names
-        }
-
-    def _node_key(self, simple: str, namespace: str) -> str | None:
+    def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
         nodes = self._whole.data.setdefault('nodes', {})
         full = _full_name(namespace, simple)
         if full in self._full_names:
             return None
+        key = full if simple in nodes else simple
+        if is_left_out:
+            return None if key in nodes else key
         self._full_names.add(full)
-        return full if simple in nodes else simple
+        self._whole.left_out.discard(('nodes', key))
+        return key
+
+    def _process_keys(self, inclusion: Inclusion) -> dict[str, str]:
+        """Return what the processes of a file are called in the whole system."""
+        own = self._whole.data.get('processes', {})
+        names = inclusion.part.data.get('processes', {})
+        taken = {*own, *names}
+        keys = {}
+        for name in names:
+            keys[name] = free_name(f'{inclusion.label}_{name}', taken) if name in own else name
+            taken.add(keys[name])
+        return keys
 
     def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
-        place = self._whole.positions.value((*inclusion.at, 'file'))
+        here = Related('included here', self._whole.positions.value((*inclusion.at, 'file')))
+        inner = inclusion.part.chains.get(('nodes', name), ())
         self._whole.diagnostics.append(
             diagnostic_at(
                 inclusion.part.positions.key(('nodes', name)),
                 'duplicate-node',
                 f"there is a node '{full}' already",
                 help="give the include a 'namespace'",
-                related=[Related('included here', place)],
+                related=[*inner, here, *self._chain],
             )
         )
 
     def _add_entry(
-        self, inclusion: Inclusion, old: DataPath, key: str, entry: dict[str, Any], namespace: str
+        self, inclusion: Inclusion, old: DataPath, key: str, entry: dict[str, Any]
     ) -> None:
         whole, part = self._whole, inclusion.part
         section, name = str(old[0]), old[1]
         new = (section, key)
         whole.positions.graft(new, part.branches(section)[name])
-        plain = {each: value for each, value in entry.items() if each != 'namespace'}
-        if namespace and not key.startswith('/'):
-            plain = {'namespace': namespace} | plain
-            self._note_namespace((*new, 'namespace'), (*inclusion.at, 'namespace'))
-        if inclusion.remap and (section == 'nodes' or takes_ros_arguments(entry)):
-            # The first rule that fits wins: those from outside do, as in ROS launch.
-            plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
-            for rule in inclusion.remap:
-                written = whole.positions.value((*inclusion.at, 'remap', rule))
-                whole.positions.values[*new, 'remap', rule] = written
-        whole.data.setdefault(section, {})[key] = plain
-        whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         for path, note in part.notes_by_entry().get(old, ()):
             whole.notes[new + path] = note
+        if section == 'nodes' or takes_ros_arguments(entry):
+            entry = self._with_outer(inclusion, new, entry)
+        whole.data.setdefault(section, {})[key] = entry
+        whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
         whole.chains[new] = (*part.chains.get(old, ()), here)
         if old in part.left_out:
             whole.left_out.add(new)
 
-    def _note_namespace(self, path: DataPath, outer: DataPath) -> None:
-        positions = self._whole.positions
-        if outer not in positions.values:
-            return
-        if path in positions.values:
-            self._whole.notes[path] = f'in that of {positions.value(outer).place}'
-        else:
-            positions.values[path] = positions.value(outer)
+    def _with_outer(
+        self, inclusion: Inclusion, path: DataPath, entry: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Return an entry with what the include says of all that comes out of the file."""
+        plain = dict(entry)
+        inner = plain.pop('namespace', '')
+        namespace = _join(inclusion.namespace, inner)
+        if namespace != inner:
+            _note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'))
+        if namespace and not str(path[-1]).startswith('/'):
+            plain = {'namespace': namespace} | plain
+        if inclusion.remap:
+            # The first rule that fits wins: those from outside do, as in ROS launch.
+            plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
+            for rule in inclusion.remap:
+                self._copy_place((*inclusion.at, 'remap', rule), (*path, 'remap', rule))
+        return plain
 
-    def _add_profiles(self, inclusion: Inclusion) -> _ProfileRenaming:
+    def _copy_place(self, old: DataPath, new: DataPath) -> None:
+        positions, notes = self._whole.positions, self._whole.notes
+        positions.keys[new] = positions.key(old)
+        positions.values[new] = positions.value(old)
+        notes.pop(new, None)
+        if old in notes:
+            notes[new] = notes[old]
+
+    def _add_profiles(self, inclusion: Inclusion) -> ProfileRenaming:
         """Add the QoS profiles of a file; return the new names of those that had to be renamed."""
-        part, label = inclusion.part, inclusion.label
-        own = self._whole.data.get('qos', {})
+        part = inclusion.part
         profiles = part.data.get('qos', {})
-        renaming = _ProfileRenaming(
-            {
-                name: _free_name(f'{label}_{name}', {*own, *profiles})
-                for name, profile in profiles.items()
-                if name in own and own[name] != profile
-            }
-        )
+        renaming = rename_profiles(self._whole.data.get('qos', {}), profiles, inclusion.label)
         for name, profile in profiles.items():
             key = str(renaming.in_qos(name))
+            own = self._whole.data.setdefault('qos', {})
+            if key in own:
+                continue
+            own[key] = renaming.in_qos(profile)
             self._whole.positions.graft(('qos', key), part.branches('qos')[name])
-            self._whole.data.setdefault('qos', {})[key] = renaming.in_qos(profile)
+            for path, note in part.notes_by_entry().get(('qos', name), ()):
+                self._whole.notes['qos', key, *path] = note
         self._whole.dropped |= {path for path in part.dropped if path[:1] == ('qos',)}
         return renaming
 
@@ -239,36 +290,6 @@ class Flattening:
                 declared[package] = part.data['interfaces'][package]
                 branch = part.branches('interfaces')[package]
                 self._whole.positions.graft(('interfaces', package), branch)
-
-
-class _ProfileRenaming:
-    """Writes new names of QoS profiles where the old ones are used."""
-
-    def __init__(self, names: dict[str, str]) -> None:
-        self._names = names
-
-    def in_node(self, node: dict[str, Any]) -> dict[str, Any]:
-        """Return a node whose entities use the new names."""
-        if not self._names:
-            return node
-        changed = dict(node)
-        for section, entries in node.items():
-            if isinstance(entries, dict) and section not in ('parameters', 'state', 'remap'):
-                changed[section] = {
-                    name: entry | {'qos': self.in_qos(entry['qos'])}
-                    if isinstance(entry, dict) and 'qos' in entry
-                    else entry
-                    for name, entry in entries.items()
-                }
-        return changed
-
-    def in_qos(self, qos: Any) -> Any:
-        """Return a QoS, or a profile, that uses the new names."""
-        if isinstance(qos, str):
-            return self._names.get(qos, qos)
-        if isinstance(qos, dict) and 'profile' in qos:
-            return qos | {'profile': self._names.get(qos['profile'], qos['profile'])}
-        return qos
 
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:
@@ -292,10 +313,3 @@ def _join(outer: str, inner: str) -> str:
     if not outer or inner.startswith('/'):
         return inner
     return f'{outer.rstrip("/")}/{inner}' if inner else outer
-
-
-def _free_name(name: str, taken: Iterable[str]) -> str:
-    taken = set(taken)
-    while name in taken:
-        name = f'{name}_'
-    return name

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.flattening import Flattening, Inclusion, push_defaults
 from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
 from composer.language.parameters import convert_parameter_value, find_type_fault
 from composer.language.paths import PathError, resolve_path
+from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
 from composer.names import did_you_mean
 
@@ -38,6 +40,8 @@ class Includer:
 
     def __init__(self) -> None:
         self._documents: dict[Path, Document] = {}
+        self._limit = 0
+        self._inclusions = 0
 
     def include(self, instance: Instance, path: Path, chain: tuple[Related, ...] = ()) -> Instance:
         """Return an instance with all that it includes in it.
@@ -46,20 +50,45 @@ class Includer:
             path: The file of the instance.
             chain: Where it is included itself, innermost first.
         """
+        self._limit = max(self._limit, instance.data.get('max_nodes', MAX_ENTRIES))
         entries = instance.data.pop('include', {})
         if not entries:
             return instance
-        push_defaults(instance)
-        flattening = Flattening(instance)
+        _settle(instance)
+        flattening = Flattening(instance, chain)
         stack = (path.resolve(), *(Path(each.span.source.name).resolve() for each in chain))
         for name, entry in entries.items():
             at = ('include', name)
             if at in instance.left_out:
                 continue
             part = self._read(instance, at, entry, stack, chain)
-            if part is not None:
-                flattening.add(Inclusion(part, at, entry))
+            if part is None:
+                continue
+            flattening.add(Inclusion(part, at, entry))
+            if self._is_too_large(instance, at):
+                break
         return instance
+
+    def _is_too_large(self, instance: Instance, at: DataPath) -> bool:
+        """Return whether a system has grown beyond its limit; say so once."""
+        if self._inclusions > self._limit:
+            return True
+        counts = {section: len(instance.data.get(section, ())) for section in SECTIONS}
+        self._inclusions += 1
+        counts['include'] = self._inclusions
+        section = max(counts, key=lambda each: counts[each])
+        if counts[section] <= self._limit:
+            return False
+        self._inclusions = self._limit + 1
+        instance.diagnostics.append(
+            diagnostic_at(
+                instance.positions.value((*at, 'file')),
+                'too-many-entries',
+                f'there are more than {self._limit:,} entries in {section} of all files',
+                help="if that is meant, raise 'max_nodes' at the top of the file",
+            )
+        )
+        return True
 
     def _read(
         self,
@@ -95,6 +124,7 @@ class Includer:
         if part is None:
             instance.diagnostics += _with_chain(document.diagnostics, inner_chain)
             return None
+        _settle(part)
         own = part.diagnostics
         part.diagnostics = []
         part = self.include(part, path, inner_chain)
@@ -107,6 +137,12 @@ class Includer:
         if resolved not in self._documents:
             self._documents[resolved] = read_document(path, _shown(path))
         return self._documents[resolved]
+
+
+def _settle(instance: Instance) -> None:
+    """Let a file's defaults and profiles hold in this file alone."""
+    push_defaults(instance)
+    drop_unknown_profiles(instance)
 
 
 def _locate(text: str, place: Span) -> Path:

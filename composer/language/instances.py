@@ -47,6 +47,8 @@ class Instance:
         notes: Where the values that the expressions of a scalar use come from, by its path.
         included: The files that are part of it.
         chains: Where entries come from by includes, innermost first, by their paths.
+        inner_names: The namespaces, as written, and simple names of nodes that are called by
+            their full names only since another node has the simple one.
     """
 
     data: dict[str, Any]
@@ -60,6 +62,7 @@ class Instance:
     notes: dict[DataPath, str] = field(default_factory=dict)
     included: dict[SourceFile, None] = field(default_factory=dict)
     chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
+    inner_names: dict[str, tuple[str, str]] = field(default_factory=dict)
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)
     _notes: dict[DataPath, list[tuple[DataPath, str]]] | None = None
 

@@ -1,6 +1,7 @@
 """Several files as one: each changes what those before it say.
 
-Mappings are merged entry by entry, all else is replaced, and `null` removes.
+Mappings are merged entry by entry, all else is replaced, and `null` removes, but for `warn_after`,
+where it is a value.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.language.positions import DataPath, SourceMap
+
+# What is in these is the user's own.
+_FREE = ('message', 'state', 'with')
 
 
 def merge_documents(documents: Sequence[Document]) -> Document:
@@ -42,18 +46,40 @@ def _merge_mappings(
     merged = dict(below)
     for key, value in above.items():
         at = (*path, key)
-        if value is None:
+        if value is None and not is_null_a_value(at):
             merged.pop(key, None)
+            positions.remove(at)
         elif isinstance(value, dict) and isinstance(merged.get(key), dict):
             merged[key] = _merge_mappings(merged[key], value, at, positions, new_positions)
         else:
-            merged[key] = _without_removals(value)
+            merged[key] = _without_removals(value, at)
             positions.replace(at, new_positions)
     return merged
 
 
-def _without_removals(value: Any) -> Any:
+def is_null_a_value(path: DataPath) -> bool:
+    """Return whether `null` at a path says something, and does not remove what is there."""
+    return path[-1] == 'warn_after' and (
+        path[:-1] == ('defaults',)
+        or (path[0] == 'nodes' and (len(path) == _IN_NODE or _is_in_entity(path)))
+    )
+
+
+_IN_NODE = 3
+_IN_ENTITY = 5
+_OF_THE_USER = ('parameters', 'remap', 'state')
+
+
+def _is_in_entity(path: DataPath) -> bool:
+    return len(path) == _IN_ENTITY and path[2] not in _OF_THE_USER
+
+
+def _without_removals(value: Any, path: DataPath) -> Any:
     """Return what is new without the nulls, which remove nothing here."""
-    if isinstance(value, dict):
-        return {key: _without_removals(each) for key, each in value.items() if each is not None}
-    return value
+    if not isinstance(value, dict) or path[-1] in _FREE:
+        return value
+    return {
+        key: _without_removals(each, (*path, key))
+        for key, each in value.items()
+        if each is not None or is_null_a_value((*path, key))
+    }

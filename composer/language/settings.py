@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import SourceFile, Span
 from composer.errors import UsageError
+from composer.language.layers import is_null_a_value
 from composer.language.source import Document, parse_document
 from composer.names import did_you_mean
 
@@ -15,18 +16,13 @@ if TYPE_CHECKING:
     from composer.language.positions import DataPath
 
 # Sections whose keys are names that the file gives; all other keys are those of the schema.
-_NAMED = frozenset(
+_NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
+_NAMED_IN_NODES = frozenset(
     (
         'action_clients',
         'actions',
-        'args',
-        'include',
-        'interfaces',
-        'nodes',
         'parameters',
-        'processes',
         'publishers',
-        'qos',
         'service_clients',
         'services',
         'subscriptions',
@@ -54,7 +50,7 @@ def apply_settings(document: Document, settings: Sequence[str]) -> Document:
             raise UsageError(message, help='write path=value, as in executor.threads=4')
         path = _resolve(path_text, data)
         value = _parse(setting, value_text)
-        data = _changed(data, path, value)
+        data = _changed(data, path, value, keeps_null=is_null_a_value(path))
         source = SourceFile(f'--set {setting}', (setting,), home='.')
         positions.remove(path)
         start = len(path_text) + 2
@@ -75,7 +71,7 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
     while rest:
         if not isinstance(inside, dict):
             message = f"--set {text}: '{'.'.join(path)}' is a value, and has no '{rest}' in it"
-            raise UsageError(message)
+            raise UsageError(message, help=_help_for(path, inside))
         key = _longest_key(rest, inside) or rest.partition('.')[0]
         if key not in inside and inside and _has_given_names(path):
             message = f"--set {text}: there is no '{key}' in {'.'.join(path)}"
@@ -86,10 +82,21 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
     return tuple(path)
 
 
+def _help_for(path: list[str], inside: Any) -> str | None:
+    if not isinstance(inside, list):
+        return None
+    return f'give the whole list, as in --set "{".".join(path)}=[first, second]"'
+
+
 def _has_given_names(path: list[str]) -> bool:
     """Return whether what is inside has names that the file itself gives."""
-    # An include may be given an argument that it was not given before.
-    return bool(path) and path[-1] in _NAMED and path[-1:] + path[:1] != ['args', 'include']
+    match path:
+        case [section]:
+            return section in _NAMED
+        case ['nodes', _, section]:
+            return section in _NAMED_IN_NODES
+        case _:
+            return False
 
 
 def _longest_key(text: str, mapping: dict[str, Any]) -> str | None:
@@ -106,12 +113,14 @@ def _parse(setting: str, text: str) -> Any:
     return document.data.get('value')
 
 
-def _changed(data: dict[str, Any], path: DataPath, value: Any) -> dict[str, Any]:
+def _changed(
+    data: dict[str, Any], path: DataPath, value: Any, *, keeps_null: bool
+) -> dict[str, Any]:
     head, *rest = path
     if rest:
         inner = data.get(str(head))
         below = inner if isinstance(inner, dict) else {}
-        return data | {str(head): _changed(below, tuple(rest), value)}
-    if value is None:
+        return data | {str(head): _changed(below, tuple(rest), value, keeps_null=keeps_null)}
+    if value is None and not keeps_null:
         return {key: each for key, each in data.items() if key != head}
     return data | {str(head): value}

@@ -379,3 +379,10 @@ class SystemSpec:
     diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]
     processes: Mapping[str, ProcessSpec]
+
+    @property
+    def longest_stop_sec(self) -> float:
+        """What callbacks, and the processes after them, get to end when the system stops."""
+        own = self.shutdown_timeout_sec
+        given = [process.stop_timeout_sec for process in self.processes.values()]
+        return own + max((own if each is None else each for each in given), default=0.0)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import signal
 
-# How much longer than `shutdown_timeout` a stop may take: the nodes are destroyed after it.
+# How much longer than that a stop may take: the nodes are destroyed after it.
 _MARGIN_SEC = 10.0
 _MARGIN_PER_NODE_SEC = 0.02
 
@@ -35,9 +35,13 @@ class _SigAction(ctypes.Structure):
     )
 
 
-def arm(shutdown_timeout_sec: float, nodes: int) -> None:
-    """Let the process end with exit code 1 and all stacks if a stop takes far too long."""
-    after_sec = shutdown_timeout_sec + _MARGIN_SEC + nodes * _MARGIN_PER_NODE_SEC
+def arm(stop_sec: float, nodes: int) -> None:
+    """Let the process end with exit code 1 and all stacks if a stop takes far too long.
+
+    Args:
+        stop_sec: What it may take.
+    """
+    after_sec = stop_sec + _MARGIN_SEC + nodes * _MARGIN_PER_NODE_SEC
     if sys.__stderr__ is not None:
         faulthandler.dump_traceback_later(after_sec, exit=True, file=sys.__stderr__)
 

@@ -106,11 +106,13 @@ class ProcessOutputs:
     def _show(self, text: str) -> None:
         # Whoever reads our output may have gone, which is no reason to stop.
         with suppress(OSError, ValueError):
-            for start in range(0, len(text), _PIECE):
-                if not self._may_write():
-                    return
-                sys.stdout.write(text[start : start + _PIECE])
+            start = 0
+            while start < len(text) and self._may_write():
+                # Whole lines, if they are not too long: others write to the terminal, too.
+                end = text.rfind('\n', start, start + _PIECE) + 1 or start + _PIECE
+                sys.stdout.write(text[start:end])
                 sys.stdout.flush()
+                start = end
 
     def _may_write(self) -> bool:
         """Wait until standard output takes something; return `False` if it is closing time."""

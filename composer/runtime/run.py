@@ -51,7 +51,7 @@ def run_system(
             try:
                 system.start()
                 system.wait()
-                last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+                last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
                 code, ended = system.stop()
             except ComposerError as error:
                 if system.has_ended:
@@ -77,7 +77,7 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
             system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
-        last_resort.arm(spec.shutdown_timeout_sec, len(spec.nodes))
+        last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
         for number in _SIGNALS:
             last_resort.let_kernel_act_after_next(number)
 

@@ -129,8 +129,8 @@ class System:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
         Foreign processes come before any `on_start`; what waits for something comes after all
-        that does not, whose behaviours run by then. Nodes
-        that have begun hear their `on_stop` if a later one cannot.
+        that does not, whose behaviours run by then. Nodes that have begun hear their `on_stop`
+        if a later one cannot.
 
         Raises:
             StartError: One of them failed; all has been torn down again.

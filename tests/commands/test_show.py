@@ -40,8 +40,6 @@ def test_it_prints_the_final_system(robot, capsys):
     assert capsys.readouterr().out == textwrap.dedent(
         f"""\
         version: 1
-        x-anchors:
-          depth: 5
         nodes:
           brain:
             description: "left brain"
@@ -80,7 +78,6 @@ def test_it_says_where_each_value_comes_from(robot, capsys):
     )
     assert origins == {
         'version: 1': 'robot.yaml:1',
-        'depth: 5': 'robot.yaml:3',
         'description: "left brain"': 'robot.yaml:7, side = left (default, robot.yaml:2)',
         'log_level: debug': 'site.yaml:1',
         'use_sim_time: true': '--set nodes.brain.use_sim_time=true',

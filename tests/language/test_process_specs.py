@@ -152,3 +152,13 @@ def test_a_system_may_have_processes_alone(load):
 
     assert list(system.spec.processes) == ['driver']
     assert not system.spec.nodes
+
+
+@pytest.mark.parametrize(
+    ('processes', 'longest'),
+    [('{}', 3), ('{a: {command: [a]}}', 6), ('{a: {command: [a], stop: {timeout: 40}}}', 43)],
+)
+def test_a_stop_takes_as_long_as_nodes_and_then_processes(load, processes, longest):
+    text = f'version: 1\nexecutor: {{shutdown_timeout: 3}}\nprocesses: {processes}\n'
+
+    assert load(robot=text).spec.longest_stop_sec == longest

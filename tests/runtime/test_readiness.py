@@ -85,6 +85,28 @@ def test_what_belongs_to_a_node_that_has_not_started_is_not_there(compose, peer)
     assert heard == []
 
 
+def test_a_node_answers_nobody_before_it_starts(compose, peer):
+    text = """
+        version: 1
+        nodes:
+          late:
+            wait_for: {topic: words}
+            services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}
+          free: {timers: {t: {period: 0.02, behaviour: 'parts:tell', with: {text: tick}}}}
+    """
+    code = CODE.replace("return {'success'", "node.logger.info('asked')\n    return {'success'")
+    child = compose(text, code)
+    client = peer.node.create_client(Trigger, 'ask')
+    assert client.wait_for_service(20)
+    client.call_async(Trigger.Request())
+    child.wait_for_line('tick', times=len(child.matching('tick')) + 20)
+    assert not child.matching('asked')
+
+    peer.node.create_publisher(String, 'words', 1)
+    child.wait_until_ready()
+    assert peer.call(Trigger, 'ask').success
+
+
 def test_an_action_is_waited_for(compose):
     text = f"""
         version: 1

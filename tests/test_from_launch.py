@@ -1,0 +1,124 @@
+"""The page for people who come from launch files: each of its systems checks, and runs."""
+
+import re
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+
+import composer
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
+from composer.reports.text import render_finding
+
+ROOT = Path(composer.__file__).parents[1]
+PAGE = ROOT / 'docs' / 'from_launch.md'
+
+# Stands in for programs of ROS packages that are not installed.
+PROGRAM = f"""#!{sys.executable}
+import rclpy
+rclpy.init()
+node = rclpy.create_node('program')
+publisher = node.create_publisher(__import__('std_msgs.msg').msg.String, 'chatter', 10)
+try:
+    rclpy.spin(node)
+except BaseException:
+    pass
+"""
+EXECUTABLES = {
+    'demo_nodes_cpp': 'talker',
+    'rclcpp_components': 'component_container',
+    'lifecycle': 'lifecycle_talker',
+}
+# They call ros2, which is not among the wheels.
+NOT_RUN = ('Composable nodes', 'Lifecycle nodes')
+
+
+def read_examples():
+    """Return the systems of the page: the heading, and the files by name, the system first."""
+    examples = []
+    for section in re.split(r'^## ', PAGE.read_text(), flags=re.MULTILINE)[1:]:
+        heading = section.partition('\n')[0]
+        files = {}
+        for text in re.findall(r'^```yaml\n(.*?)^```$', section, re.MULTILINE | re.DOTALL):
+            name = re.match(r'# (\S+\.yaml)\n', text)
+            if not name:
+                examples.append((heading, {'system.yaml': text}))
+            elif files and name[1] not in files:
+                files[name[1]] = text
+            else:
+                files = {name[1]: text}
+                examples.append((heading, files))
+    return examples
+
+
+EXAMPLES = read_examples()
+
+
+def test_the_page_shows_each_thing_that_a_launch_file_does():
+    assert len(EXAMPLES) >= 16
+    text = PAGE.read_text()
+    for term in (
+        'DeclareLaunchArgument remappings PushRosNamespace GroupAction SetRemap IfCondition '
+        'UnlessCondition PythonExpression IncludeLaunchDescription respawn OnProcessExit '
+        'OnProcessStart OnShutdown TimerAction SetEnvironmentVariable ExecuteProcess SetParameter '
+        'ComposableNode LifecycleNode log-level output'
+    ).split():
+        assert term in text
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return a folder with the packages that the page uses in an ament prefix below it."""
+    prefix = tmp_path / 'prefix'
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    index.mkdir(parents=True)
+    for package, executable in EXECUTABLES.items():
+        (index / package).touch()
+        program = prefix / 'lib' / package / executable
+        program.parent.mkdir(parents=True)
+        program.write_text(PROGRAM)
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(folder, files):
+    """Write an example with what the page leaves out; return the system's path and arguments."""
+    for name, text in files.items():
+        if 'ros__parameters' not in text:
+            nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
+            text = f'version: 1\n{text}{nodes}'
+        (folder / name).write_text(text)
+    first = next(iter(files))
+    words = re.search(r'^# arguments: (.*)$', files[first], re.MULTILINE)
+    return folder / first, words[1].split() if words else []
+
+
+@pytest.mark.parametrize(
+    'files', [files for _, files in EXAMPLES], ids=[heading for heading, _ in EXAMPLES]
+)
+def test_an_example_has_no_findings(folder, files):
+    path, words = write(folder, files)
+    for given in (None, words):
+        system = load_system(path, given)
+        findings = check_system(system, InterfaceCatalogue())
+        assert not findings, '\n'.join(map(render_finding, findings))
+
+
+RUNNING = [example for example in EXAMPLES if example[0] not in NOT_RUN]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    'files', [files for _, files in RUNNING], ids=[heading for heading, _ in RUNNING]
+)
+def test_an_example_runs_and_stops(folder, compose, files):
+    path, words = write(folder, files)
+    child = compose.run(path, *words)
+    child.wait_until_ready()
+    assert child.stop() == 0, child.output
+    assert not child.matching('[ERROR]'), child.output
