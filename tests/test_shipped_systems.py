@@ -125,7 +125,8 @@ def test_the_camera_is_simulated_by_default(up, peer, wait_for):
     wait_for(lambda: len(heard) > 1, 'two previews')
 
     assert (heard[0].header.frame_id, list(heard[0].data)) == ('camera', [0, 255])
-    assert nodes_of(peer) == {'/simulated_camera', '/preview'}
+    nodes = {'/simulated_camera', '/preview'}
+    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
     assert child.stop() == 0
 
 
@@ -171,7 +172,8 @@ def test_the_camera_is_a_driver_of_its_own_if_it_is_real(up, peer, wait_for, ins
     wait_for(lambda: heard, 'a preview')
 
     assert (heard[0].width, heard[0].height) == (640, 480)
-    assert nodes_of(peer) == {'/v4l2_camera', '/preview'}
+    nodes = {'/v4l2_camera', '/preview'}
+    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
     assert child.stop() == 0
 
 
@@ -183,8 +185,10 @@ def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for
     child = up('hybrid')
     wait_for(lambda: {each.data for each in obstacles} == {True, False}, 'near and far things')
 
+    wait_for(lambda: ranges, 'a measurement')
     assert ranges[0].header.frame_id == 'range_sensor'
-    assert nodes_of(peer) == {'/front/range_sensor', '/obstacle_detector'}
+    nodes = {'/front/range_sensor', '/obstacle_detector'}
+    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
     assert child.stop() == 0
     wait_for(lambda: not nodes_of(peer), 'the end of the program')
 

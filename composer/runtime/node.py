@@ -90,7 +90,7 @@ class Node:
             one callback group never run at the same time, so it needs no lock.
         own_state: What the behaviour of one timer, subscription, service or action keeps for
             itself from call to call; empty at the start. Two uses of a behaviour in one node have
-            one each.
+            one each; the goals of an action share theirs.
         ros: The rclpy node beneath, for what is not here.
     """
 

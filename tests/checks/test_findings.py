@@ -10,6 +10,7 @@ import pytest
 
 import composer
 from composer.checks import check_files, check_system
+from composer.commands.selection import select_files
 from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system
@@ -17,7 +18,7 @@ from composer.reports.text import render_finding
 
 DATA = Path(__file__).parents[1] / 'data'
 INVALID = DATA / 'invalid'
-SHIPPED = sorted((Path(composer.__file__).parents[1] / 'configs').glob('*.yaml'))
+SHIPPED = select_files([str(Path(composer.__file__).parents[1] / 'configs')]).paths
 
 CASES = sorted(path.stem for path in INVALID.glob('*.yaml'))
 # These look into interface packages, which come with ROS.
