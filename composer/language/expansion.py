@@ -81,6 +81,9 @@ class _Expansion:
             path = (self._section, written)
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
             is_repeated = _FOREACH in entry
+            if entry.get(_FOREACH) == {}:
+                self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
+                continue
             for filler in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
                 if len(self._entries) >= self._limit:
                     self._report_limit(path)
