@@ -9,7 +9,15 @@ from benchmarks.rows import ROWS, Job
 
 pytestmark = pytest.mark.ros
 
-TINY = {'forty': 2, 'further_node': 1, 'thousand': 2, 'idle_cpu': 2, 'round_trips': 1, 'soak': 100}
+TINY = {
+    'check': 1,
+    'forty': 2,
+    'further_node': 1,
+    'idle_cpu': 2,
+    'round_trips': 1,
+    'soak': 100,
+    'thousand': 2,
+}
 
 
 def sides():

@@ -290,10 +290,9 @@ def test_signals_that_composer_ignores_reach_the_process(compose):
     child = compose(system({'driver': {'command': command}}))
     child.wait_for_line('exit code 0')
 
-    assert child.matching('[driver]') == [
-        '[driver] SigBlk:\t0000000000000000',
-        '[driver] SigIgn:\t0000000000000000',
-    ]
+    masks = [int(line.split()[-1], 16) for line in child.matching('[driver] Sig')]
+    # Those above 31 are of libc and of real time: whoever started the tests may have set them.
+    assert [mask & 0x7FFFFFFF for mask in masks] == [0, 0]
 
 
 def test_every_line_of_the_output_has_the_name_in_front(compose):

@@ -79,7 +79,7 @@ import parts
 print(json.dumps({
     'codes': codes,
     'threads': [thread.name for thread in threading.enumerate()],
-    'new tasks and descriptors': [now - then for now, then in zip(after, before)],
+    'new tasks and descriptors': [max(0, now - then) for now, then in zip(after, before)],
     'seen': len(parts.files),
     'left': [name for name in parts.files if os.path.exists(name)],
     'handlers': handlers == [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)],
