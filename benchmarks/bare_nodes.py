@@ -2,8 +2,8 @@
 
 python -m benchmarks.bare_nodes FIRST COUNT STYLE
 
-STYLE is `full` for nodes as rclpy makes them, `lean` for nodes without parameter services and
-`/rosout`, which take part in nothing but topics.
+STYLE is `full` for nodes as rclpy makes them, `lean` for nodes without any service of ROS and
+without `/rosout`, which take part in nothing but topics.
 """
 
 import sys
@@ -11,6 +11,7 @@ from contextlib import suppress
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from std_msgs.msg import Empty
 
 from benchmarks.programs import BARE_READY
@@ -20,12 +21,14 @@ def spin_nodes(first: int, count: int, *, lean: bool) -> None:
     """Create the nodes, say that they are ready, and spin."""
     rclpy.init()
     executor = SingleThreadedExecutor()
+    overrides = [Parameter('start_type_description_service', value=False)] if lean else None
     for number in range(first, first + count):
         node = rclpy.create_node(
             f'bare_{number}',
             use_global_arguments=False,
             start_parameter_services=not lean,
             enable_rosout=not lean,
+            parameter_overrides=overrides,
         )
         node.create_publisher(Empty, f'bare_topic_{number}', 10)
         node.create_subscription(Empty, f'bare_topic_{number}', lambda _: None, 10)
