@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from composer.python_source import FunctionKind
 from composer.runtime import forks
 from composer.runtime.behaviours import kind_of
+from composer.runtime.executor.forks import end_child
 from composer.runtime.stacks import format_coroutine, format_thread
 
 if TYPE_CHECKING:
@@ -239,11 +240,11 @@ class BehaviourCall:
                     return False
                 result = function(*arguments)
                 if forks.in_child:
-                    forks.leave_child()
+                    end_child()
                 deliver(result)
             except BaseException as error:  # noqa: BLE001 - it never takes another node down
                 if forks.in_child:
-                    forks.leave_child(error)
+                    end_child(error)
                 failed(owner, error)
                 return False
             finally:
@@ -273,11 +274,11 @@ class BehaviourCall:
                     return
                 result = await coroutine
                 if forks.in_child:
-                    forks.leave_child()
+                    end_child()
                 self._deliver(result)
             except BaseException as error:
                 if forks.in_child:
-                    forks.leave_child(error)
+                    end_child(error)
                 if _comes_from_outside(error):
                     # The executor drops the coroutine; to go on would be an error of Python's.
                     raise

@@ -10,9 +10,10 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
+
+from composer.runtime.executor.forks import end_child
 
 if TYPE_CHECKING:
     from types import CodeType, FrameType
@@ -28,34 +29,6 @@ _forking = threading.local()
 
 # The code of coroutines that run behaviours.
 coroutine_codes: set[CodeType] = set()
-
-
-def leave_child(error: BaseException | None = None) -> NoReturn:
-    """End a child because the behaviour that forked it has ended.
-
-    Args:
-        error: What the behaviour raised; `SystemExit` gives the exit code, others show their
-            traceback and give 1.
-    """
-    code = 0
-    if isinstance(error, SystemExit):
-        code = _exit_code(error.code)
-    elif error is not None:
-        code = 1
-        with suppress(Exception):
-            traceback.print_exception(error)
-    _flush()
-    os._exit(code)
-
-
-def _exit_code(code: object) -> int:
-    if code is None:
-        return 0
-    if isinstance(code, int):
-        return code & 0xFF
-    with suppress(Exception):
-        print(code, file=sys.stderr)  # noqa: T201 - as Python itself does at the end
-    return 1
 
 
 def _flush() -> None:
@@ -106,7 +79,7 @@ def _leave_at_end_of(coroutine: FrameType) -> None:
 
     def look(frame: FrameType, event: str, _argument: object) -> None:
         if event == 'return' and frame is coroutine:
-            leave_child()
+            end_child()
 
     sys.setprofile(look)
 

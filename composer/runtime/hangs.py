@@ -6,13 +6,11 @@ themselves only note when they began.
 
 from __future__ import annotations
 
-import threading
 import time
-import traceback
 from typing import TYPE_CHECKING, Any
 
 from composer.runtime.calls import RunningCall
-from composer.runtime.logs import system_logger
+from composer.runtime.watching import Watch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -88,7 +86,7 @@ class HangLimit:
             self._warn(f'{self._owner} ({self._place}) {what} after {ran_sec:.1f} s')
 
 
-class HangWatch:
+class HangWatch(Watch):
     """The thread that looks at what runs.
 
     Args:
@@ -100,30 +98,11 @@ class HangWatch:
         self, nodes: Callable[[], Iterable[LiveNode]], limits_sec: Iterable[float | None]
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
-        pause = max(shortest / _LOOKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
-        self._pause_sec = min(pause, _LONGEST_PAUSE_SEC)
+        pause_sec = max(shortest / _LOOKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
+        super().__init__('composer-watch', self._look_at_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
         self._nodes = nodes
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='composer-watch', daemon=True)
 
-    def start(self) -> None:
-        """Begin to look."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Look no more."""
-        self._ended.set()
-        if self._thread.is_alive():
-            self._thread.join(_LONGEST_PAUSE_SEC)
-
-    def _run(self) -> None:
-        while not self._ended.wait(self._pause_sec):
-            try:
-                self._look()
-            except Exception:  # noqa: BLE001 - one fault must not leave the system unwatched
-                system_logger.error(traceback.format_exc())
-
-    def _look(self) -> None:
+    def _look_at_calls(self) -> None:
         for node in self._nodes():
             for token, entry in list(node.ledger.entries.items()):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:

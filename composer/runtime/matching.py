@@ -6,8 +6,6 @@ does. That their types differ is no event of Fast DDS, and is seen in the graph 
 
 from __future__ import annotations
 
-import threading
-import traceback
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +20,7 @@ from rclpy.qos import (
 )
 
 from composer.language.specs import PublisherSpec
-from composer.runtime.logs import system_logger
+from composer.runtime.watching import Watch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -150,7 +148,7 @@ class Endpoint:
         )
 
 
-class GraphWatch:
+class GraphWatch(Watch):
     """The thread that looks who meets.
 
     Args:
@@ -158,32 +156,16 @@ class GraphWatch:
     """
 
     def __init__(self, nodes: Callable[[], Iterable[LiveNode]]) -> None:
+        super().__init__('composer-graph', self._look_unless_destroyed, _PAUSE_SEC)
         self._nodes = nodes
         self._seen: list[tuple[str, list[str]]] = []
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='composer-graph', daemon=True)
 
-    def start(self) -> None:
-        """Begin to look."""
-        self._thread.start()
+    def _look_unless_destroyed(self) -> None:
+        # A node may be destroyed meanwhile.
+        with suppress(InvalidHandle):
+            self._look_at_graph()
 
-    def stop(self) -> None:
-        """Look no more; no node is being asked when this returns."""
-        self._ended.set()
-        if self._thread.is_alive():
-            self._thread.join(_PAUSE_SEC)
-
-    def _run(self) -> None:
-        while not self._ended.wait(_PAUSE_SEC):
-            try:
-                # A node may be destroyed meanwhile.
-                with suppress(InvalidHandle):
-                    self._look()
-            except Exception:  # noqa: BLE001 - one fault must not leave the system unwatched
-                system_logger.error(traceback.format_exc())
-                return
-
-    def _look(self) -> None:
+    def _look_at_graph(self) -> None:
         nodes = list(self._nodes())
         mixed = self._newly_mixed_topics(nodes)
         for node in nodes:

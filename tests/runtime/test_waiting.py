@@ -9,7 +9,7 @@ pytest.importorskip('rclpy')
 from rclpy.task import Future
 
 from composer.errors import SystemStoppingError
-from composer.runtime.waiting import StopSignal, ThreadWaits
+from composer.runtime.waiting import CoroutineWaits, StopSignal, ThreadWaits
 
 pytestmark = pytest.mark.ros
 
@@ -23,6 +23,12 @@ def test_a_wait_without_an_end_does_not_begin_when_the_system_stops(waits):
     waits.stop.set()
     with pytest.raises(SystemStoppingError):
         waits.until_done(Future(), None)
+
+
+def test_nor_does_one_of_a_coroutine(waits):
+    waits.stop.set()
+    with pytest.raises(SystemStoppingError):
+        CoroutineWaits(None, waits).until_done(Future(), None).send(None)
 
 
 def test_one_with_an_end_does_for_what_must_be_switched_off(waits):

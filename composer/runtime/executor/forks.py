@@ -37,16 +37,26 @@ def end_child(error: BaseException | None = None) -> NoReturn:
     Args:
         error: What the callback raised that forked it.
     """
-    code: Any = 0
-    if isinstance(error, SystemExit):
-        code = error.code
-    elif error is not None:
-        traceback.print_exception(error)
-        code = 1
-    if code is not None and not isinstance(code, int):
-        print(code, file=sys.stderr)  # noqa: T201 (as Python does)
-        code = 1
+    code = 0
+    # What the child did may have left anything broken; it must end all the same.
+    with suppress(Exception):
+        code = _exit_code(error)
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError, AttributeError):
+        with suppress(Exception):
             stream.flush()
-    os._exit((code or 0) & 0xFF)
+    os._exit(code & 0xFF)
+
+
+def _exit_code(error: BaseException | None) -> int:
+    """Return the exit code after an error, and show what is to be shown of it."""
+    code = error.code if isinstance(error, SystemExit) else None
+    if code is None and (error is None or isinstance(error, SystemExit)):
+        return 0
+    if isinstance(code, int):
+        return code
+    with suppress(Exception):
+        if code is None:
+            traceback.print_exception(error)
+        else:
+            print(code, file=sys.stderr)  # noqa: T201 (as Python does)
+    return 1
