@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import pytest
 
@@ -49,6 +50,26 @@ def compose(tmp_path, domain_id):
     composing = Composing(tmp_path, domain_id)
     yield composing
     composing.end()
+
+
+@pytest.fixture
+def start_program():
+    """Run Python programs, such as plain rclpy peers; they are gone when the test ends.
+
+    A signal that can be heard would not do: rclpy loses one now and then.
+    """
+    with ExitStack() as programs:
+
+        def start(*arguments, **options):
+            process = subprocess.Popen(
+                [sys.executable, *map(str, arguments)],
+                **{'stdout': subprocess.PIPE, 'text': True} | options,
+            )
+            programs.enter_context(process)
+            programs.callback(process.kill)
+            return process
+
+        yield start
 
 
 @pytest.fixture

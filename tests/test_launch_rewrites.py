@@ -6,8 +6,6 @@ here, and both graphs are seen by a third node.
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -211,27 +209,21 @@ OPTIONAL_PROGRAMS = [
 
 
 @pytest.fixture
-def plain(tmp_path):
+def plain(tmp_path, start_program):
     """Run plain nodes in a domain of their own."""
-    processes = []
 
     def run(programs):
         domain_id = allocate_domain()
-        process = subprocess.Popen(
-            [sys.executable, Path(__file__).with_name('plain_nodes.py'), json.dumps(programs)],
+        process = start_program(
+            Path(__file__).with_name('plain_nodes.py'),
+            json.dumps(programs),
             cwd=tmp_path,
             env=os.environ | {'ROS_DOMAIN_ID': str(domain_id), 'ROS_LOG_DIR': str(tmp_path / 'l')},
-            stdout=subprocess.PIPE,
         )
-        processes.append(process)
-        assert process.stdout.readline() == b'ready\n'
+        assert process.stdout.readline() == 'ready\n'
         return domain_id
 
-    yield run
-    for process in processes:
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    return run
 
 
 CASES = {

@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -35,47 +34,35 @@ def up(compose):
 class Foreigners:
     """Plain rclpy peers, each in a process of its own."""
 
-    def __init__(self):
-        self._servers = []
+    def __init__(self, start_program):
+        self._start_program = start_program
 
     def serve(self, *arguments):
         server = self._start(arguments, stdin=subprocess.PIPE)
-        self._servers.append(server)
         lines = iter(server.stdout.readline, '')
         assert 'ready\n' in lines, f'the foreign peer {arguments} did not start'
 
     def ask(self, *arguments):
         """Return the result of a client."""
         client = self._start(arguments)
-        try:
-            output, _ = client.communicate(timeout=60)
-        finally:
-            client.kill()
+        output, _ = client.communicate(timeout=60)
         assert client.returncode == 0, output
         (result,) = (line for line in output.splitlines() if line.startswith('result '))
         return json.loads(result.removeprefix('result '))
 
-    def end(self):
-        for server in self._servers:
-            server.kill()
-            server.communicate()
-
     def _start(self, arguments, **options):
-        return subprocess.Popen(
-            [sys.executable, ROOT / 'tests' / 'foreign_peers.py', *map(str, arguments)],
+        return self._start_program(
+            ROOT / 'tests' / 'foreign_peers.py',
+            *arguments,
             env=os.environ | {'PYTHONPATH': str(ROOT)},
-            stdout=subprocess.PIPE,
-            text=True,
             **options,
         )
 
 
 @pytest.fixture
-def foreigners(domain_id):
+def foreigners(domain_id, start_program):
     """Return a way to start plain rclpy peers, which are gone when the test ends."""
-    foreigners = Foreigners()
-    yield foreigners
-    foreigners.end()
+    return Foreigners(start_program)
 
 
 def said_by(child, node):

@@ -13,6 +13,7 @@ SHIPPED = ROOT / 'interfaces'
 
 WriteDefinitions = Callable[[Mapping[str, str]], Path]
 RunPython = Callable[..., subprocess.CompletedProcess[str]]
+StartProgram = Callable[..., subprocess.Popen[str]]
 
 
 @pytest.fixture

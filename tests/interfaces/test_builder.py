@@ -1,10 +1,9 @@
-import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from building import SHIPPED, RunPython, WriteDefinitions, process_environment
+from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
 
 from composer.interfaces.builder import (
     BuildError,
@@ -294,22 +293,16 @@ def shipped() -> list[str]:
 
 
 @pytest.fixture
-def server(shared_cache: Path, shipped: list[str]) -> Iterator[None]:
-    process = subprocess.Popen(
-        [sys.executable, '-c', SERVER, *shipped],
-        env=process_environment(shared_cache, ROS_DOMAIN_ID='83'),
-    )
-    yield
-    process.terminate()
-    process.wait(timeout=30)
-
-
-@pytest.mark.usefixtures('server')
 def test_two_processes_talk_by_service_and_action(
     run_python: RunPython,
+    start_program: StartProgram,
+    shared_cache: Path,
     shipped: list[str],
+    domain_id: int,
 ) -> None:
-    run = run_python(CLIENT, *shipped, ROS_DOMAIN_ID='83')
+    environment = process_environment(shared_cache, ROS_DOMAIN_ID=str(domain_id))
+    start_program('-c', SERVER, *shipped, env=environment, stdout=None)
+    run = run_python(CLIENT, *shipped, ROS_DOMAIN_ID=str(domain_id))
     assert run.stdout.splitlines()[-3:] == [
         '5',
         '[0, 1, 1, 2, 3, 5, 8, 13]',

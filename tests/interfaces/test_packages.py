@@ -1,5 +1,4 @@
 import fcntl
-import os
 import signal
 import subprocess
 import sys
@@ -8,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from building import SHIPPED, RunPython, WriteDefinitions, process_environment
+from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
 
 from composer.interfaces.differences import DefinitionsDifferError
 from composer.interfaces.packages import (
@@ -28,6 +27,7 @@ folders = {name: Path(folder) for name, folder in zip(sys.argv[1::2], sys.argv[2
 for each in provide_packages(folders, lambda line: print(line, flush=True)):
     print(each.package, each.origin)
 """
+StartProvider = Callable[[Path, Path], subprocess.Popen[str]]
 EXAMPLE = ('example_interfaces', SHIPPED / 'example_interfaces')
 ROBOTS = {'msg/Robot.msg': 'string name\n'}
 
@@ -43,13 +43,12 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def start_provider(cache: Path, folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, '-c', PROVIDE, 'robots', str(folder)],
-        env=process_environment(cache),
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+@pytest.fixture
+def start_provider(start_program: StartProgram) -> StartProvider:
+    def start(cache: Path, folder: Path) -> subprocess.Popen[str]:
+        return start_program('-c', PROVIDE, 'robots', folder, env=process_environment(cache))
+
+    return start
 
 
 def test_a_second_start_uses_what_the_first_one_built(
@@ -81,6 +80,7 @@ def test_a_cached_start_imports_neither_builder_nor_generators(
 
 
 def test_two_starts_at_once_build_once(
+    start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
 ) -> None:
@@ -96,12 +96,11 @@ def test_two_starts_at_once_build_once(
     assert all(lines[:-1] in ([], [waiting]) for lines in outputs if 'cached' in lines[-1])
 
 
-def stop_in_mid_build(cache: Path, folder: Path, pattern: str) -> None:
+def kill_in_mid_build(start: subprocess.Popen[str], cache: Path, pattern: str) -> None:
     """Kill a start as soon as a file is there that a pattern in the cache's folder fits."""
-    start = start_provider(cache, folder)
     interfaces = cache / 'composer' / 'interfaces'
     wait_for(lambda: any(interfaces.glob(pattern)))
-    os.kill(start.pid, signal.SIGKILL)
+    start.kill()
     start.communicate(timeout=60)
 
 
@@ -117,12 +116,13 @@ def stop_in_mid_build(cache: Path, folder: Path, pattern: str) -> None:
 )
 def test_a_killed_build_leaves_nothing_that_is_used(
     run_python: RunPython,
+    start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
     sign: str,
 ) -> None:
     folder = write_definitions(ROBOTS)
-    stop_in_mid_build(tmp_path, folder, f'robots-*.partial/{sign}')
+    kill_in_mid_build(start_provider(tmp_path, folder), tmp_path, f'robots-*.partial/{sign}')
     code = PROVIDE + 'from robots.msg import Robot; print(Robot(name="Marvin"))'
     lines = run_python(code, 'robots', folder, cache=tmp_path).stdout.splitlines()
     assert lines[-2:] == ['robots built', "robots.msg.Robot(name='Marvin')"]
@@ -147,6 +147,7 @@ def is_locked(path: Path) -> bool:
 
 
 def test_a_killed_build_is_locked_until_its_compilers_are_done(
+    start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -155,7 +156,8 @@ def test_a_killed_build_is_locked_until_its_compilers_are_done(
     compiler.write_text(SLOW_COMPILER.format(folder=tmp_path))
     compiler.chmod(0o755)
     monkeypatch.setenv('CXX', str(compiler))
-    stop_in_mid_build(tmp_path, write_definitions(ROBOTS), '../../started')
+    start = start_provider(tmp_path, write_definitions(ROBOTS))
+    kill_in_mid_build(start, tmp_path, '../../started')
     [lock] = (tmp_path / 'composer' / 'interfaces').glob('*.lock')
     assert is_locked(lock)
     (tmp_path / 'go').touch()
@@ -163,13 +165,14 @@ def test_a_killed_build_is_locked_until_its_compilers_are_done(
 
 
 def test_an_interrupted_build_leaves_nothing(
+    start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
 ) -> None:
     start = start_provider(tmp_path, write_definitions(ROBOTS))
     cache = tmp_path / 'composer' / 'interfaces'
     wait_for(lambda: any(cache.glob('robots-*.partial/build/units')))
-    os.kill(start.pid, signal.SIGINT)
+    start.send_signal(signal.SIGINT)
     start.communicate(timeout=60)
     assert start.returncode != 0
     assert [path.suffix for path in cache.iterdir()] == ['.lock']

@@ -1,9 +1,6 @@
 """Actions that systems serve: how each goal ends, under each rule, for a plain rclpy client."""
 
-import os
 import signal
-import subprocess
-import sys
 from collections import Counter
 
 import pytest
@@ -416,20 +413,11 @@ rclpy.spin(node)
 """
 
 
-def test_a_client_killed_in_mid_goal_leaves_the_server_sound(compose, connect, domain_id):
+def test_a_client_killed_in_mid_goal_leaves_the_server_sound(compose, connect, start_program):
     child = compose(serving('generator', more=', concurrency: queue'), CODE)
-    doomed = subprocess.Popen(
-        [sys.executable, '-c', CLIENT_CODE],
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert doomed.stdout.readline() == 'heard\n'
-    finally:
-        doomed.kill()
-        doomed.wait()
-        doomed.stdout.close()
+    doomed = start_program('-c', CLIENT_CODE)
+    assert doomed.stdout.readline() == 'heard\n'
+    doomed.kill()
     client = connect('generator')
 
     # It waits for the killed client's goal, which runs to its end.

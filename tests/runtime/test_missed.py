@@ -1,9 +1,8 @@
 """What subscriptions and timers miss because callbacks take too long is counted exactly."""
 
-import sys
 import threading
 from contextlib import contextmanager
-from subprocess import Popen
+from subprocess import PIPE
 
 import pytest
 
@@ -103,13 +102,11 @@ def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
 
 @pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
 def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
-    node, executor, wait_for, reliability
+    node, executor, wait_for, start_program, reliability
 ):
     slow = Slow(node, reliability)
-    with (
-        spinning(executor),
-        Popen([sys.executable, '-c', SENDER, reliability, '200'], stdin=-1) as sender,
-    ):
+    start_program('-c', SENDER, reliability, '200', stdin=PIPE)
+    with spinning(executor):
         wait_for(lambda: executor.missed(node, slow.entity).overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1] == 199, 'the last message')
@@ -118,7 +115,6 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
                 lambda: executor.missed(node, slow.entity).overruns == 200 - len(slow.heard),
                 'the exact count',
             )
-        sender.stdin.close()
 
 
 def test_subscriptions_that_keep_up_have_no_overruns(node, executor, wait_for):

@@ -1,9 +1,6 @@
 """Calls of services from behaviours: of this process and of others, one and thousands."""
 
-import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
@@ -155,26 +152,15 @@ rclpy.spin(node)
 
 
 @pytest.fixture
-def plain_server(domain_id):
+def plain_server(domain_id, start_program):
     """Start a plain rclpy server; it is gone when the test ends."""
-    processes = []
 
     def start(how):
-        process = subprocess.Popen(
-            [sys.executable, '-c', PEER_CODE, how],
-            env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
+        process = start_program('-c', PEER_CODE, how)
         assert process.stdout.readline() == 'up\n'
         return process
 
-    yield start
-    for process in processes:
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    return start
 
 
 def asking(client, *, server=SERVER, threads=2):

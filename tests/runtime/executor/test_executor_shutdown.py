@@ -1,9 +1,6 @@
 """`shutdown`, `wake`, contexts and signals."""
 
-import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 import weakref
@@ -85,11 +82,12 @@ def test_no_callback_begins_after_spin_has_returned(node: Any, executor: Any) ->
 
 @pytest.mark.parametrize('name', ['SIGINT', 'SIGTERM'])
 @pytest.mark.parametrize('how', ['spin', 'spin_once', 'busy'])
-def test_signals_end_spin(name: str, how: str) -> None:
+@pytest.mark.usefixtures('domain_id')
+def test_signals_end_spin(name: str, how: str, start_program: Any) -> None:
     program = f"""
 import rclpy, threading, time
 from composer.runtime.executor import ComposerExecutor
-rclpy.init(domain_id={100 + os.getpid() % 100})
+rclpy.init()
 node = rclpy.create_node('node')
 executor = ComposerExecutor()
 executor.add_node(node)
@@ -102,16 +100,11 @@ try:
 except KeyboardInterrupt:
     print('interrupted', flush=True)
 """
-    process = subprocess.Popen([sys.executable, '-c', program], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
+    process = start_program('-c', program)
     assert process.stdout.readline() == 'ready\n'
     time.sleep(0.3)
     process.send_signal(getattr(signal, name))
-    try:
-        output, _ = process.communicate(timeout=DEADLINE_SEC)
-    finally:
-        process.kill()
-        process.communicate()
+    output, _ = process.communicate(timeout=DEADLINE_SEC)
     assert output in ('interrupted\n', 'returned\n')
     assert process.returncode == 0
 
