@@ -30,14 +30,12 @@ def run(arguments: list[str]) -> int:
     except click.exceptions.Exit as error:
         return error.exit_code
     except click.ClickException as error:
-        error.show()
+        _say(*_translate(error))
         return ExitCode.USAGE
     except (KeyboardInterrupt, click.Abort):
         return ExitCode.FAILED
     except ComposerError as error:
-        click.echo(f'error: {error}', err=True)
-        if error.help:
-            click.echo(f'  help: {error.help}', err=True)
+        _say(str(error), error.help)
         return ExitCode.USAGE if isinstance(error, UsageError) else ExitCode.FAILED
     except BrokenPipeError:
         # Whoever read our output has gone; there is nobody to tell.
@@ -50,6 +48,9 @@ def run(arguments: list[str]) -> int:
 
 def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
     """Take what stands between `--ros-args` and `--` (or the end) out of a command line.
+
+    Returns:
+        What is left, and what was taken out.
 
     Source: https://docs.ros.org/en/jazzy/How-To-Guides/Node-arguments.html
     """
@@ -64,6 +65,20 @@ def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
         else:
             (ros if inside else own).append(argument)
     return own, ros
+
+
+def _say(message: str, help: str | None) -> None:  # noqa: A002 - the word that is shown
+    click.echo(f'error: {message}', err=True)
+    if help:
+        click.echo(f'  help: {help}', err=True)
+
+
+def _translate(error: click.ClickException) -> tuple[str, str]:
+    """Return message and help of what click has to say, in the form of all other errors."""
+    message = error.format_message().removesuffix('.')
+    context = getattr(error, 'ctx', None)
+    command = context.command_path if context else 'composer'
+    return message[:1].lower() + message[1:], f"'{command} --help' shows how it is used"
 
 
 def _bug_report(arguments: list[str]) -> str:

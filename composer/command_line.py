@@ -5,17 +5,25 @@ What a command does is in its file in `composer/commands/`, which is imported wh
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import click
 
-from composer.command_words import check_log_levels, check_rule, check_rules, split_words
+from composer.command_words import (
+    NUMBERS_ARE_VALUES,
+    check_log_levels,
+    check_rule,
+    check_rules,
+    refuse_together,
+    split_words,
+    takes_system,
+)
 from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
 from composer.reports import FORMATS
 
-_SET_HELP = 'Change a value, as in nodes.talker.log_level=debug; null removes it.'
+# Without one there is help, and exit code 2: it is not for choice.
+_SUBCOMMAND = 'COMMAND [ARGS]...'
 
 
 def _show_version(context: click.Context, _option: click.Parameter, value: object) -> None:
@@ -26,7 +34,18 @@ def _show_version(context: click.Context, _option: click.Parameter, value: objec
         context.exit()
 
 
-@click.group(context_settings={'help_option_names': ['-h', '--help']})
+def _help_without_command(context: click.Context) -> int:
+    """Show what commands there are, if none was given."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help(), err=True)
+    return ExitCode.USAGE
+
+
+@click.group(
+    invoke_without_command=True,
+    subcommand_metavar=_SUBCOMMAND,
+    context_settings={'help_option_names': ['-h', '--help']},
+)
 @click.option(
     '--version',
     is_flag=True,
@@ -35,29 +54,28 @@ def _show_version(context: click.Context, _option: click.Parameter, value: objec
     callback=_show_version,
     help='Show the version and exit.',
 )
-def cli() -> None:
-    """Run ROS 2 systems that are declared in YAML."""
+@click.pass_context
+def cli(context: click.Context) -> int:
+    """Run ROS 2 systems that are declared in YAML.
+
+    Exit codes: 0 done, 1 the input or the run failed, 2 wrong usage, 3 a bug in Composer.
+    """
+    return _help_without_command(context)
 
 
-@cli.command(
-    'up',
-    context_settings={'ignore_unknown_options': True, 'help_option_names': []},
-    options_metavar='[OPTIONS]',
-)
-@click.argument(
-    'words', nargs=-1, type=click.UNPROCESSED, metavar='FILE [LAYER]... [NAME:=VALUE]...'
-)
-@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
-@click.option(
-    '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
-)
+@cli.command('up', context_settings={**NUMBERS_ARE_VALUES, 'help_option_names': []})
+@takes_system
 @click.option(
     '--log-level',
     'log_levels',
     multiple=True,
     metavar='[NODE:=]LEVEL',
     callback=check_log_levels,
-    help='debug, info, warn, error or fatal; of all nodes, or of one. Wins over the file.',
+    help='debug, info, warn, error or fatal; of all nodes, or of one. Wins over the file. '
+    'May be repeated.',
+)
+@click.option(
+    '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
 )
 @click.pass_context
 def up_command(
@@ -68,7 +86,7 @@ def up_command(
     *,
     wants_help: bool,
 ) -> int:
-    """Check FILE, then run the system that it declares until it is stopped.
+    """Check FILE, then run its system until it is stopped.
 
     LAYERs are files (.yaml, .yml) that change what those before them say. The file's own
     arguments are given by name, NAME:=VALUE, or as values in their order. What follows --ros-args
@@ -82,14 +100,7 @@ def up_command(
             paths, _ = split_words(words)
             click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
-    if not words:
-        message = "Missing argument 'FILE'."
-        raise click.UsageError(message, context)
     paths, arguments = split_words(words)
-    for argument in arguments:
-        # A minus before a digit or a dot belongs to a number.
-        if re.match(r'-[^\W\d]|--', argument):
-            raise click.NoSuchOption(argument, ctx=context)
     return up(paths, arguments, context.obj, log_levels, settings)
 
 
@@ -135,7 +146,10 @@ def up_command(
     '--skip-foreign', is_flag=True, help='Pass over named files that do not look like systems.'
 )
 @click.option(
-    '--stdin-filename', metavar='PATH', default='<stdin>', help='What to take - for, in an editor.'
+    '--stdin-filename',
+    metavar='PATH',
+    default='<stdin>',
+    help='The path of what comes from standard input, for an editor.',
 )
 def check_command(  # noqa: PLR0913 - one for each option
     files: tuple[str, ...],
@@ -150,10 +164,10 @@ def check_command(  # noqa: PLR0913 - one for each option
     skip_foreign: bool,
     stdin_filename: str,
 ) -> int:
-    """Say all that is wrong with FILES, without running anything. Needs no ROS.
+    """Say all that is wrong with FILES, without running anything.
 
-    A file may be a pattern in quotes, a folder (all systems in it are checked), or - for standard
-    input.
+    It needs no ROS 2. A FILE may be a pattern in quotes, a folder (all systems in it are
+    checked), or - for standard input.
     """
     from composer.commands.check import CheckOptions, check
 
@@ -174,7 +188,7 @@ def check_command(  # noqa: PLR0913 - one for each option
 @cli.command('explain')
 @click.argument('rule', required=False, callback=check_rule)
 def explain_command(rule: str | None) -> int:
-    """Say what RULE means, with a bad and a good example; without RULE, list all."""
+    """Say what RULE means, with examples; without RULE, list all."""
     from composer.commands.explain import explain
 
     return explain(rule)
@@ -189,15 +203,14 @@ def schema_command(*, path_only: bool) -> int:
     return print_schema(path_only=path_only)
 
 
-@cli.command('show', options_metavar='[OPTIONS]')
-@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
-@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@cli.command('show', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
 @click.option(
     '--format',
     'output_format',
     type=click.Choice(['yaml', 'json']),
     default='yaml',
-    help='How it is written.',
+    help='How it is written; yaml by default.',
 )
 @click.option('--origin', is_flag=True, help='Say of each value where it comes from.')
 @click.option('--args', 'wants_arguments', is_flag=True, help='List the arguments of FILE.')
@@ -216,24 +229,31 @@ def show_command(
     wants_arguments: bool,
     wants_parameters: bool,
 ) -> int:
-    """Print the system that FILE declares: all included, and with nothing left to evaluate.
+    """Print the final system, with nothing left to evaluate.
 
-    Several FILEs are layers, each over those before it. `composer up` accepts what is printed.
+    LAYERs and NAME:=VALUE are as for `composer up`, which accepts what is printed.
     """
     from composer.commands.show import show, show_arguments
     from composer.commands.show_parameters import show_parameters
 
+    refuse_together(
+        {
+            '--args': wants_arguments,
+            '--params': wants_parameters,
+            '--origin': origin,
+            '--format json': output_format == 'json',
+        }
+    )
     paths, arguments = split_words(words)
     if wants_arguments:
-        return show_arguments(paths)
+        return show_arguments(paths, settings)
     if wants_parameters:
         return show_parameters(paths, arguments, settings)
     return show(paths, arguments, settings, output_format=output_format, origins=origin)
 
 
-@cli.command('graph', options_metavar='[OPTIONS]')
-@click.argument('words', nargs=-1, required=True, metavar='FILE... [NAME:=VALUE]...')
-@click.option('--set', 'settings', multiple=True, metavar='PATH=VALUE', help=_SET_HELP)
+@cli.command('graph', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
 @click.option(
     '--format',
     'format_name',
@@ -252,10 +272,11 @@ def graph_command(
     format_name: str | None,
     output: Path | None,
 ) -> int:
-    """Draw the system that FILE declares: who publishes, hears, serves and calls what.
+    """Draw who publishes, hears, serves and calls what.
 
     Types, QoS that differs from the default, and what `composer check` finds are in it. svg and
-    html need Graphviz: the program, or the extra 'graph'. Several FILEs are layers.
+    html need Graphviz: the program, or the extra 'graph'. LAYERs and NAME:=VALUE are as for
+    `composer up`.
     """
     from composer.commands.graph import graph
 
@@ -266,21 +287,26 @@ def graph_command(
 @cli.command('new')
 @click.argument('name')
 def new_command(name: str) -> int:
-    """Create the folder NAME with a project that works: a system, behaviours, tests, CI."""
+    """Create the folder NAME with a project that works.
+
+    It has a system, behaviours, tests that run it, CI, and the schema for editors.
+    """
     from composer.commands.new import create_project
 
     return create_project(name)
 
 
-@cli.group('interfaces')
-def interfaces_group() -> None:
+@cli.group('interfaces', invoke_without_command=True, subcommand_metavar=_SUBCOMMAND)
+@click.pass_context
+def interfaces_group(context: click.Context) -> int:
     """Build, list and show interface packages."""
+    return _help_without_command(context)
 
 
 @interfaces_group.command('build')
 @click.argument('file', type=click.Path(path_type=Path))
 def interfaces_build_command(file: Path) -> int:
-    """Build the packages that FILE declares, where they are not there yet."""
+    """Build the packages of FILE that are not there yet."""
     from composer.commands.interfaces import build
 
     return build(file)
@@ -289,7 +315,7 @@ def interfaces_build_command(file: Path) -> int:
 @interfaces_group.command('list')
 @click.argument('package', required=False)
 def interfaces_list_command(package: str | None) -> int:
-    """List the interfaces that are installed, or those of PACKAGE."""
+    """List all installed interfaces, or those of PACKAGE."""
     from composer.commands.interfaces import list_all
 
     return list_all(package)
@@ -298,7 +324,10 @@ def interfaces_list_command(package: str | None) -> int:
 @interfaces_group.command('show')
 @click.argument('name')
 def interfaces_show_command(name: str) -> int:
-    """Show the fields, constants and comments of NAME, as in std_msgs/msg/Header."""
+    """Show fields, constants and comments of NAME.
+
+    NAME is a full one, as in std_msgs/msg/Header.
+    """
     from composer.commands.interfaces import show
 
     return show(name)
