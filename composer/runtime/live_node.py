@@ -184,16 +184,19 @@ class LiveNode:
             failed: Takes what it raised, after that has been reported.
         """
         function = partial(self.function(behaviour), **behaviour.arguments)
-        return self.last_call(owner, behaviour.path, function, failed)
+        return self.reported_call(owner, behaviour.path, function, failed)
 
-    def last_call(
+    def reported_call(
         self,
         owner: str,
         path: DataPath,
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of what is not answered by `on_error` when it raises."""
+        """Return the wrapped call of a function whose errors are reported, and no more.
+
+        At the start and the end of a node `on_error` does not count.
+        """
         place = self.place(path)
         self._limit(owner, place, self.spec)
 
