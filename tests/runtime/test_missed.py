@@ -16,7 +16,7 @@ from std_msgs.msg import Int32
 
 from composer.runtime.executor import Missed
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
 
 SENDER = """
 import sys, time

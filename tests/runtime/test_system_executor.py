@@ -13,8 +13,8 @@ from composer.runtime.executor import ComposerExecutor
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(60, method='thread')]
-DEADLINE_SEC = 20.0
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+DEADLINE_SEC = 40.0
 
 
 @pytest.fixture
