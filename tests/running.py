@@ -237,6 +237,18 @@ class Peer:
             self.node.destroy_client(client)
         return [call.result() for call in calls]
 
+    def meet_action_server(self, name):
+        """Return when the server of an action has found all ends that this peer has by now.
+
+        They are found in the order in which they were made; the last of them is made here.
+        """
+        from action_msgs.msg import GoalInfo
+        from action_msgs.srv import CancelGoal
+        from unique_identifier_msgs.msg import UUID
+
+        nobody = GoalInfo(goal_id=UUID(uuid=[1] * 16))
+        self.call(CancelGoal, f'{name}/_action/cancel_goal', goal_info=nobody)
+
     def close(self):
         self._spinning = False
         self._executor.wake()

@@ -60,7 +60,7 @@ print(code, before == dict(os.environ))
         env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
         stdout=subprocess.PIPE,
         text=True,
-        timeout=100,
+        timeout=200,
         check=True,
     )
 

@@ -130,6 +130,8 @@ def test_private_remapped_and_absolute_names_are_served(child, shared_peer, name
 def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
     client = shared_peer.node.create_client(BasicTypes, '/robot/echo')
     assert client.wait_for_service(30)
+    # Ends are found in the order in which they were made: who answers this knows the client.
+    shared_peer.call(Trigger, '/robot/message')
     futures = [
         client.call_async(BasicTypes.Request(int64_value=number, string_value=str(number)))
         for number in range(8)
@@ -202,10 +204,13 @@ def test_requests_of_a_reentrant_service_run_beside_each_other(compose, peer, wa
           server:
             services:
               meet: {type: std_srvs/srv/Trigger, behaviour: 'parts:meet', group: reentrant}
+              other: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
     """
     child = compose(text, CODE)
     client = peer.node.create_client(Trigger, 'meet')
     assert client.wait_for_service(30)
+    # Ends are found in the order in which they were made: who answers this knows the client.
+    peer.call(Trigger, 'other')
     futures = [client.call_async(Trigger.Request()) for _ in range(2)]
     wait_for(lambda: all(future.done() for future in futures), 'both responses')
 
