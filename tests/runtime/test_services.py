@@ -168,15 +168,19 @@ def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
     shared_peer.node.destroy_client(client)
 
 
-def test_the_quality_of_service_is_the_declared_one(child, shared_peer):
+def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for):
     profile = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
     client = shared_peer.node.create_client(Trigger, '/robot/best_effort', qos_profile=profile)
     assert client.wait_for_service(30)
 
-    readers = shared_peer.node.get_subscriptions_info_by_topic(
-        'rq/robot/best_effortRequest', no_mangle=True
-    )
-    theirs = [info for info in readers if info.node_name == 'server']
+    def readers():
+        found = shared_peer.node.get_subscriptions_info_by_topic(
+            'rq/robot/best_effortRequest', no_mangle=True
+        )
+        return [info for info in found if info.node_name == 'server']
+
+    # An end may be found before the name of its node.
+    theirs = wait_for(readers, 'the end of the server')
     assert [info.qos_profile.reliability for info in theirs] == [ReliabilityPolicy.BEST_EFFORT]
     shared_peer.node.destroy_client(client)
 

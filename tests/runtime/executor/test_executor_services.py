@@ -19,7 +19,11 @@ from std_srvs.srv import Trigger
 from composer.runtime.executor import ComposerExecutor
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_a_service_can_be_called_from_a_callback_of_another_group(

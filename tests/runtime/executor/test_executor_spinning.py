@@ -22,6 +22,7 @@ from composer.runtime.executor import ComposerExecutor
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
 
 
+@pytest.mark.usefixtures('patient')
 def test_spin_once_runs_one_callback(node: Any, executor: Any) -> None:
     ticks: list[int] = []
     node.create_timer(0.01, lambda: ticks.append(1))
@@ -55,6 +56,7 @@ def test_spin_once_returns_though_its_callback_blocks(node: Any, executor: Any) 
     assert over.wait(DEADLINE_SEC)
 
 
+@pytest.mark.usefixtures('patient')
 def test_spin_once_serves_a_node_that_is_added_while_it_waits(context: Any, executor: Any) -> None:
     node = rclpy.create_node('late', context=context)
     ticked = threading.Event()
@@ -113,6 +115,7 @@ def test_spin_once_until_future_complete_returns_when_it_is_done(
     assert future.done()
 
 
+@pytest.mark.usefixtures('patient')
 def test_rclpy_functions_take_the_executor(context: Any, executor: Any) -> None:
     node = rclpy.create_node('given', context=context)
     future = Future()
@@ -149,6 +152,7 @@ def test_spin_can_go_on_after_an_exception(node: Any, executor: Any) -> None:
             executor.spin()
 
 
+@pytest.mark.usefixtures('patient')
 def test_spin_once_raises_what_a_callback_raises(node: Any, executor: Any) -> None:
     def fail() -> None:
         raise KeyError

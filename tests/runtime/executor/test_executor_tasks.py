@@ -15,7 +15,11 @@ from rclpy.context import Context
 from spinning import DEADLINE_SEC, spinning, wait_for
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -> None:

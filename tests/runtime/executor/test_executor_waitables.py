@@ -23,7 +23,11 @@ from std_msgs.msg import Empty
 from test_msgs.action import Fibonacci
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_a_guard_condition_runs_its_callback(node: Any, executor: Any) -> None:
