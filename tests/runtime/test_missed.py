@@ -109,8 +109,9 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
     slow = Slow(node, reliability)
     sender = start_program('-c', SENDER, reliability, '200', stdin=PIPE)
     wait_for(slow.entity.get_publisher_count, 'the publisher')
-    print('go', file=sender.stdin, flush=True)
     with spinning(executor):
+        wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
+        print('go', file=sender.stdin, flush=True)
         wait_for(lambda: executor.missed(node, slow.entity).overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1] == 199, 'the last message')

@@ -131,6 +131,28 @@ def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
     assert not thread.is_alive()
 
 
+@pytest.mark.parametrize('what', ['context', 'executor'])
+def test_spin_once_ends_with_what_ended_right_before_it_waits(
+    node: Any, executor: Any, context: Context, monkeypatch: Any, what: str
+) -> None:
+    engine = executor._engine
+    wait_if = engine.polling.wait_if
+
+    def wait_later(*arguments: Any) -> None:
+        if what == 'context':
+            context.handle.shutdown()
+            engine.wake()
+        else:
+            executor.shutdown(0)
+        wait_if(*arguments)
+
+    monkeypatch.setattr(engine.polling, 'wait_if', wait_later)
+    thread = threading.Thread(target=executor.spin_once, daemon=True)
+    thread.start()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
 def test_spin_ends_when_a_signal_ends_the_context_during_a_look_at_events(
     node: Any, executor: Any, context: Context, monkeypatch: Any
 ) -> None:
