@@ -44,7 +44,7 @@ def start(command, folder=ROOT, **variables):
         env=os.environ | {'PYTHONPATH': str(ROOT), **variables},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
 

@@ -103,7 +103,7 @@ def test_the_hook_runs_a_command_that_there_is(tmp_path):
         env={'PYTHONPATH': str(ROOT), 'PATH': ''},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert result.returncode == 1
@@ -133,7 +133,7 @@ def test_the_action_checks_what_its_inputs_say(tmp_path):
         },
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert result.returncode == 1

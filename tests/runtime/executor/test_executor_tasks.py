@@ -12,10 +12,14 @@ pytest.importorskip('test_msgs')
 
 import rclpy
 from rclpy.context import Context
-from spinning import spinning, wait_for
+from spinning import DEADLINE_SEC, spinning, wait_for
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -> None:
@@ -32,7 +36,7 @@ def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -
     executor.spin_once(timeout_sec=0)
     assert one.done()
     assert not two.done()
-    executor.spin_once(timeout_sec=1)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
     assert two.result() == 'first second'
 
 
@@ -62,7 +66,7 @@ def test_a_coroutine_that_yields_is_resumed_by_the_next_spin_once(
         steps.append(2)
 
     timer = node.create_timer(0.01, tick)
-    executor.spin_once(timeout_sec=5)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
     assert steps == [1]
     timer.cancel()
     executor.spin_once(timeout_sec=0)
@@ -88,7 +92,7 @@ def test_a_suspended_callback_goes_on_when_its_node_is_back(
 
     node = rclpy.create_node('node', context=context)
     timer = node.create_timer(0.01, tick)
-    rclpy.spin_once(node, executor=executor, timeout_sec=5)
+    rclpy.spin_once(node, executor=executor, timeout_sec=DEADLINE_SEC)
     timer.cancel()
     waiting = False
     executor.spin_once(timeout_sec=0)
