@@ -6,25 +6,22 @@ include says beside (`namespace`, `remap`) is applied to all that comes out of i
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.flattening import Flattening, Inclusion, push_defaults
-from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
-from composer.language.parameters import convert_parameter_value, find_type_fault
-from composer.language.paths import PathError, resolve_path
+from composer.language.given_arguments import give_arguments
+from composer.language.included_files import locate_file, shown_path
+from composer.language.instances import Instance, read_instance
+from composer.language.paths import PathError
 from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
-from composer.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection
 
-    from composer.diagnostics import Span
-    from composer.language.arguments import ArgumentSpec
     from composer.language.positions import DataPath
 
 
@@ -102,7 +99,7 @@ class Includer:
     ) -> Instance | None:
         place = instance.positions.value((*at, 'file'))
         try:
-            path = _locate(entry['file'], place)
+            path = locate_file(entry['file'], place)
         except PathError as error:
             instance.diagnostics.append(
                 diagnostic_at(place, 'missing-include', str(error), help=error.help)
@@ -119,7 +116,7 @@ class Includer:
         document = self._document(path)
         faults: list[Diagnostic] = []
         part = read_instance(
-            document, lambda declared: _give(declared, instance, at, entry, faults)
+            document, lambda declared: give_arguments(declared, instance, at, entry, faults)
         )
         instance.diagnostics += faults
         inner_chain = (here, *chain)
@@ -137,7 +134,7 @@ class Includer:
     def _document(self, path: Path) -> Document:
         resolved = path.resolve()
         if resolved not in self._documents:
-            self._documents[resolved] = read_document(path, _shown(path))
+            self._documents[resolved] = read_document(path, shown_path(path))
         return self._documents[resolved]
 
 
@@ -145,104 +142,6 @@ def _settle(instance: Instance) -> None:
     """Let a file's defaults and profiles hold in this file alone."""
     push_defaults(instance)
     drop_unknown_profiles(instance)
-
-
-def _locate(text: str, place: Span) -> Path:
-    """Return the file that an include names.
-
-    Raises:
-        PathError: There is no such file.
-    """
-    path = resolve_path(text, place.source.folder)
-    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
-        message = f"there is no file '{_shown(path)}'"
-        raise PathError(message, help=_help_for(path))
-    return path
-
-
-def _help_for(path: Path) -> str | None:
-    try:
-        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
-    except OSError:
-        return None
-    return did_you_mean(path.name, names, 'there are')
-
-
-def _shown(path: Path) -> str:
-    """Return a path as findings show it: from the working folder, where it lies below that."""
-    plain = Path(os.path.normpath(path))
-    try:
-        return str(plain.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(plain)
-
-
-def _give(
-    declared: Mapping[str, ArgumentSpec],
-    instance: Instance,
-    at: DataPath,
-    entry: dict[str, Any],
-    faults: list[Diagnostic],
-) -> ArgumentValues:
-    """Return the values that an include gives."""
-    given = entry.get('args', {})
-    values = dict(sample_values(declared).values)
-    origins: dict[str, str] = {}
-    section = (*at, 'args')
-    positions = instance.positions
-    faults += [
-        diagnostic_at(
-            positions.key((*section, name)),
-            'unknown-argument',
-            f"'{entry['file']}' takes no argument '{name}'",
-            help=did_you_mean(name, declared, 'it takes'),
-        )
-        for name in given
-        if name not in declared
-    ]
-    unknown: list[str] = []
-    for name, argument in declared.items():
-        path = (*section, name)
-        if name in given:
-            value = convert_parameter_value(given[name], argument.type)
-            fault = _find_fault(argument, value)
-            if not fault:
-                values[name] = value
-                origins[name] = _origin(instance, path)
-            elif positions.value(path) not in instance.sampled_spans:
-                faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
-            if fault or positions.value(path) in instance.sampled_spans:
-                unknown.append(name)
-        elif path in instance.dropped or section in instance.dropped:
-            unknown.append(name)
-        elif argument.default is None:
-            unknown.append(name)
-            faults.append(
-                _missing_argument(argument, entry['file'], positions.value((*at, 'file')))
-            )
-    return ArgumentValues(values, unknown, origins)
-
-
-def _origin(instance: Instance, path: DataPath) -> str:
-    note = instance.notes.get(path)
-    return instance.positions.value(path).place + (f', {note}' if note else '')
-
-
-def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:
-    message = f"'{file}' wants the argument '{argument.name}'"
-    return diagnostic_at(
-        place, 'missing-argument', message, help=f"give it under 'args': {argument}"
-    )
-
-
-def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:
-    fault = find_type_fault(value, argument.type)
-    if fault:
-        return f"'{argument.name}': {fault}"
-    if argument.choices and value not in argument.choices:
-        choices = ', '.join(map(str, argument.choices))
-        return f"'{argument.name}': {value!r} is none of {choices}"
-    return None
 
 
 def _with_chain(
