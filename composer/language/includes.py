@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.language.defaults import push_defaults
 from composer.language.filling import MAX_ENTRIES, SECTIONS
-from composer.language.flattening import Flattening, Inclusion, push_defaults
+from composer.language.flattening import Flattening, Inclusion
 from composer.language.given_arguments import give_arguments
 from composer.language.included_files import locate_file, shown_path
 from composer.language.instances import Instance, read_instance
