@@ -95,23 +95,25 @@ class Flattening:
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
+        self._whole.spans_left_out += part.spans_left_out
 
     def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
         nodes = self._whole.data.setdefault('nodes', {})
         full = full_node_name(namespace, simple)
-        if full in self._full_names:
-            return None
         key = full if simple in nodes else simple
         if is_left_out:
             return None if key in nodes else key
+        if full in self._full_names:
+            return None
         self._full_names.add(full)
-        self._whole.left_out.discard(('nodes', key))
         return key
 
     def _process_keys(self, inclusion: Inclusion) -> dict[str, str]:
         """Return what the processes of a file are called in the whole system."""
-        own = self._whole.data.get('processes', {})
+        processes, left_out = self._whole.data.get('processes', {}), self._whole.left_out
+        # What is left out gives way.
+        own = [name for name in processes if ('processes', name) not in left_out]
         names = inclusion.part.data.get('processes', {})
         taken = {*own, *names}
         keys = {}
@@ -148,8 +150,13 @@ class Flattening:
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
         whole.chains[new] = (*part.chains.get(old, ()), here)
-        if old in part.left_out:
-            whole.left_out.add(new)
+        self._leave_out(new, is_left_out=old in part.left_out)
+
+    def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
+        if is_left_out:
+            self._whole.left_out.add(path)
+        else:
+            self._whole.left_out.discard(path)
 
     def _with_outer(
         self, inclusion: Inclusion, path: DataPath, entry: dict[str, Any]
@@ -185,6 +192,9 @@ class Flattening:
         for name, profile in profiles.items():
             key = str(renaming.in_qos(name))
             own = self._whole.data.setdefault('qos', {})
+            is_left_out = ('qos', name) in part.left_out
+            if not (key in own and is_left_out):
+                self._leave_out(('qos', key), is_left_out=is_left_out)
             if key in own:
                 continue
             own[key] = renaming.in_qos(profile)
@@ -197,10 +207,14 @@ class Flattening:
     def _add_interfaces(self, part: Instance) -> None:
         for package in part.data.get('interfaces', {}):
             declared = self._whole.data.setdefault('interfaces', {})
+            path = ('interfaces', package)
+            is_left_out = path in part.left_out
+            if not (package in declared and is_left_out):
+                self._leave_out(path, is_left_out=is_left_out)
             if package not in declared:
                 declared[package] = part.data['interfaces'][package]
                 branch = part.branches('interfaces')[package]
-                self._whole.positions.graft(('interfaces', package), branch)
+                self._whole.positions.graft(path, branch)
 
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:

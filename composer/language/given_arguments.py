@@ -10,37 +10,23 @@ from composer.language.parameters import convert_parameter_value, find_type_faul
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
-    from composer.diagnostics import Span
     from composer.language.arguments import ArgumentSpec
+    from composer.language.include_places import IncludePlace
     from composer.language.instances import Instance
     from composer.language.positions import DataPath
 
 
 def give_arguments(
-    declared: Mapping[str, ArgumentSpec],
-    instance: Instance,
-    at: DataPath,
-    entry: dict[str, Any],
-    faults: list[Diagnostic],
+    declared: Mapping[str, ArgumentSpec], place: IncludePlace, faults: list[Diagnostic]
 ) -> ArgumentValues:
-    """Return the values that an include gives."""
-    given = entry.get('args', {})
+    """Return the values that an include gives; what is wrong with them is added to `faults`."""
+    given = place.entry.get('args', {})
     values = dict(sample_values(declared).values)
     origins: dict[str, str] = {}
-    section = (*at, 'args')
-    positions = instance.positions
-    faults += [
-        diagnostic_at(
-            positions.key((*section, name)),
-            'unknown-argument',
-            f"'{entry['file']}' takes no argument '{name}'",
-            help=did_you_mean(name, declared, 'it takes'),
-        )
-        for name in given
-        if name not in declared
-    ]
+    section = (*place.at, 'args')
+    faults += _find_unknown(declared, given, place)
     unknown: list[str] = []
     for name, argument in declared.items():
         path = (*section, name)
@@ -49,19 +35,30 @@ def give_arguments(
             fault = _find_fault(argument, value)
             if not fault:
                 values[name] = value
-                origins[name] = _origin(instance, path)
-            elif positions.value(path) not in instance.sampled_spans:
-                faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
-            if fault or positions.value(path) in instance.sampled_spans:
+                origins[name] = _origin(place.instance, path)
+            elif not place.is_open(path):
+                span = place.instance.positions.value(path)
+                faults.append(diagnostic_at(span, 'argument-type', fault))
+            if fault or place.is_open(path):
                 unknown.append(name)
-        elif path in instance.dropped or section in instance.dropped:
+        elif not place.instance.dropped.isdisjoint((path, section)):
             unknown.append(name)
         elif argument.default is None:
             unknown.append(name)
-            faults.append(
-                _missing_argument(argument, entry['file'], positions.value((*at, 'file')))
-            )
+            faults.append(_missing_argument(argument, place))
     return ArgumentValues(values, unknown, origins)
+
+
+def _find_unknown(
+    declared: Mapping[str, ArgumentSpec], given: Mapping[str, Any], place: IncludePlace
+) -> Iterator[Diagnostic]:
+    for name in [each for each in given if each not in declared]:
+        yield diagnostic_at(
+            place.instance.positions.key((*place.at, 'args', name)),
+            'unknown-argument',
+            f"'{place.file}' takes no argument '{name}'",
+            help=did_you_mean(name, declared, 'it takes'),
+        )
 
 
 def _origin(instance: Instance, path: DataPath) -> str:
@@ -69,11 +66,10 @@ def _origin(instance: Instance, path: DataPath) -> str:
     return instance.positions.value(path).place + (f', {note}' if note else '')
 
 
-def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:
-    message = f"'{file}' wants the argument '{argument.name}'"
-    return diagnostic_at(
-        place, 'missing-argument', message, help=f"give it under 'args': {argument}"
-    )
+def _missing_argument(argument: ArgumentSpec, place: IncludePlace) -> Diagnostic:
+    message = f"'{place.file}' wants the argument '{argument.name}'"
+    help_text = f"give it under 'args': {argument}"
+    return diagnostic_at(place.span, 'missing-argument', message, help=help_text)
 
 
 def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:

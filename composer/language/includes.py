@@ -9,11 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.diagnostics import Diagnostic, Related
 from composer.language.defaults import push_defaults
 from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.flattening import Flattening, Inclusion
 from composer.language.given_arguments import give_arguments
+from composer.language.include_places import IncludePlace
 from composer.language.included_files import locate_file, shown_path
 from composer.language.instances import Instance, read_instance
 from composer.language.paths import PathError
@@ -21,9 +22,7 @@ from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from composer.language.positions import DataPath
+    from collections.abc import Collection, Mapping
 
 
 _HERE = 'included here'
@@ -32,21 +31,30 @@ _HERE = 'included here'
 class Includer:
     """Reads the files that a file includes, and what these include, each file once.
 
-    Args:
-        folder: Where relative paths of a text without a file begin.
+    What an include brings whose `when` does not hold is read as well, and left out as a whole.
     """
 
     def __init__(self) -> None:
         self._documents: dict[Path, Document] = {}
         self._limit = 0
         self._inclusions = 0
+        # Entries and includes that were read although they are left out.
+        self._left_out = 0
 
-    def include(self, instance: Instance, path: Path, chain: tuple[Related, ...] = ()) -> Instance:
+    def include(
+        self,
+        instance: Instance,
+        path: Path,
+        chain: tuple[Related, ...] = (),
+        *,
+        is_left_out: bool = False,
+    ) -> Instance:
         """Return an instance with all that it includes in it.
 
         Args:
             path: The file of the instance.
             chain: Where it is included itself, innermost first.
+            is_left_out: Whether it is read for its faults alone.
         """
         # An included file may ask for more; one that asks for nothing changes nothing.
         asked = instance.data.get('max_nodes', 0 if chain else MAX_ENTRIES)
@@ -56,78 +64,66 @@ class Includer:
             return instance
         _settle(instance)
         flattening = Flattening(instance, chain)
-        stack = (path.resolve(), *(Path(each.span.source.name).resolve() for each in chain))
-        for name, entry in entries.items():
-            at = ('include', name)
-            if at in instance.left_out:
-                continue
-            part = self._read(instance, at, entry, stack, chain)
+        for place in _used_first(entries, instance):
+            aside = is_left_out or place.is_left_out
+            if aside and self._left_out > self._limit:
+                break
+            part = self._read(place, path, chain, is_left_out=aside)
             if part is None:
                 continue
-            flattening.add(Inclusion(part, at, entry))
-            if self._is_too_large(instance, at):
+            if place.is_left_out:
+                part.leave_out_all()
+            flattening.add(Inclusion(part, place.at, place.entry))
+            if aside:
+                self._left_out += 1 + sum(len(part.data.get(each, ())) for each in SECTIONS)
+            elif self._is_too_large(place, chain):
                 break
         return instance
 
-    def _is_too_large(self, instance: Instance, at: DataPath) -> bool:
+    def _is_too_large(self, place: IncludePlace, chain: tuple[Related, ...]) -> bool:
         """Return whether a system has grown beyond its limit; say so once."""
         if self._inclusions > self._limit:
             return True
-        counts = {section: len(instance.data.get(section, ())) for section in SECTIONS}
         self._inclusions += 1
+        counts = {each: _count_used(place.instance, each, self._limit) for each in SECTIONS}
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
         if counts[section] <= self._limit:
             return False
         self._inclusions = self._limit + 1
-        instance.diagnostics.append(
-            diagnostic_at(
-                instance.positions.value((*at, 'file')),
-                'too-many-entries',
-                f'there are more than {self._limit:,} entries in {section} of all files',
-                help="if that is meant, raise 'max_nodes' at the top of the file",
-            )
-        )
+        message = f'there are more than {self._limit:,} entries in {section} of all files'
+        help_text = "if that is meant, raise 'max_nodes' at the top of the file"
+        place.report('too-many-entries', message, chain, help_text)
         return True
 
     def _read(
         self,
-        instance: Instance,
-        at: DataPath,
-        entry: dict[str, Any],
-        stack: tuple[Path, ...],
+        place: IncludePlace,
+        parent: Path,
         chain: tuple[Related, ...],
+        *,
+        is_left_out: bool,
     ) -> Instance | None:
-        place = instance.positions.value((*at, 'file'))
-        try:
-            path = locate_file(entry['file'], place)
-        except PathError as error:
-            instance.diagnostics.append(
-                diagnostic_at(place, 'missing-include', str(error), help=error.help)
-            )
+        """Return what an include brings, or say what is wrong with it and return `None`."""
+        path = _find_file(place, chain)
+        if path is None:
             return None
-        here = Related(_HERE, place)
-        if path.resolve() in stack:
-            message = f"'{entry['file']}' includes itself"
-            related = [Related(_HERE, each.span) for each in chain]
-            instance.diagnostics.append(
-                diagnostic_at(place, 'include-cycle', message, related=related)
-            )
+        stack = (parent, *(Path(each.span.source.name) for each in chain))
+        if path.resolve() in [each.resolve() for each in stack]:
+            place.report('include-cycle', f"'{place.file}' includes itself", chain)
             return None
-        document = self._document(path)
+        instance, document = place.instance, self._document(path)
         faults: list[Diagnostic] = []
-        part = read_instance(
-            document, lambda declared: give_arguments(declared, instance, at, entry, faults)
-        )
-        instance.diagnostics += faults
-        inner_chain = (here, *chain)
+        part = read_instance(document, lambda declared: give_arguments(declared, place, faults))
+        instance.diagnostics += _with_chain(faults, chain)
+        inner_chain = (Related(_HERE, place.span), *chain)
         if part is None:
             instance.diagnostics += _with_chain(document.diagnostics, inner_chain)
             return None
         _settle(part)
         own = part.diagnostics
         part.diagnostics = []
-        part = self.include(part, path, inner_chain)
+        part = self.include(part, path, inner_chain, is_left_out=is_left_out)
         instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
         instance.included |= {part.positions.source: None} | part.included
         return part
@@ -137,6 +133,30 @@ class Includer:
         if resolved not in self._documents:
             self._documents[resolved] = read_document(path, shown_path(path))
         return self._documents[resolved]
+
+
+def _used_first(entries: Mapping[str, dict[str, Any]], instance: Instance) -> list[IncludePlace]:
+    """Return the includes of a file; what is left out must not take names from what is used."""
+    places = [IncludePlace(instance, ('include', name), entries[name]) for name in entries]
+    return sorted(places, key=lambda place: place.is_left_out)
+
+
+def _count_used(instance: Instance, section: str, limit: int) -> int:
+    """Return how many entries a section has; those that are left out count up to a limit."""
+    count = len(instance.data.get(section, ()))
+    if count <= limit:
+        return count
+    return count - sum(path[0] == section for path in instance.left_out)
+
+
+def _find_file(place: IncludePlace, chain: tuple[Related, ...]) -> Path | None:
+    """Return the file that an include names; if there is none, say so and return `None`."""
+    try:
+        return locate_file(place.file, place.span)
+    except PathError as error:
+        if not place.may_be_absent:
+            place.report('missing-include', str(error), chain, error.help)
+    return None
 
 
 def _settle(instance: Instance) -> None:
