@@ -17,7 +17,7 @@ from composer.language.composition import (
     ScalarNode,
     SequenceNode,
     TreeNode,
-    compose_tree,
+    compose_trees,
 )
 from composer.language.parameter_patterns import find_pattern_fault
 from composer.language.parameter_scalars import read_scalar
@@ -95,13 +95,14 @@ def parse_parameter_file(text: str, name: str) -> ParameterFile:
     """Read the text of a file that is called `name` in findings."""
     source = SourceFile(name, tuple(text.splitlines()))
     try:
-        tree = compose_tree(text, source, alias_rule=RULE)
+        trees = compose_trees(text, source, alias_rule=RULE)
     except CompositionError as error:
         return ParameterFile(faults=(_explain_typo(error.diagnostic),))
     reader = _Reader()
-    if tree is not None:
+    # ROS reads several documents as if they were one.
+    for tree in trees:
         reader.read_nodes(tree, '')
-        reader.check_double_names()
+    reader.check_double_names()
     return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.faults))
 
 
@@ -109,12 +110,12 @@ def parse_override(text: str) -> tuple[Any, str | None] | None:
     """Return value and type of what follows `:=` on a command line; `None` if rcl refuses it."""
     reader = _Reader()
     try:
-        tree = compose_tree(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
+        trees = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
     except CompositionError:
         return None
-    if tree is None or isinstance(tree, MappingNode):
+    if len(trees) != 1 or isinstance(trees[0], MappingNode):
         return None
-    value = reader.read_value(tree)
+    value = reader.read_value(trees[0])
     return None if reader.faults else (value, infer_parameter_type(value))
 
 
