@@ -15,6 +15,7 @@ from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
+from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import (
     check_environment,
     check_executables,
@@ -49,6 +50,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_parameters,
     check_behaviour_sources,
     check_processes,
+    check_process_parameters,
     check_annotations,
     check_uses,
 )
