@@ -117,7 +117,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
     instance = read_instance(document, give_values)
     if instance is None:
         return LoadedSystem(path, None, document.positions, frozenset(), document.diagnostics)
-    whole = Includer().include(instance, path)
+    whole = Includer(instance.data.get('environment', {})).include(instance, path)
     used, unused = _divided(whole.data, whole.left_out)
     return LoadedSystem(
         path,

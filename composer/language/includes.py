@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, Related
+from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
 from composer.language.defaults import push_defaults
 from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.flattening import Flattening, Inclusion
@@ -22,7 +22,7 @@ from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
 
 _HERE = 'included here'
@@ -32,9 +32,13 @@ class Includer:
     """Reads the files that a file includes, and what these include, each file once.
 
     What an include brings whose `when` does not hold is read as well, and left out as a whole.
+
+    Args:
+        environment: The variables that the file sets which is started: no other file sets any.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, environment: Collection[str]) -> None:
+        self._environment = environment
         self._documents: dict[Path, Document] = {}
         self._limit = 0
         self._inclusions = 0
@@ -122,6 +126,8 @@ class Includer:
             return None
         _settle(part)
         own = part.diagnostics
+        if not is_left_out:
+            own += _find_unset(part, self._environment)
         part.diagnostics = []
         part = self.include(part, path, inner_chain, is_left_out=is_left_out)
         instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
@@ -147,6 +153,18 @@ def _count_used(instance: Instance, section: str, limit: int) -> int:
     if count <= limit:
         return count
     return count - sum(path[0] == section for path in instance.left_out)
+
+
+def _find_unset(part: Instance, environment: Collection[str]) -> Iterator[Diagnostic]:
+    for name in part.data.get('environment', {}):
+        if name not in environment:
+            yield diagnostic_at(
+                part.positions.key(('environment', name)),
+                'ignored-environment',
+                f"'{name}' is not set: only the environment of the file that is started counts",
+                help="set it in that file, or for a process under 'env'",
+                severity=Severity.WARNING,
+            )
 
 
 def _find_file(place: IncludePlace, chain: tuple[Related, ...]) -> Path | None:

@@ -35,6 +35,13 @@ INCLUDES = Family(
             'The file could not do what it was written for.',
         ),
         Rule(
+            'ignored-environment',
+            'An environment variable is set by an included file alone.',
+            'A process has one environment, which is the business of the file that is started.',
+            severity=Severity.WARNING,
+            is_ignorable=True,
+        ),
+        Rule(
             'changes-nothing',
             'A layer removes or changes what is not there.',
             'It is misspelt, or meant for another file: an included file takes no layers.',

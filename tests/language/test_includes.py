@@ -5,6 +5,7 @@ import textwrap
 import pytest
 
 from composer.checks import check_system
+from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system
 
@@ -325,6 +326,23 @@ def test_what_is_ignored_may_hold_variables_of_foreach(write):
     system = load_system(write(robot=text))
     assert not system.diagnostics
     assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]
+
+
+def test_variables_of_the_environment_are_those_of_the_file_that_is_started(write):
+    path = write(
+        leaf='version: 1\nenvironment: {A: 1, B: 2}\nnodes: {}\n',
+        middle=robot('{file: leaf.yaml}', 'environment: {B: 3}\nnodes: {}'),
+        off='version: 1\nenvironment: {C: 1}\nnodes: {}\n',
+        robot='version: 1\nenvironment: {A: 4}\ninclude:\n  middle: {file: middle.yaml}\n'
+        '  off: {file: off.yaml, when: false}\n',
+    )
+    system = load_system(path)
+    assert system.spec.environment == {'A': '4'}
+    found = {(each.rule, each.severity, str(each.span)) for each in system.diagnostics}
+    assert found == {
+        ('ignored-environment', Severity.WARNING, 'leaf.yaml:2:21'),
+        ('ignored-environment', Severity.WARNING, 'middle.yaml:4:15'),
+    }
 
 
 # Includes that are left out
