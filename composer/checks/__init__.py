@@ -23,6 +23,7 @@ from composer.checks.processes import (
     check_waits,
 )
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.transforms import check_transforms
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
 from composer.diagnostics import MAX_FINDINGS
@@ -49,6 +50,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_transforms,
     check_processes,
     check_process_parameters,
     check_annotations,

@@ -395,6 +395,7 @@ def test_what_an_include_that_is_left_out_brings_is_checked(write, real, words, 
     assert full_names(system) == ['//camera']
 
 
+@pytest.mark.ros
 def test_all_rules_hold_for_what_is_left_out(write):
     real = """args: {ip: {type: string}}
 qos: {fast: {depth: 9}}
@@ -444,6 +445,7 @@ def test_values_that_hang_on_arguments_are_samples_where_an_include_is_left_out(
     assert (finding.rule, str(finding.span)) == ('argument-type', 'robot.yaml:5:48')
 
 
+@pytest.mark.ros
 def test_what_is_left_out_hides_no_fault_of_what_is_used(write):
     part = """
     version: 1
