@@ -4,9 +4,10 @@ import textwrap
 
 import pytest
 
-from composer.language.parameter_files import parse_override, parse_parameter_file
+from composer.language.parameter_files import parse_parameter_file
 from composer.language.parameter_overrides import find_overrides, parse_command_line
 from composer.language.parameter_patterns import find_pattern_fault, matches_pattern
+from composer.language.parameter_values import parse_override
 
 
 def parse(text):
