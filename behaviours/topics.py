@@ -108,7 +108,7 @@ def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, 
 
     The expressions are those of the language, without its braces: in scope are the fields of the
     message that is heard, and the message itself as `message`. Fields that are not named keep
-    their defaults.
+    their defaults. `composer check` reads them, too.
 
     ```yaml
     subscriptions:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.annotations import check_annotations
 from composer.checks.behaviours import check_behaviour_sources
@@ -15,6 +15,7 @@ from composer.checks.names import check_full_names, check_names
 from composer.checks.node_uses import UseReader
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
+from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import (
     check_environment,
     check_executables,
@@ -22,6 +23,7 @@ from composer.checks.processes import (
     check_waits,
 )
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.transforms import check_transforms
 from composer.checks.uses import check_uses
 from composer.checks.wiring import check_wiring
 from composer.diagnostics import MAX_FINDINGS
@@ -31,13 +33,16 @@ from composer.language import LoadedSystem, load_system
 from composer.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.rules.record import Need
 
-NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
+SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
+
+NODE_RULES: tuple[CheckRule, ...] = (
     check_names,
     check_qos,
     check_publish,
@@ -45,11 +50,13 @@ NODE_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_transforms,
     check_processes,
+    check_process_parameters,
     check_annotations,
     check_uses,
 )
-SYSTEM_RULES: tuple[Callable[[CheckContext], Iterable[Diagnostic]], ...] = (
+SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
     check_parameter_files,
     check_executables,
@@ -111,32 +118,30 @@ def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
 
 def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
     samples = _by_line(context.system.sampled)
-    for rule, each_context in _applications(context):
-        findings = (each for each in rule(each_context) if not _hangs_on_samples(each, samples))
-        # One more, as a sign that there are more.
-        yield from islice(findings, MAX_FINDINGS + 1)
-
-
-def _applications(
-    context: CheckContext,
-) -> Iterator[tuple[Callable[[CheckContext], Iterable[Diagnostic]], CheckContext]]:
-    yield from ((rule, context) for rule in (*NODE_RULES, *SYSTEM_RULES))
+    for rule in (*NODE_RULES, *SYSTEM_RULES):
+        yield from _apply(rule, context, samples)
     if context.system.unused is not None:
         # What is left out this time may be there the next.
         other = replace(context, spec=context.system.unused)
-        yield from ((rule, other) for rule in NODE_RULES)
+        samples = _by_line((*context.system.sampled, *context.system.sampled_unused))
+        for rule in NODE_RULES:
+            yield from _apply(rule, other, samples)
 
 
-def _by_line(spans: Iterable[Span]) -> dict[tuple[SourceFile, int], list[Span]]:
+def _apply(rule: CheckRule, context: CheckContext, samples: SpansByLine) -> Iterator[Diagnostic]:
+    findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
+    # One more, as a sign that there are more.
+    yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _by_line(spans: Iterable[Span]) -> SpansByLine:
     lines: dict[tuple[SourceFile, int], list[Span]] = {}
     for span in spans:
         lines.setdefault((span.source, span.line), []).append(span)
     return lines
 
 
-def _hangs_on_samples(
-    finding: Diagnostic, samples: Mapping[tuple[SourceFile, int], list[Span]]
-) -> bool:
+def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
     """Return whether a finding is about a value that is not the real one."""
     place = finding.span
     return place is not None and any(

@@ -11,7 +11,6 @@ from composer.names import (
     expand_name,
     find_namespace_fault,
     find_node_name_fault,
-    find_parameter_name_fault,
 )
 
 if TYPE_CHECKING:
@@ -54,10 +53,6 @@ def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterato
     if fault:
         message = f"'{process.namespace}': {fault}"
         yield context.at_value((*path, 'namespace'), 'bad-name', message)
-    for name in process.parameters:
-        if fault := find_parameter_name_fault(name):
-            at = (*path, 'parameters', name)
-            yield context.at_key(at, 'bad-name', f"'{name}': {fault}")
 
 
 def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:

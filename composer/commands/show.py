@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from composer.commands.kept_comments import append_comments, find_kept_comments
 from composer.commands.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
@@ -47,7 +48,8 @@ def show(
         click.echo(json.dumps(data, indent=2))
     else:
         remark = (lambda path: describe_origin(system, path)) if origins else None
-        click.echo(render_yaml(data, remark), nl=False)
+        comments = find_kept_comments(system, render_yaml(data))
+        click.echo(append_comments(render_yaml(data, remark), comments), nl=False)
     return ExitCode.DONE
 
 

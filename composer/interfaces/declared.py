@@ -14,12 +14,16 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.language import LoadedSystem
+    from composer.language.specs import SystemSpec
 
 
 def declared_folders(system: LoadedSystem) -> dict[str, Path]:
     """Return the folder of each interface package that a system declares."""
-    declared = system.spec.interfaces if system.spec else {}
-    return {package: Path(folder) for package, folder in declared.items()}
+    return _folders_of(system.spec)
+
+
+def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:
+    return {package: Path(folder) for package, folder in spec.interfaces.items()} if spec else {}
 
 
 def describe_declared(
@@ -31,7 +35,8 @@ def describe_declared(
         What describes the types of the system, the packages of which nothing is known because
         something is wrong with them, and what that is.
     """
-    folders = declared_folders(system)
+    # What is left out is checked all the same, and needs its types for that.
+    folders = _folders_of(system.unused) | declared_folders(system)
     if not folders:
         return installed, frozenset(), []
     catalogue = InterfaceCatalogue()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.language.arguments import ArgumentSpec, parse_arguments
 from composer.language.includes import Includer
-from composer.language.instances import ArgumentValues, read_instance, sample_values
+from composer.language.instances import PARTS, ArgumentValues, read_instance, sample_values
 from composer.language.layers import merge_documents
 from composer.language.parser import parse_system
 from composer.language.settings import apply_settings
@@ -42,7 +42,9 @@ class LoadedSystem:
         included: The files that are part of it.
         chains: Where entries come from by includes, innermost first, by their paths.
         notes: Where the values that the expressions of a scalar use come from, by its path.
-        unused: As `spec`, of the nodes whose `when` does not hold.
+        unused: As `spec`, of the nodes and processes whose `when`, or that of their include, does
+            not hold.
+        sampled_unused: As `sampled`, of what is said of `unused` alone.
     """
 
     path: Path
@@ -58,6 +60,7 @@ class LoadedSystem:
     chains: Mapping[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     notes: Mapping[DataPath, str] = field(default_factory=dict)
     unused: SystemSpec | None = None
+    sampled_unused: tuple[Span, ...] = ()
 
     @property
     def files(self) -> list[Path]:
@@ -114,7 +117,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
     instance = read_instance(document, give_values)
     if instance is None:
         return LoadedSystem(path, None, document.positions, frozenset(), document.diagnostics)
-    whole = Includer().include(instance, path)
+    whole = Includer(instance.data.get('environment', {})).include(instance, path)
     used, unused = _divided(whole.data, whole.left_out)
     return LoadedSystem(
         path,
@@ -130,18 +133,24 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
         whole.chains,
         whole.notes,
         parse_system(unused, path.stem) if unused else None,
+        tuple(whole.spans_left_out),
     )
 
 
 def _divided(
     data: dict[str, Any], left_out: Collection[DataPath]
 ) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Return the data without the entries that are left out, and with these alone."""
+    """Return the data without the entries that are left out, and with these alone.
+
+    QoS profiles and interfaces are for both.
+    """
     if not left_out:
         return data, None
     used, unused = dict(data), dict(data)
-    for section in ('nodes', 'processes'):
+    for section in PARTS:
         entries = data.get(section, {})
         used[section] = {k: v for k, v in entries.items() if (section, k) not in left_out}
+    for section in ('nodes', 'processes'):
+        entries = data.get(section, {})
         unused[section] = {k: v for k, v in entries.items() if (section, k) in left_out}
     return used, unused

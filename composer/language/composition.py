@@ -65,22 +65,33 @@ class CompositionError(Exception):
         self.diagnostic = diagnostic
 
 
-def compose_tree(
-    text: str, source: SourceFile, *, alias_rule: str | None = None
-) -> TreeNode | None:
+def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
     """Return the one document of a text, or `None` if it is empty.
-
-    Args:
-        alias_rule: The rule that aliases break, where the reader of the file takes none.
 
     Raises:
         CompositionError: The text is not YAML, nests too deep, holds several documents, or an
             alias that is unknown or contains itself.
     """
-    composer = _TreeBuilder(source, alias_rule)
+    trees = _compose(text, source, _TreeBuilder(source, most_documents=1))
+    return trees[0] if trees else None
+
+
+def compose_trees(text: str, source: SourceFile, *, alias_rule: str) -> list[TreeNode]:
+    """Return all documents of a text that takes no aliases.
+
+    Args:
+        alias_rule: The rule that aliases break.
+
+    Raises:
+        CompositionError: The text is not YAML, nests too deep, or holds an alias.
+    """
+    return _compose(text, source, _TreeBuilder(source, alias_rule=alias_rule))
+
+
+def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> list[TreeNode]:
     try:
         for event in yaml.parse(text, Loader=_Loader):
-            composer.take(event)
+            builder.take(event)
     except yaml.MarkedYAMLError as error:
         raise CompositionError(_syntax_fault(error, source)) from error
     except yaml.reader.ReaderError as error:
@@ -89,16 +100,23 @@ def compose_tree(
         raise CompositionError(
             diagnostic_at(Span(source, 1, 1, 0), 'yaml-syntax', f'this is not YAML: {error}')
         ) from error
-    return composer.root
+    return builder.roots
 
 
 class _TreeBuilder:
     """Takes the parser's events one by one."""
 
-    def __init__(self, source: SourceFile, alias_rule: str | None) -> None:
-        self.root: TreeNode | None = None
+    def __init__(
+        self,
+        source: SourceFile,
+        *,
+        alias_rule: str | None = None,
+        most_documents: int | None = None,
+    ) -> None:
+        self.roots: list[TreeNode] = []
         self._source = source
         self._alias_rule = alias_rule
+        self._most_documents = most_documents
         self._open: list[SequenceNode | MappingNode] = []
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
@@ -121,7 +139,7 @@ class _TreeBuilder:
             self._add(self._aliased(event), None)
         elif isinstance(event, yaml.DocumentStartEvent):
             self._documents += 1
-            if self._documents > 1:
+            if self._most_documents is not None and self._documents > self._most_documents:
                 self._stop(event, 'several-documents', 'a file holds one YAML document, not more')
 
     def _enter(self, node: SequenceNode | MappingNode, event: Any) -> None:
@@ -138,7 +156,7 @@ class _TreeBuilder:
         if anchor is not None:
             self._anchors[anchor] = node
         if not self._open:
-            self.root = node
+            self.roots.append(node)
             return
         parent = self._open[-1]
         if isinstance(parent, SequenceNode):

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.processes import takes_ros_arguments, with_defaults, with_waits
+from composer.language.namespaces import (
+    full_node_name,
+    join_namespaces,
+    note_namespace,
+    split_node_name,
+)
+from composer.language.processes import takes_ros_arguments, with_waits
 from composer.language.profiles import (
     ProfileRenaming,
     free_name,
@@ -17,100 +22,6 @@ from composer.language.profiles import (
 if TYPE_CHECKING:
     from composer.language.instances import Instance
     from composer.language.positions import DataPath
-
-# What defaults hold that is not simply a key of each node.
-_SPECIAL_DEFAULTS = ('namespace', 'qos')
-_WITH_QOS = ('publishers', 'subscriptions')
-
-
-def push_defaults(instance: Instance) -> None:
-    """Write the defaults of a file into its nodes, so that they hold nowhere else."""
-    defaults = instance.data.pop('defaults', {})
-    if not defaults:
-        return
-    pushing = _Pushing(instance, defaults)
-    for section, write in (('nodes', pushing.in_node), ('processes', pushing.in_process)):
-        entries = instance.data.get(section, {})
-        for name in entries:
-            entries[name] = write(name, entries[name])
-
-
-class _Pushing:
-    """Writes the defaults of one file into its nodes and processes."""
-
-    def __init__(self, instance: Instance, defaults: dict[str, Any]) -> None:
-        self._instance = instance
-        self._defaults = defaults
-        self._branches = instance.positions.branches(('defaults',))
-        self._notes = [(at, note) for at, note in instance.notes.items() if at[0] == 'defaults']
-
-    def in_node(self, name: str, node: dict[str, Any]) -> dict[str, Any]:
-        at = ('nodes', name)
-        plain = {k: v for k, v in self._defaults.items() if k not in _SPECIAL_DEFAULTS}
-        for key in plain.keys() - node.keys():
-            self._graft((*at, key), key)
-        full = plain | node
-        if not name.startswith('/'):
-            full |= self._namespace(at, node)
-        if 'qos' in self._defaults:
-            for section in _WITH_QOS:
-                if section in full:
-                    full[section] = self._with_qos((*at, section), full[section])
-        return full
-
-    def in_process(self, name: str, process: dict[str, Any]) -> dict[str, Any]:
-        if not takes_ros_arguments(process):
-            return with_waits(process, {}, self._defaults.get('namespace', ''))
-        at = ('processes', name)
-        full = with_defaults(process, self._defaults)
-        if 'log_level' in full and 'log_level' not in process:
-            self._graft((*at, 'log_level'), 'log_level')
-        if (
-            'use_sim_time'
-            in full.get('parameters', {}).keys() - process.get('parameters', {}).keys()
-        ):
-            self._graft((*at, 'parameters', 'use_sim_time'), 'use_sim_time')
-        return full | self._namespace(at, process)
-
-    def _namespace(self, at: DataPath, entry: dict[str, Any]) -> dict[str, str]:
-        outer, inner = self._defaults.get('namespace', ''), entry.get('namespace', '')
-        namespace = _join(outer, inner)
-        if namespace != inner:
-            _note_namespace(self._instance, (*at, 'namespace'), ('defaults', 'namespace'), inner)
-        return {'namespace': namespace} if namespace else {}
-
-    def _with_qos(self, at: DataPath, entries: dict[str, Any]) -> dict[str, Any]:
-        changed = {}
-        positions = self._instance.positions
-        for name, entry in entries.items():
-            path = (*at, name)
-            mapping = {'type': entry} if isinstance(entry, str) else entry
-            if isinstance(entry, str):
-                positions.values[*path, 'type'] = positions.value(path)
-            if 'qos' not in mapping:
-                mapping = mapping | {'qos': deepcopy(self._defaults['qos'])}
-                self._graft((*path, 'qos'), 'qos')
-            changed[name] = mapping
-        return changed
-
-    def _graft(self, path: DataPath, key: str) -> None:
-        self._instance.positions.graft(path, self._branches[key])
-        for at, note in self._notes:
-            if at[1] == key:
-                self._instance.notes[path + at[2:]] = note
-
-
-def _note_namespace(instance: Instance, path: DataPath, outer: DataPath, inner: str) -> None:
-    """Note that the namespace at a path lies in the one that is written at another path."""
-    positions, notes = instance.positions, instance.notes
-    place = ', '.join(filter(None, (positions.value(outer).place, notes.get(outer))))
-    if inner:
-        own = notes.get(path)
-        notes[path] = f'{own}, in that of {place}' if own else f'in that of {place}'
-        return
-    positions.values[path] = positions.value(outer)
-    if outer in notes:
-        notes[path] = notes[outer]
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +65,7 @@ class Flattening:
         self._whole = instance
         self._chain = chain
         self._full_names = {
-            _full_name(*_split(name, node))
+            full_node_name(*split_node_name(name, node))
             for name, node in instance.data.get('nodes', {}).items()
             if ('nodes', name) not in instance.left_out
         }
@@ -165,8 +76,8 @@ class Flattening:
         renaming = self._add_profiles(inclusion)
         keys = self._process_keys(inclusion)
         for name, node in part.data.get('nodes', {}).items():
-            inner, simple = part.inner_names.get(name) or _split(name, node)
-            full = _join(inclusion.namespace, inner)
+            inner, simple = part.inner_names.get(name) or split_node_name(name, node)
+            full = join_namespaces(inclusion.namespace, inner)
             is_left_out = ('nodes', name) in part.left_out
             key = self._node_key(simple, full, is_left_out=is_left_out)
             if key is not None:
@@ -176,7 +87,7 @@ class Flattening:
                     self._whole.inner_names[key] = full, simple
                 self._add_entry(inclusion, ('nodes', name), key, entry)
             elif not is_left_out:
-                self._report_duplicate(inclusion, name, _full_name(full, simple))
+                self._report_duplicate(inclusion, name, full_node_name(full, simple))
         for name, process in part.data.get('processes', {}).items():
             entry = with_waits(process, keys)
             if not takes_ros_arguments(process):
@@ -184,23 +95,25 @@ class Flattening:
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
         self._add_interfaces(part)
         self._whole.sampled_spans += part.sampled_spans
+        self._whole.spans_left_out += part.spans_left_out
 
     def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
         nodes = self._whole.data.setdefault('nodes', {})
-        full = _full_name(namespace, simple)
-        if full in self._full_names:
-            return None
+        full = full_node_name(namespace, simple)
         key = full if simple in nodes else simple
         if is_left_out:
             return None if key in nodes else key
+        if full in self._full_names:
+            return None
         self._full_names.add(full)
-        self._whole.left_out.discard(('nodes', key))
         return key
 
     def _process_keys(self, inclusion: Inclusion) -> dict[str, str]:
         """Return what the processes of a file are called in the whole system."""
-        own = self._whole.data.get('processes', {})
+        processes, left_out = self._whole.data.get('processes', {}), self._whole.left_out
+        # What is left out gives way.
+        own = [name for name in processes if ('processes', name) not in left_out]
         names = inclusion.part.data.get('processes', {})
         taken = {*own, *names}
         keys = {}
@@ -237,8 +150,13 @@ class Flattening:
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
         whole.chains[new] = (*part.chains.get(old, ()), here)
-        if old in part.left_out:
-            whole.left_out.add(new)
+        self._leave_out(new, is_left_out=old in part.left_out)
+
+    def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
+        if is_left_out:
+            self._whole.left_out.add(path)
+        else:
+            self._whole.left_out.discard(path)
 
     def _with_outer(
         self, inclusion: Inclusion, path: DataPath, entry: dict[str, Any]
@@ -246,9 +164,9 @@ class Flattening:
         """Return an entry with what the include says of all that comes out of the file."""
         plain = dict(entry)
         inner = plain.pop('namespace', '')
-        namespace = _join(inclusion.namespace, inner)
+        namespace = join_namespaces(inclusion.namespace, inner)
         if namespace != inner:
-            _note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'), inner)
+            note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'), inner)
         if namespace and not str(path[-1]).startswith('/'):
             plain = {'namespace': namespace} | plain
         if inclusion.remap:
@@ -274,6 +192,9 @@ class Flattening:
         for name, profile in profiles.items():
             key = str(renaming.in_qos(name))
             own = self._whole.data.setdefault('qos', {})
+            is_left_out = ('qos', name) in part.left_out
+            if not (key in own and is_left_out):
+                self._leave_out(('qos', key), is_left_out=is_left_out)
             if key in own:
                 continue
             own[key] = renaming.in_qos(profile)
@@ -286,30 +207,15 @@ class Flattening:
     def _add_interfaces(self, part: Instance) -> None:
         for package in part.data.get('interfaces', {}):
             declared = self._whole.data.setdefault('interfaces', {})
+            path = ('interfaces', package)
+            is_left_out = path in part.left_out
+            if not (package in declared and is_left_out):
+                self._leave_out(path, is_left_out=is_left_out)
             if package not in declared:
                 declared[package] = part.data['interfaces'][package]
                 branch = part.branches('interfaces')[package]
-                self._whole.positions.graft(('interfaces', package), branch)
+                self._whole.positions.graft(path, branch)
 
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:
     return {old: new for old, new in (inner or {}).items() if old not in outer}
-
-
-def _split(name: str, node: dict[str, Any]) -> tuple[str, str]:
-    """Return the namespace and the simple name of a node."""
-    if name.startswith('/'):
-        namespace, _, simple = name.rpartition('/')
-        return namespace or '/', simple
-    return node.get('namespace', ''), name
-
-
-def _full_name(namespace: str, name: str) -> str:
-    return '/' + _join(namespace, name).lstrip('/')
-
-
-def _join(outer: str, inner: str) -> str:
-    """Return the inner namespace in the outer one; each may be absolute, relative or empty."""
-    if not outer or inner.startswith('/'):
-        return inner
-    return f'{outer.rstrip("/")}/{inner}' if inner else outer

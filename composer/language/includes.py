@@ -6,26 +6,23 @@ include says beside (`namespace`, `remap`) is applied to all that comes out of i
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
+from composer.language.defaults import push_defaults
 from composer.language.filling import MAX_ENTRIES, SECTIONS
-from composer.language.flattening import Flattening, Inclusion, push_defaults
-from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
-from composer.language.parameters import convert_parameter_value, find_type_fault
-from composer.language.paths import PathError, resolve_path
+from composer.language.flattening import Flattening, Inclusion
+from composer.language.given_arguments import give_arguments
+from composer.language.include_places import IncludePlace
+from composer.language.included_files import locate_file, shown_path
+from composer.language.instances import Instance, read_instance
+from composer.language.paths import PathError
 from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
-from composer.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
-    from composer.diagnostics import Span
-    from composer.language.arguments import ArgumentSpec
-    from composer.language.positions import DataPath
+    from collections.abc import Collection, Iterator, Mapping
 
 
 _HERE = 'included here'
@@ -34,21 +31,34 @@ _HERE = 'included here'
 class Includer:
     """Reads the files that a file includes, and what these include, each file once.
 
+    What an include brings whose `when` does not hold is read as well, and left out as a whole.
+
     Args:
-        folder: Where relative paths of a text without a file begin.
+        environment: The variables that the file sets which is started: no other file sets any.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, environment: Collection[str]) -> None:
+        self._environment = environment
         self._documents: dict[Path, Document] = {}
         self._limit = 0
         self._inclusions = 0
+        # Entries and includes that were read although they are left out.
+        self._left_out = 0
 
-    def include(self, instance: Instance, path: Path, chain: tuple[Related, ...] = ()) -> Instance:
+    def include(
+        self,
+        instance: Instance,
+        path: Path,
+        chain: tuple[Related, ...] = (),
+        *,
+        is_left_out: bool = False,
+    ) -> Instance:
         """Return an instance with all that it includes in it.
 
         Args:
             path: The file of the instance.
             chain: Where it is included itself, innermost first.
+            is_left_out: Whether it is read for its faults alone.
         """
         # An included file may ask for more; one that asks for nothing changes nothing.
         asked = instance.data.get('max_nodes', 0 if chain else MAX_ENTRIES)
@@ -58,78 +68,68 @@ class Includer:
             return instance
         _settle(instance)
         flattening = Flattening(instance, chain)
-        stack = (path.resolve(), *(Path(each.span.source.name).resolve() for each in chain))
-        for name, entry in entries.items():
-            at = ('include', name)
-            if at in instance.left_out:
-                continue
-            part = self._read(instance, at, entry, stack, chain)
+        for place in _used_first(entries, instance):
+            aside = is_left_out or place.is_left_out
+            if aside and self._left_out > self._limit:
+                break
+            part = self._read(place, path, chain, is_left_out=aside)
             if part is None:
                 continue
-            flattening.add(Inclusion(part, at, entry))
-            if self._is_too_large(instance, at):
+            if place.is_left_out:
+                part.leave_out_all()
+            flattening.add(Inclusion(part, place.at, place.entry))
+            if aside:
+                self._left_out += 1 + sum(len(part.data.get(each, ())) for each in SECTIONS)
+            elif self._is_too_large(place, chain):
                 break
         return instance
 
-    def _is_too_large(self, instance: Instance, at: DataPath) -> bool:
+    def _is_too_large(self, place: IncludePlace, chain: tuple[Related, ...]) -> bool:
         """Return whether a system has grown beyond its limit; say so once."""
         if self._inclusions > self._limit:
             return True
-        counts = {section: len(instance.data.get(section, ())) for section in SECTIONS}
         self._inclusions += 1
+        counts = {each: _count_used(place.instance, each, self._limit) for each in SECTIONS}
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
         if counts[section] <= self._limit:
             return False
         self._inclusions = self._limit + 1
-        instance.diagnostics.append(
-            diagnostic_at(
-                instance.positions.value((*at, 'file')),
-                'too-many-entries',
-                f'there are more than {self._limit:,} entries in {section} of all files',
-                help="if that is meant, raise 'max_nodes' at the top of the file",
-            )
-        )
+        message = f'there are more than {self._limit:,} entries in {section} of all files'
+        help_text = "if that is meant, raise 'max_nodes' at the top of the file"
+        place.report('too-many-entries', message, chain, help_text)
         return True
 
     def _read(
         self,
-        instance: Instance,
-        at: DataPath,
-        entry: dict[str, Any],
-        stack: tuple[Path, ...],
+        place: IncludePlace,
+        parent: Path,
         chain: tuple[Related, ...],
+        *,
+        is_left_out: bool,
     ) -> Instance | None:
-        place = instance.positions.value((*at, 'file'))
-        try:
-            path = _locate(entry['file'], place)
-        except PathError as error:
-            instance.diagnostics.append(
-                diagnostic_at(place, 'missing-include', str(error), help=error.help)
-            )
+        """Return what an include brings, or say what is wrong with it and return `None`."""
+        path = _find_file(place, chain)
+        if path is None:
             return None
-        here = Related(_HERE, place)
-        if path.resolve() in stack:
-            message = f"'{entry['file']}' includes itself"
-            related = [Related(_HERE, each.span) for each in chain]
-            instance.diagnostics.append(
-                diagnostic_at(place, 'include-cycle', message, related=related)
-            )
+        stack = (parent, *(Path(each.span.source.name) for each in chain))
+        if path.resolve() in [each.resolve() for each in stack]:
+            place.report('include-cycle', f"'{place.file}' includes itself", chain)
             return None
-        document = self._document(path)
+        instance, document = place.instance, self._document(path)
         faults: list[Diagnostic] = []
-        part = read_instance(
-            document, lambda declared: _give(declared, instance, at, entry, faults)
-        )
-        instance.diagnostics += faults
-        inner_chain = (here, *chain)
+        part = read_instance(document, lambda declared: give_arguments(declared, place, faults))
+        instance.diagnostics += _with_chain(faults, chain)
+        inner_chain = (Related(_HERE, place.span), *chain)
         if part is None:
             instance.diagnostics += _with_chain(document.diagnostics, inner_chain)
             return None
         _settle(part)
         own = part.diagnostics
+        if not is_left_out:
+            own += _find_unset(part, self._environment)
         part.diagnostics = []
-        part = self.include(part, path, inner_chain)
+        part = self.include(part, path, inner_chain, is_left_out=is_left_out)
         instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
         instance.included |= {part.positions.source: None} | part.included
         return part
@@ -137,112 +137,50 @@ class Includer:
     def _document(self, path: Path) -> Document:
         resolved = path.resolve()
         if resolved not in self._documents:
-            self._documents[resolved] = read_document(path, _shown(path))
+            self._documents[resolved] = read_document(path, shown_path(path))
         return self._documents[resolved]
+
+
+def _used_first(entries: Mapping[str, dict[str, Any]], instance: Instance) -> list[IncludePlace]:
+    """Return the includes of a file; what is left out must not take names from what is used."""
+    places = [IncludePlace(instance, ('include', name), entries[name]) for name in entries]
+    return sorted(places, key=lambda place: place.is_left_out)
+
+
+def _count_used(instance: Instance, section: str, limit: int) -> int:
+    """Return how many entries a section has; those that are left out count up to a limit."""
+    count = len(instance.data.get(section, ()))
+    if count <= limit:
+        return count
+    return count - sum(path[0] == section for path in instance.left_out)
+
+
+def _find_unset(part: Instance, environment: Collection[str]) -> Iterator[Diagnostic]:
+    for name in part.data.get('environment', {}):
+        if name not in environment:
+            yield diagnostic_at(
+                part.positions.key(('environment', name)),
+                'ignored-environment',
+                f"'{name}' is not set: only the environment of the file that is started counts",
+                help="set it in that file, or for a process under 'env'",
+                severity=Severity.WARNING,
+            )
+
+
+def _find_file(place: IncludePlace, chain: tuple[Related, ...]) -> Path | None:
+    """Return the file that an include names; if there is none, say so and return `None`."""
+    try:
+        return locate_file(place.file, place.span)
+    except PathError as error:
+        if not place.may_be_absent:
+            place.report('missing-include', str(error), chain, error.help)
+    return None
 
 
 def _settle(instance: Instance) -> None:
     """Let a file's defaults and profiles hold in this file alone."""
     push_defaults(instance)
     drop_unknown_profiles(instance)
-
-
-def _locate(text: str, place: Span) -> Path:
-    """Return the file that an include names.
-
-    Raises:
-        PathError: There is no such file.
-    """
-    path = resolve_path(text, place.source.folder)
-    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
-        message = f"there is no file '{_shown(path)}'"
-        raise PathError(message, help=_help_for(path))
-    return path
-
-
-def _help_for(path: Path) -> str | None:
-    try:
-        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
-    except OSError:
-        return None
-    return did_you_mean(path.name, names, 'there are')
-
-
-def _shown(path: Path) -> str:
-    """Return a path as findings show it: from the working folder, where it lies below that."""
-    plain = Path(os.path.normpath(path))
-    try:
-        return str(plain.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(plain)
-
-
-def _give(
-    declared: Mapping[str, ArgumentSpec],
-    instance: Instance,
-    at: DataPath,
-    entry: dict[str, Any],
-    faults: list[Diagnostic],
-) -> ArgumentValues:
-    """Return the values that an include gives."""
-    given = entry.get('args', {})
-    values = dict(sample_values(declared).values)
-    origins: dict[str, str] = {}
-    section = (*at, 'args')
-    positions = instance.positions
-    faults += [
-        diagnostic_at(
-            positions.key((*section, name)),
-            'unknown-argument',
-            f"'{entry['file']}' takes no argument '{name}'",
-            help=did_you_mean(name, declared, 'it takes'),
-        )
-        for name in given
-        if name not in declared
-    ]
-    unknown: list[str] = []
-    for name, argument in declared.items():
-        path = (*section, name)
-        if name in given:
-            value = convert_parameter_value(given[name], argument.type)
-            fault = _find_fault(argument, value)
-            if not fault:
-                values[name] = value
-                origins[name] = _origin(instance, path)
-            elif positions.value(path) not in instance.sampled_spans:
-                faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
-            if fault or positions.value(path) in instance.sampled_spans:
-                unknown.append(name)
-        elif path in instance.dropped or section in instance.dropped:
-            unknown.append(name)
-        elif argument.default is None:
-            unknown.append(name)
-            faults.append(
-                _missing_argument(argument, entry['file'], positions.value((*at, 'file')))
-            )
-    return ArgumentValues(values, unknown, origins)
-
-
-def _origin(instance: Instance, path: DataPath) -> str:
-    note = instance.notes.get(path)
-    return instance.positions.value(path).place + (f', {note}' if note else '')
-
-
-def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnostic:
-    message = f"'{file}' wants the argument '{argument.name}'"
-    return diagnostic_at(
-        place, 'missing-argument', message, help=f"give it under 'args': {argument}"
-    )
-
-
-def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:
-    fault = find_type_fault(value, argument.type)
-    if fault:
-        return f"'{argument.name}': {fault}"
-    if argument.choices and value not in argument.choices:
-        choices = ', '.join(map(str, argument.choices))
-        return f"'{argument.name}': {value!r} is none of {choices}"
-    return None
 
 
 def _with_chain(

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from composer.language.positions import Branch, DataPath, Key, SourceMap
     from composer.language.source import Document
 
+# The sections whose entries become part of a file that includes theirs.
+PARTS = ('nodes', 'processes', 'qos', 'interfaces')
+
 
 @dataclass(frozen=True, slots=True)
 class ArgumentValues:
@@ -40,10 +43,12 @@ class Instance:
     Attributes:
         data: As the schema wants them, without what was wrong.
         dropped: The paths of the data that were left out for that.
-        left_out: The paths of entries whose `when` does not hold; they are still in the data.
+        left_out: The paths of entries whose `when` does not hold, or that come with an include
+            whose `when` does not; they are still in the data.
         arguments: What the file declares.
         values: What they are in this instance.
         sampled_spans: Where values stand that hang on samples of arguments.
+        spans_left_out: As these, in what is left out.
         notes: Where the values that the expressions of a scalar use come from, by its path.
         included: The files that are part of it.
         chains: Where entries come from by includes, innermost first, by their paths.
@@ -59,6 +64,7 @@ class Instance:
     arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     sampled_spans: list[Span] = field(default_factory=list)
+    spans_left_out: list[Span] = field(default_factory=list)
     notes: dict[DataPath, str] = field(default_factory=dict)
     included: dict[SourceFile, None] = field(default_factory=dict)
     chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
@@ -73,6 +79,14 @@ class Instance:
             for path, note in self.notes.items():
                 self._notes.setdefault(path[:2], []).append((path[2:], note))
         return self._notes
+
+    def leave_out_all(self) -> None:
+        """Leave out all that the file declares."""
+        self.left_out = {
+            (section, name) for section in PARTS for name in self.data.get(section, ())
+        }
+        self.spans_left_out += self.sampled_spans
+        self.sampled_spans = []
 
     def branches(self, section: str) -> dict[Key, Branch]:
         """Return the positions of the entries of a section; call it when they are settled."""
@@ -112,7 +126,7 @@ def read_instance(
         declared,
         given.values,
         filled.sampled_spans,
-        filled.notes,
+        notes=filled.notes,
     )
 
 

@@ -1,18 +1,21 @@
 """Several files as one: each changes what those before it say.
 
 Mappings are merged entry by entry, all else is replaced, and `null` removes, but for `warn_after`,
-where it is a value.
+where it is a value. What a layer means to change and is not there is a finding.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from composer.diagnostics import Severity, diagnostic_at
 from composer.language.source import Document
+from composer.names import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, SourceMap
 
 # What is in these is the user's own.
@@ -31,30 +34,73 @@ def _merge(below: Document, above: Document) -> Document:
     diagnostics = (*below.diagnostics, *above.diagnostics)
     if below.data is None or above.data is None:
         return Document(None, below.positions, diagnostics)
-    positions = below.positions.copy()
-    data = _merge_mappings(below.data, above.data, (), positions, above.positions)
-    return Document(data, positions, diagnostics)
+    merging = _Merging(below.positions.copy(), above.positions)
+    data = merging.merge(below.data, above.data, ())
+    return Document(data, merging.positions, (*diagnostics, *merging.findings))
 
 
-def _merge_mappings(
-    below: dict[str, Any],
-    above: dict[str, Any],
-    path: DataPath,
-    positions: SourceMap,
-    new_positions: SourceMap,
-) -> dict[str, Any]:
-    merged = dict(below)
-    for key, value in above.items():
-        at = (*path, key)
-        if value is None and not is_null_a_value(at):
-            merged.pop(key, None)
-            positions.remove(at)
-        elif isinstance(value, dict) and isinstance(merged.get(key), dict):
-            merged[key] = _merge_mappings(merged[key], value, at, positions, new_positions)
-        else:
-            merged[key] = _without_removals(value, at)
-            positions.replace(at, new_positions)
-    return merged
+class _Merging:
+    """Merges a layer into what is below it.
+
+    Args:
+        positions: Those of what is below; they become those of the result.
+        new_positions: Those of the layer.
+    """
+
+    def __init__(self, positions: SourceMap, new_positions: SourceMap) -> None:
+        self.positions = positions
+        self.findings: list[Diagnostic] = []
+        self._new_positions = new_positions
+
+    def merge(
+        self, below: dict[str, Any], above: dict[str, Any], path: DataPath
+    ) -> dict[str, Any]:
+        merged = dict(below)
+        for key, value in above.items():
+            at = (*path, key)
+            if value is None and not is_null_a_value(at):
+                if key not in merged:
+                    self._report(at, f"null removes '{key}', which is not there", below)
+                merged.pop(key, None)
+                self.positions.remove(at)
+            elif isinstance(value, dict) and isinstance(merged.get(key), dict):
+                merged[key] = self.merge(merged[key], value, at)
+            else:
+                if key not in merged and _only_changes_a_node(at, value):
+                    self._report(at, f"there is no node '{key}' to change", below)
+                merged[key] = self._without_removals(value, at)
+                self.positions.replace(at, self._new_positions)
+        return merged
+
+    def _without_removals(self, value: Any, path: DataPath) -> Any:
+        """Return what is new without the nulls, which remove nothing here."""
+        if not isinstance(value, dict) or path[-1] in _FREE:
+            return value
+        kept = {}
+        for key, each in value.items():
+            at = (*path, key)
+            if each is not None or is_null_a_value(at):
+                kept[key] = self._without_removals(each, at)
+            else:
+                self._report(at, f"null removes '{key}', which is not there", {})
+        return kept
+
+    def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
+        self.findings.append(
+            diagnostic_at(
+                self._new_positions.key(path),
+                'changes-nothing',
+                message,
+                help=did_you_mean(str(path[-1]), there, 'there are') if there else None,
+                severity=Severity.WARNING,
+            )
+        )
+
+
+def _only_changes_a_node(path: DataPath, value: Any) -> bool:
+    """Return whether a value is for a node that others declare: it has nothing to do by itself."""
+    is_node = len(path) == _NODE and path[0] == 'nodes'
+    return is_node and isinstance(value, dict) and 0 < len(value) == len(value.keys() & _CHANGES)
 
 
 def is_null_a_value(path: DataPath) -> bool:
@@ -65,21 +111,19 @@ def is_null_a_value(path: DataPath) -> bool:
     )
 
 
+_NODE = 2
 _IN_NODE = 3
 _IN_ENTITY = 5
 _OF_THE_USER = ('parameters', 'remap', 'state')
+# What says how a node runs; all else gives it something to do.
+_CHANGES = frozenset(
+    (
+        *('namespace', 'description', 'log_level', 'use_sim_time', 'parameter_services', 'rosout'),
+        *('type_description_service', 'logger_services', 'on_error', 'warn_after', 'parameters'),
+        *('parameter_files', 'state', 'remap', 'wait_for', 'when', 'foreach'),
+    )
+)
 
 
 def _is_in_entity(path: DataPath) -> bool:
     return len(path) == _IN_ENTITY and path[2] not in _OF_THE_USER
-
-
-def _without_removals(value: Any, path: DataPath) -> Any:
-    """Return what is new without the nulls, which remove nothing here."""
-    if not isinstance(value, dict) or path[-1] in _FREE:
-        return value
-    return {
-        key: _without_removals(each, (*path, key))
-        for key, each in value.items()
-        if each is not None or is_null_a_value((*path, key))
-    }

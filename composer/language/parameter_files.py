@@ -17,20 +17,19 @@ from composer.language.composition import (
     ScalarNode,
     SequenceNode,
     TreeNode,
-    compose_tree,
+    compose_trees,
 )
 from composer.language.parameter_patterns import find_pattern_fault
-from composer.language.parameter_scalars import read_scalar
+from composer.language.parameter_values import RULE, ValueReader
 from composer.language.parameters import infer_parameter_type
 from composer.language.source import decode_content, read_content
-from composer.names import suggest, with_article
+from composer.names import suggest
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Span
 
-RULE = 'bad-parameter-file'
 PARAMETERS_KEY = 'ros__parameters'
 _SHAPE_HELP = 'a parameter file is node: {ros__parameters: {name: value}}; /** means every node'
 _TYPO = ':='
@@ -95,27 +94,15 @@ def parse_parameter_file(text: str, name: str) -> ParameterFile:
     """Read the text of a file that is called `name` in findings."""
     source = SourceFile(name, tuple(text.splitlines()))
     try:
-        tree = compose_tree(text, source, alias_rule=RULE)
+        trees = compose_trees(text, source, alias_rule=RULE)
     except CompositionError as error:
         return ParameterFile(faults=(_explain_typo(error.diagnostic),))
     reader = _Reader()
-    if tree is not None:
+    # ROS reads several documents as if they were one.
+    for tree in trees:
         reader.read_nodes(tree, '')
-        reader.check_double_names()
+    reader.check_double_names()
     return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.faults))
-
-
-def parse_override(text: str) -> tuple[Any, str | None] | None:
-    """Return value and type of what follows `:=` on a command line; `None` if rcl refuses it."""
-    reader = _Reader()
-    try:
-        tree = compose_tree(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
-    except CompositionError:
-        return None
-    if tree is None or isinstance(tree, MappingNode):
-        return None
-    value = reader.read_value(tree)
-    return None if reader.faults else (value, infer_parameter_type(value))
 
 
 class _Reader:
@@ -125,6 +112,7 @@ class _Reader:
         self.patterns: list[tuple[str, Span]] = []
         self.entries: list[ParameterEntry] = []
         self.faults: list[Diagnostic] = []
+        self._values = ValueReader(self.faults)
         # Mappings of names that were entered since the last value.
         self._opened = 0
 
@@ -223,7 +211,7 @@ class _Reader:
                 self._opened += 1
                 self._read_parameters(value_node, pattern, place, keys, is_last=ends)
                 continue
-            value = self.read_value(value_node, key)
+            value = self._values.read(value_node, key)
             if value is None:
                 continue
             items = value_node.items if isinstance(value_node, SequenceNode) else []
@@ -264,43 +252,6 @@ class _Reader:
             message = f"'{PARAMETERS_KEY}' stands inside of '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, 'names of nodes stand above it')
 
-    def read_value(self, node: TreeNode, key: str = '') -> Any:
-        """Return a value, `None` if rcl refuses it."""
-        if isinstance(node, ScalarNode):
-            if node.text or node.quoted:
-                return read_scalar(node)
-            where = f"'{key}' has no value" if key else 'there is no value'
-            help_text = "write one; '' is an empty text, and ROS has no null"
-            self._fault(node.span, where, help_text)
-            return None
-        if isinstance(node, MappingNode):
-            self._fault(node.span, 'a list of parameters holds no mappings')
-            return None
-        return self._read_list(node)
-
-    def _read_list(self, node: SequenceNode) -> list[Any] | None:
-        values: list[Any] = []
-        for item in node.items:
-            if isinstance(item, SequenceNode):
-                self._fault(
-                    item.span, 'a list of parameters holds no lists', 'write one long list'
-                )
-                return None
-            value = self.read_value(item)
-            if value is None:
-                return None
-            if values and type(value) is not type(values[0]):
-                first, other = (infer_parameter_type(each) for each in (values[0], value))
-                self._fault(
-                    item.span,
-                    f'a list has one type: this is {with_article(str(other))}, and the first item '
-                    f'{with_article(str(first))}',
-                    _help_for_mixture(values[0], value),
-                )
-                return None
-            values.append(value)
-        return values
-
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
@@ -339,12 +290,6 @@ def _help_for(node: TreeNode) -> str | None:
         return None
     name, _, value = node.text.partition(_TYPO)
     return f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"
-
-
-def _help_for_mixture(first: Any, other: Any) -> str | None:
-    if {type(first), type(other)} == {int, float}:
-        return 'give each of them a decimal point'
-    return 'put each in quotes if they are texts' if str in (type(first), type(other)) else None
 
 
 def _explain_typo(finding: Diagnostic) -> Diagnostic:

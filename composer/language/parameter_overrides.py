@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from composer.language.parameter_files import parse_override
 from composer.language.parameter_patterns import matches_pattern
+from composer.language.parameter_values import parse_override
 from composer.language.parameters import PARAMETER_TYPES
 
 if TYPE_CHECKING:

@@ -20,13 +20,18 @@ class PathError(ComposerError):
     """A path leads into a package that is not installed."""
 
 
+def is_in_package(text: str) -> bool:
+    """Return whether a path leads into the share folder of a ROS package."""
+    return text.startswith(_PACKAGE)
+
+
 def resolve_path(text: str, folder: Path) -> Path:
     """Return the path that a text means in a file of `folder`.
 
     Raises:
         PathError: The package of `package://name/path` is not installed.
     """
-    if not text.startswith(_PACKAGE):
+    if not is_in_package(text):
         return folder / text
     package, _, rest = text.removeprefix(_PACKAGE).partition('/')
     share = find_share(package)
@@ -71,6 +76,6 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
 
 
 def _resolved(text: str, path: DataPath, positions: SourceMap) -> str:
-    if text.startswith(_PACKAGE):
+    if is_in_package(text):
         return text
     return str(positions.value(path).source.folder / text)

@@ -98,7 +98,7 @@ class Sandbox(SandboxedEnvironment):
         """
         self.budget.begin()
         try:
-            return evaluate_expression(self._parse_once(code), self, values)
+            return evaluate_expression(self.parse_expression(code), self, values)
         except RecursionError:
             raise _too_deep() from None
 
@@ -108,7 +108,7 @@ class Sandbox(SandboxedEnvironment):
         Raises:
             TemplateError: It is none.
         """
-        expression = self._parse_once(code)
+        expression = self.parse_expression(code)
         try:
             found = {each.name for each in expression.find_all(nodes.Name)}
         except RecursionError:
@@ -226,7 +226,12 @@ class Sandbox(SandboxedEnvironment):
             return value
         return self.budget.listed(value) if hasattr(value, '__iter__') else value
 
-    def _parse_once(self, code: str) -> nodes.Expr:
+    def parse_expression(self, code: str) -> nodes.Expr:
+        """Return the tree of an expression, which is read once.
+
+        Raises:
+            TemplateError: It is none.
+        """
         if code not in self._parsed:
             self.budget.spend_on_parsing(code)
             try:

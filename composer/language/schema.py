@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import MAX_FINDINGS
 from composer.language.acceptance import Acceptor, SchemaCompiler
-from composer.language.schema_faults import StructureFault, explain
+from composer.language.schema_explanations import explain
 from composer.language.schema_file import schema_path
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, Key, SourceMap
+    from composer.language.schema_faults import StructureFault
 
 # What editors accept in place of a number, a word and the like. Here, the values are in place.
 _TEMPLATE = {'$ref': '#/$defs/template'}

@@ -50,6 +50,8 @@ def apply_settings(document: Document, settings: Sequence[str]) -> Document:
             raise UsageError(message, help='write path=value, as in executor.threads=4')
         path = _resolve(path_text, data)
         value = _parse(setting, value_text)
+        if value is None and not is_null_a_value(path):
+            _find(path, data, setting)
         data = _changed(data, path, value, keeps_null=is_null_a_value(path))
         source = SourceFile(f'--set {setting}', (setting,), home='.')
         positions.remove(path)
@@ -85,6 +87,22 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
         rest = rest[len(key) + 1 :]
         inside = inside.get(key, {}) if rest else None
     return tuple(path)
+
+
+def _find(path: DataPath, data: dict[str, Any], setting: str) -> None:
+    """Make sure that there is something at a path.
+
+    Raises:
+        UsageError: There is nothing to remove.
+    """
+    inside: Any = data
+    for depth, key in enumerate(path):
+        if not isinstance(inside, dict) or key not in inside:
+            where = f' in {".".join(map(str, path[:depth]))}' if depth else ''
+            message = f"--set {setting}: there is no '{key}'{where} to remove"
+            help_text = did_you_mean(str(key), inside, 'there are') if inside else None
+            raise UsageError(message, help=help_text)
+        inside = inside[key]
 
 
 def _help_for(path: list[str], inside: Any) -> str | None:

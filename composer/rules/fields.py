@@ -1,4 +1,4 @@
-"""Rules of payloads."""
+"""Rules of payloads and of what makes them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ _TYPES = 'https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html#fie
 
 FIELDS = Family(
     'fields',
-    'constant messages against the fields of their type',
+    'messages that the file describes, against the fields of their type',
     (
         Rule(
             'unknown-field',
-            'The type has no field of this name.',
+            'The type has no field of this name, in a message or in an expression of `transform`.',
             'The message could not be made.',
             _TYPES,
             needs='interfaces',

@@ -13,7 +13,8 @@ PARAMETERS = Family(
     (
         Rule(
             'bad-parameter',
-            'A declaration contradicts itself: its type, value, range, step and choices.',
+            'A declaration contradicts itself: its type, value, range, step and choices; or a '
+            'parameter of a process has a value that ROS has no type for.',
             'ROS refuses the declaration when the node is created, or takes it as something else.',
             'https://docs.ros.org/en/jazzy/Concepts/Basic/About-Parameters.html',
         ),

@@ -8,8 +8,10 @@ Composer dies, however that was, it kills all that has ever come out of what it 
   own, whatever sessions they have made.
 - The kernel kills each process that it started if the guardian itself dies (`PR_SET_PDEATHSIG`;
   the guardian has one thread, and so is no prey of the rule that the thread counts).
-- A second guardian, forked at the beginning, watches over the first one. It has no descendants,
-  and finds those of the first one by a mark in their environment.
+- A second guardian is its parent, and a subreaper, too: when the first one is killed, what is left
+  of its descendants becomes the second one's own, which kills it. It also ends the first one if
+  that does not do its work when Composer has gone.
+- All that was started has a mark in its environment, for Composer to find if both are killed.
 
 Requests and answers are one JSON object a line. Requests: `start` (a number of Composer's
 choice, `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number,
@@ -268,15 +270,26 @@ def _remove(folder: str) -> None:
         os.rmdir(folder)  # noqa: PTH106 - fast
 
 
-def _watch(guardian: int, mark: str) -> None:
-    """Be the second guardian: wait for the end of the first one, and clean up after it."""
-    # If that has died before, somebody else is the parent.
+def _clean_up(mark: str, folder: str) -> None:
+    """Kill all descendants, and remove what is temporary."""
+    myself = os.getpid()
+    _kill_all(lambda: find_descendants(myself) | find_marked(mark))
+    _remove(folder)
+
+
+def _watch(guardian: int, composer: int) -> None:
+    """Be the second guardian: wait for the end of the first one, and see to it."""
+    ended = select.poll()
+    ended.register(os.pidfd_open(guardian), select.POLLIN)
     with contextlib.suppress(ProcessLookupError):
-        ended = select.poll()
-        ended.register(os.pidfd_open(guardian), select.POLLIN)
-        if os.getppid() == guardian:
-            ended.poll()
-    kill_marked(mark)
+        either = select.poll()
+        for pid in (guardian, composer):
+            either.register(os.pidfd_open(pid), select.POLLIN)
+        either.poll()
+    # What the first one has to do then takes it no longer than its patience.
+    if not ended.poll(2 * _PATIENCE_SEC * 1000):
+        os.kill(guardian, signal.SIGKILL)
+    os.waitpid(guardian, 0)
 
 
 def main() -> None:
@@ -287,24 +300,17 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     os.set_inheritable(descriptor, False)
-    guardian = os.getpid()
-    second = os.fork()
-    if second == 0:
-        os.close(descriptor)
-        os.setsid()
-        _watch(guardian, mark)
-        _remove(folder)
-        os._exit(0)
-    # It may be gone by then, and its number somebody else's.
-    second_handle = os.pidfd_open(second)
+    guardian = os.fork()
     try:
-        Guardian(socket.socket(fileno=descriptor), composer).run()
+        if guardian == 0:
+            os.setsid()
+            _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+            Guardian(socket.socket(fileno=descriptor), composer).run()
+        else:
+            os.close(descriptor)
+            _watch(guardian, composer)
     finally:
-        _kill_all(lambda: (find_descendants(guardian) | find_marked(mark)) - {second})
-        _remove(folder)
-        with contextlib.suppress(ProcessLookupError):
-            signal.pidfd_send_signal(second_handle, signal.SIGKILL)
-            os.waitpid(second, 0)
+        _clean_up(mark, folder)
 
 
 if __name__ == '__main__':

@@ -83,25 +83,29 @@ class GuardianConnection:
 
     def close(self) -> None:
         """Let the guardian kill all that is left; return when it has."""
-        self._hang_up()
-        self._process.wait(_END_SEC)
+        self.abandon()
         if self._thread is not threading.current_thread():
-            self._thread.join()
+            self._thread.join(_END_SEC)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(0)
         self._socket.close()
 
     def abandon(self) -> None:
         """Do the same in a signal handler, where no lock may be waited for."""
-        self._hang_up()
-        with suppress(OSError):
-            ended = select.poll()
-            ended.register(os.pidfd_open(self._process.pid), select.POLLIN)
-            ended.poll(_END_SEC * 1000)
-
-    def _hang_up(self) -> None:
         self._is_closing = True
         # A child that a behaviour has forked may hold the socket, too: closing would not do.
         with suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
+            self._socket.shutdown(socket.SHUT_WR)
+        self._wait_for_end()
+
+    def _wait_for_end(self) -> None:
+        """Wait until both guardians have ended; if they hang, they end when Composer has."""
+        with suppress(OSError):
+            ended = select.poll()
+            descriptor = os.pidfd_open(self._process.pid)
+            ended.register(descriptor, select.POLLIN)
+            ended.poll(_END_SEC * 1000)
+            os.close(descriptor)
 
     def _send(self, request: dict[str, Any], descriptors: Sequence[int] = ()) -> None:
         line = json.dumps(request).encode() + b'\n'
@@ -117,7 +121,8 @@ class GuardianConnection:
             for line in lines:
                 self._hear(json.loads(line))
         if not self._is_closing:
-            # The kernel has killed what it had started, but not what that has started.
+            # The second one kills what the first one leaves, if it has not been killed, too.
+            self._wait_for_end()
             guardian.kill_marked(self.mark)
             self._lost()
 

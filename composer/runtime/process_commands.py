@@ -92,7 +92,7 @@ def find_folder(spec: ProcessSpec) -> str | None:
 
 def render_parameters(parameters: Mapping[str, Any]) -> str:
     """Return a parameter file for all nodes of a process; rcl reads the types that were meant."""
-    values = {name: _converted(value) for name, value in parameters.items() if value is not None}
+    values = _converted(dict(parameters))
     return yaml.dump({'/**': {'ros__parameters': values}}, Dumper=_Dumper, allow_unicode=True)
 
 
@@ -127,7 +127,7 @@ _Dumper.add_representer(str, _quote)
 
 def _converted(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _converted(each) for name, each in value.items() if each is not None}
+        return {name: _converted(each) for name, each in value.items()}
     return convert_parameter_value(value, infer_parameter_type(value))
 
 

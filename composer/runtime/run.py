@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Comes when the terminal is closed, often twice: from the shell, and from the kernel.
+_HANG_UP = signal.SIGHUP
 
 
 def run_system(
@@ -35,8 +37,9 @@ def run_system(
     """Start a system, wait for its end, and stop it.
 
     The first SIGINT or SIGTERM stops it, a second one leaves at once with exit code 1, and a third
-    one ends the process even if no Python can run. If a behaviour cannot be ended, the process is
-    left with its exit code, since its threads cannot be ended either.
+    one ends the process even if no Python can run. SIGHUP stops it, too, unless it was ignored
+    before, as by `nohup`; more of them change nothing. If a behaviour cannot be ended, the process
+    is left with its exit code, since its threads cannot be ended either.
 
     Returns:
         The exit code.
@@ -72,16 +75,21 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
         yield
         return
 
-    def handle(_signal: int, _frame: FrameType | None) -> None:
+    def handle(number: int, _frame: FrameType | None) -> None:
         if system.stop_requested:
+            if number == _HANG_UP:
+                return
             system.abandon()
             _leave(ExitCode.FAILED)
         system.request_stop()
         last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
-        for number in _SIGNALS:
-            last_resort.let_kernel_act_after_next(number)
+        for each in _SIGNALS:
+            last_resort.let_kernel_act_after_next(each)
 
-    before: dict[int, Any] = {number: signal.signal(number, handle) for number in _SIGNALS}
+    handled = list(_SIGNALS)
+    if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
+        handled.append(_HANG_UP)
+    before: dict[int, Any] = {number: signal.signal(number, handle) for number in handled}
     forks.signal_handlers.update(before)
     try:
         yield

@@ -1,7 +1,9 @@
 """`composer show`."""
 
 import json
+import re
 import textwrap
+from pathlib import Path
 
 import pytest
 
@@ -100,3 +102,60 @@ def test_a_faulty_file_is_not_shown(robot, capsys):
     captured = capsys.readouterr()
     assert captured.out == ''
     assert 'unknown-key' in captured.err
+
+
+SILENCED = """
+version: 1
+include:
+  "{{ side }}": {foreach: {side: [left, right]}, file: part.yaml, namespace: "{{ side }}"}
+nodes:
+  talker:
+    publishers:
+      news:  # composer: ignore[no-subscription, incompatible-qos]
+        type: std_msgs/msg/String
+      fast:
+        type: std_msgs/msg/String
+        qos: {reliability: best_effort}  # composer: ignore[incompatible-qos]
+    timers:
+      tell: {period: 1.0, publish: news, message: {data: x}}  # composer: ignore[unknown-behaviour]
+      tell_fast: {period: 1.0, publish: fast, message: {data: x}}
+  listener:
+    subscriptions: {fast: {type: std_msgs/msg/String, publish: copy}}
+    publishers: {copy: {type: std_msgs/msg/String, external: true}}
+"""
+PART = """
+version: 1
+nodes:
+  only:
+    publishers: {lonely: std_msgs/msg/String}  # composer: ignore[no-subscription]
+    timers: {tell: {period: 1.0, publish: lonely, message: {data: x}}}
+"""
+
+
+@pytest.fixture
+def silenced(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'robot.yaml').write_text(SILENCED.lstrip())
+    (tmp_path / 'part.yaml').write_text(PART.lstrip())
+
+
+def test_what_is_silenced_remains_so(silenced, capsys):
+    assert run(['show', 'robot.yaml']) == 0
+    shown = capsys.readouterr().out
+    assert re.findall(r'(\S+)(?: \S+)?  # composer: ignore\[(.*)\]', shown) == [
+        ('news:', 'no-subscription'),
+        ('reliability:', 'incompatible-qos'),
+        ('lonely:', 'no-subscription'),
+        ('lonely:', 'no-subscription'),
+    ]
+    Path('flat.yaml').write_text(shown)
+    assert run(['check', '--strict', 'flat.yaml']) == 0
+    assert capsys.readouterr().out.startswith('flat.yaml: ok')
+    assert run(['show', 'flat.yaml']) == 0
+    assert capsys.readouterr().out == shown
+
+
+def test_origins_stand_before_what_is_silenced(silenced, capsys):
+    assert run(['show', '--origin', 'robot.yaml']) == 0
+    (line,) = [each for each in capsys.readouterr().out.splitlines() if 'best_effort' in each]
+    assert line.split('  # ')[1:] == ['robot.yaml:11', 'composer: ignore[incompatible-qos]']

@@ -4,6 +4,9 @@ import textwrap
 
 import pytest
 
+from composer.checks import check_system
+from composer.diagnostics import Severity
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system
 
 ARM = """
@@ -132,7 +135,7 @@ def test_includes_are_repeated_and_left_out(write):
             foreach: {i: "{{ range(count) }}"}
             file: part.yaml
             namespace: "robot_{{ i }}"
-          real: {file: no_such.yaml, when: false}
+          real: {file: part.yaml, when: false}
         nodes: {}
     """
     system = load_system(write(part='version: 1\nnodes: {n: {}}', robot=include))
@@ -197,6 +200,29 @@ def test_a_cycle_over_two_files_names_the_way(write):
     path = write(a=robot('{file: robot.yaml}'), robot=robot('{file: a.yaml}'))
     (finding,) = load_system(path).diagnostics
     assert (finding.rule, str(finding.span)) == ('include-cycle', 'a.yaml:3:16')
+    assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
+
+
+@pytest.mark.parametrize(
+    ('include', 'rule'),
+    [
+        ('{file: amr.yaml}', 'missing-include'),
+        ('{file: leaf.yaml, args: {sdie: left}}', 'unknown-argument'),
+        ('{file: leaf.yaml, args: {joints: many}}', 'argument-type'),
+        ('{file: arm.yaml}', 'missing-argument'),
+        ('{file: middle.yaml}', 'include-cycle'),
+    ],
+)
+def test_what_is_wrong_with_an_include_comes_with_the_chain_of_includes(write, include, rule):
+    path = write(
+        arm=ARM,
+        leaf='version: 1\nargs: {joints: 2}\nnodes: {}',
+        middle=robot(include),
+        robot=robot('{file: middle.yaml}'),
+    )
+    (finding,) = load_system(path).diagnostics
+    assert finding.rule == rule
+    assert finding.span.source.name == 'middle.yaml'
     assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
 
 
@@ -300,3 +326,155 @@ def test_what_is_ignored_may_hold_variables_of_foreach(write):
     system = load_system(write(robot=text))
     assert not system.diagnostics
     assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]
+
+
+def test_variables_of_the_environment_are_those_of_the_file_that_is_started(write):
+    path = write(
+        leaf='version: 1\nenvironment: {A: 1, B: 2}\nnodes: {}\n',
+        middle=robot('{file: leaf.yaml}', 'environment: {B: 3}\nnodes: {}'),
+        off='version: 1\nenvironment: {C: 1}\nnodes: {}\n',
+        robot='version: 1\nenvironment: {A: 4}\ninclude:\n  middle: {file: middle.yaml}\n'
+        '  off: {file: off.yaml, when: false}\n',
+    )
+    system = load_system(path)
+    assert system.spec.environment == {'A': '4'}
+    found = {(each.rule, each.severity, str(each.span)) for each in system.diagnostics}
+    assert found == {
+        ('ignored-environment', Severity.WARNING, 'leaf.yaml:2:21'),
+        ('ignored-environment', Severity.WARNING, 'middle.yaml:4:15'),
+    }
+
+
+# Includes that are left out
+
+SWITCH = """
+version: 1
+args: {real: false, ip: ''}
+include:
+  sim: {file: sim.yaml, when: "{{ not real }}"}
+  real: {file: real.yaml, when: "{{ real }}", args: {ip: "{{ ip }}"}}
+"""
+SIM = 'version: 1\nqos: {fast: {depth: 1}}\nnodes: {camera: {log_level: info}}\n'
+
+
+def switch(real, sim=SIM, **files):
+    return {'sim': sim, 'real': f'version: 1\n{real}', 'robot': SWITCH, **files}
+
+
+@pytest.mark.parametrize(
+    ('real', 'words', 'expected'),
+    [
+        (
+            'args: {ip: {type: string}}\nnodes: {camera: {log_levl: info}}',
+            [],
+            [('unknown-key', 'real.yaml:3:18', ['robot.yaml:5:16'])],
+        ),
+        (
+            'args: {ip: {type: string}}\ninclude: {x: {file: none.yaml}}',
+            [],
+            [('missing-include', 'real.yaml:3:21', ['robot.yaml:5:16'])],
+        ),
+        (
+            'args: {op: x}\nnodes: {}',
+            [],
+            [('unknown-argument', 'robot.yaml:5:54', [])],
+        ),
+        (
+            'args: {ip: {type: string}, x: {type: string}}\nnodes: {}',
+            [],
+            [('missing-argument', 'robot.yaml:5:16', [])],
+        ),
+    ],
+)
+def test_what_an_include_that_is_left_out_brings_is_checked(write, real, words, expected):
+    system = load_system(write(**switch(real)), words)
+    assert [
+        (each.rule, str(each.span), [str(place.span) for place in each.related])
+        for each in system.diagnostics
+    ] == expected
+    assert full_names(system) == ['//camera']
+
+
+@pytest.mark.ros
+def test_all_rules_hold_for_what_is_left_out(write):
+    real = """args: {ip: {type: string}}
+qos: {fast: {depth: 9}}
+interfaces: {no_such_msgs: no/such/folder}
+nodes:
+  camera:
+    publishers: {image: {type: std_msgs/msg/Strng, qos: fast}}
+processes:
+  camera: {command: ['true'], name: 1x}
+"""
+    sim = SIM + "processes: {camera: {command: ['true']}}\n"
+    system = load_system(write(**switch(real, sim)))
+    findings = check_system(system, InterfaceCatalogue())
+    assert {(each.rule, each.file, each.span.line) for each in findings} >= {
+        ('unknown-interfaces', 'real.yaml', 4),
+        ('unknown-type', 'real.yaml', 7),
+        ('bad-name', 'real.yaml', 9),
+    }
+    assert system.data['qos'] == {'fast': {'depth': 1}}
+    assert system.data['interfaces'] == {}
+    assert [*system.data['nodes']] == [*system.data['processes']] == ['camera']
+
+
+@pytest.mark.parametrize('file', ['package://no_such/x.yaml', '"{{ ip }}.yaml"'])
+def test_what_is_left_out_may_be_in_a_package_of_other_machines(write, file):
+    path = write(
+        robot=f"version: 1\nargs: {{ip: ''}}\n"
+        f'include: {{x: {{file: {file}, when: false}}}}\nnodes: {{}}\n'
+    )
+    assert not load_system(path).diagnostics
+
+
+def test_values_that_hang_on_arguments_are_samples_where_an_include_is_left_out(write):
+    part = """
+    version: 1
+    args: {ip: {type: string, choices: [a, b]}, rate: {type: double}}
+    nodes: {n: {timers: {t: {period: "{{ 1 / rate }}", behaviour: 'parts:tick'}}}}
+    """
+    robot = """
+    version: 1
+    args: {ip: '', rate: 0.0}
+    include:
+      x: {file: part.yaml, when: "{{ ip != '' }}", args: {ip: "{{ ip }}", rate: "{{ rate }}"}}
+      y: {file: part.yaml, when: false, args: {ip: c, rate: 1.0}}
+    """
+    (finding,) = load_system(write(part=part, robot=robot)).diagnostics
+    assert (finding.rule, str(finding.span)) == ('argument-type', 'robot.yaml:5:48')
+
+
+@pytest.mark.ros
+def test_what_is_left_out_hides_no_fault_of_what_is_used(write):
+    part = """
+    version: 1
+    args: {kind: {type: string}}
+    nodes: {n: {publishers: {c: {type: "std_msgs/msg/{{ kind }}", external: true}}}}
+    """
+    robot = """
+    version: 1
+    args: {kind: String}
+    include:
+      x: {file: part.yaml, args: {kind: Strng}}
+      y: {file: part.yaml, when: false, args: {kind: "{{ kind }}"}, namespace: y}
+    """
+    system = load_system(write(part=part, robot=robot), [])
+    rules = [each.rule for each in check_system(system, InterfaceCatalogue())]
+    assert 'unknown-type' in rules
+
+
+def test_what_is_left_out_counts_for_no_limit(write):
+    robot = """
+    version: 1
+    max_nodes: 3
+    include:
+      "off_{{ i }}":
+        {foreach: {i: "{{ range(3) }}"}, file: mid.yaml, namespace: "n{{ i }}", when: false}
+      on: {file: mid.yaml}
+    """
+    mid = 'version: 1\ninclude: {leaf: {file: leaf.yaml}, off: {file: leaf.yaml, when: false}}\n'
+    leaf = 'version: 1\nnodes: {a: {}, b: {}, c: {}}\n'
+    system = load_system(write(robot=robot, mid=mid, leaf=leaf))
+    assert not system.diagnostics
+    assert full_names(system) == ['//a', '//b', '//c']

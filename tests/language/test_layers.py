@@ -4,6 +4,7 @@ import textwrap
 
 import pytest
 
+from composer.diagnostics import Severity
 from composer.errors import UsageError
 from composer.language import load_system
 
@@ -57,6 +58,57 @@ def test_null_removes(write):
     system = load(write(base=BASE, site='nodes: {listener: null, talker: {log_level: null}}'))
     assert list(system.spec.nodes) == ['talker']
     assert system.spec.nodes['talker'].log_level is None
+
+
+@pytest.mark.parametrize(
+    ('site', 'place', 'message', 'help_text'),
+    [
+        (
+            'nodes: {listner: null}',
+            'site.yaml:1:9',
+            "null removes 'listner', which is not there",
+            "did you mean 'listener'?",
+        ),
+        (
+            'nodes: {talker: {timers: {tock: null}}}',
+            'site.yaml:1:27',
+            "null removes 'tock', which is not there",
+            "did you mean 'tick'?",
+        ),
+        (
+            'nodes: {talker: {publishers: {x: {type: std_msgs/msg/Empty, qos: null}}}}',
+            'site.yaml:1:61',
+            "null removes 'qos', which is not there",
+            None,
+        ),
+        (
+            'nodes: {talkr: {log_level: debug}}',
+            'site.yaml:1:9',
+            "there is no node 'talkr' to change",
+            "did you mean 'talker'?",
+        ),
+        (
+            'nodes: {qqq: {parameters: {rate: 2.0}}}',
+            'site.yaml:1:9',
+            "there is no node 'qqq' to change",
+            'there are: listener, talker',
+        ),
+    ],
+)
+def test_a_layer_that_changes_nothing_is_a_finding(write, site, place, message, help_text):
+    (finding,) = load(write(base=BASE, site=site)).diagnostics
+    assert (finding.rule, finding.severity) == ('changes-nothing', Severity.WARNING)
+    assert (str(finding.span), finding.message, finding.help) == (place, message, help_text)
+
+
+def test_a_layer_may_remove_and_change_what_one_before_it_adds(write):
+    layers = {
+        'one': 'nodes: {new: {publishers: {c: std_msgs/msg/String}}, old: {}}',
+        'two': 'nodes: {new: {log_level: debug}, old: null, other: {}}',
+    }
+    system = load(write(base=BASE, **layers))
+    assert not system.diagnostics
+    assert list(system.spec.nodes) == ['talker', 'listener', 'new', 'other']
 
 
 def test_a_later_layer_wins_over_an_earlier_one(write):
@@ -117,6 +169,21 @@ def test_a_setting_is_the_last_layer_and_typed_as_in_a_file(write, setting, read
             'nodes.talker',
             "'nodes.talker' sets nothing",
             'write path=value, as in executor.threads=4',
+        ),
+        (
+            'nodes.talker.timers.tock=null',
+            "there is no 'tock' in nodes.talker.timers",
+            "did you mean 'tick'?",
+        ),
+        (
+            'nodes.talker.services.x=null',
+            "there is no 'services' in nodes.talker to remove",
+            'there are: log_level, parameters, publishers, timers',
+        ),
+        (
+            'executr=null',
+            "there is no 'executr' to remove",
+            'there are: args, nodes, version',
         ),
     ],
 )

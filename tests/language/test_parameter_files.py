@@ -4,9 +4,10 @@ import textwrap
 
 import pytest
 
-from composer.language.parameter_files import parse_override, parse_parameter_file
+from composer.language.parameter_files import parse_parameter_file
 from composer.language.parameter_overrides import find_overrides, parse_command_line
 from composer.language.parameter_patterns import find_pattern_fault, matches_pattern
+from composer.language.parameter_values import parse_override
 
 
 def parse(text):
@@ -51,6 +52,26 @@ def test_quotes_and_the_tag_of_texts_keep_numbers_texts():
           ros__parameters: {a: "5", b: 'true', c: !!str 5, d: !!int "5", e: 5}
         """
     assert values_of(text) == {'a': '5', 'b': 'true', 'c': '5', 'd': '5', 'e': 5}
+
+
+def test_several_documents_are_read_as_one():
+    text = """
+        /**: {ros__parameters: {a: 1, b: 1, c: {d: x}}}
+        ---
+        robot:
+          arm: {ros__parameters: {b: 2}}
+        ...
+        ---
+        /robot/arm: {ros__parameters: {c.e: [1.5]}}
+        """
+    assert values_of(text) == {'a': 1, 'b': 2, 'c.d': 'x', 'c.e': [1.5]}
+
+
+@pytest.mark.parametrize('document', ['', '~', 'a', '[1]'])
+def test_a_document_that_is_no_mapping_is_refused(document):
+    file = parse_parameter_file(f'/**: {{ros__parameters: {{a: 1}}}}\n--- {document}\n', 'p.yaml')
+    (fault,) = file.faults
+    assert fault.message == "a value stands here, and no 'ros__parameters' above it"
 
 
 def test_a_value_knows_its_place():

@@ -169,6 +169,8 @@ class Writer:
         choose = self._random.choice
         text = ''
         for _ in range(choose([1, 2, 3])):
+            # Another document, as ROS allows.
+            text += choose(['', '', '', '---\n', '...\n---\n' if text else ''])
             if choose([True, False, False]):
                 body = self.parameters(0, ' ' * 6)
                 text += f'robot:\n  arm:\n    ros__parameters:\n{body}'

@@ -103,10 +103,16 @@ def children(pid):
     return found
 
 
-def guardians(parent):
-    """Return the guardians among the children of a process."""
-    lines = command_lines()
-    return [pid for pid in children(parent) if b'runtime/guardian.py' in lines.get(pid, b'')]
+def guardians(child):
+    """Return the guardian of a system, and the second one, which is its parent."""
+
+    def among_children(parent):
+        lines = command_lines()
+        return [pid for pid in children(parent) if b'runtime/guardian.py' in lines.get(pid, b'')]
+
+    (second,) = among_children(child._process.pid)
+    (guardian,) = among_children(second)
+    return guardian, second
 
 
 def system(processes, nodes=None, **keys):
@@ -178,9 +184,7 @@ def test_nothing_is_left_after_a_second_signal(compose, stubborn):
 
 def test_nothing_is_left_after_the_death_of_composer(compose, stubborn, wait_for, scratch):
     child = compose_stubborn(compose, stubborn)
-    (guardian,) = guardians(child._process.pid)
-    helpers = [guardian, *guardians(guardian)]
-    assert len(helpers) == 2
+    helpers = guardians(child)
     child.stop(signal.SIGKILL)
 
     wait_for(lambda: not stubborn.left(), 'the end of all processes')
@@ -191,10 +195,8 @@ def test_nothing_is_left_after_the_death_of_composer(compose, stubborn, wait_for
 def test_nothing_is_left_after_the_death_of_composer_and_the_guardian(
     compose, stubborn, wait_for, scratch
 ):
-    # What has left its session and emptied its environment is known to the guardian alone.
-    kinds = [kind for kind in KINDS if kind != 'nameless']
-    child = compose_stubborn(compose, stubborn, kinds)
-    (guardian,) = guardians(child._process.pid)
+    child = compose_stubborn(compose, stubborn)
+    guardian, _ = guardians(child)
     os.kill(guardian, signal.SIGSTOP)
     child.send(signal.SIGSTOP)
     os.kill(guardian, signal.SIGKILL)
@@ -206,8 +208,7 @@ def test_nothing_is_left_after_the_death_of_composer_and_the_guardian(
 
 def test_a_process_dies_with_composer_and_both_guardians(compose, stubborn, wait_for):
     child = compose_stubborn(compose, stubborn, ['plain', 'deaf', 'asleep', 'mute'])
-    (guardian,) = guardians(child._process.pid)
-    (second,) = guardians(guardian)
+    guardian, second = guardians(child)
     child.send(signal.SIGSTOP)
     for pid in (guardian, second):
         os.kill(pid, signal.SIGSTOP)
@@ -219,9 +220,8 @@ def test_a_process_dies_with_composer_and_both_guardians(compose, stubborn, wait
 
 
 def test_the_death_of_the_guardian_ends_the_system(compose, stubborn):
-    kinds = [kind for kind in KINDS if kind != 'nameless']
-    child = compose_stubborn(compose, stubborn, kinds)
-    (guardian,) = guardians(child._process.pid)
+    child = compose_stubborn(compose, stubborn)
+    guardian, _ = guardians(child)
     os.kill(guardian, signal.SIGKILL)
 
     assert child.wait() == 1
@@ -229,13 +229,38 @@ def test_the_death_of_the_guardian_ends_the_system(compose, stubborn):
     assert stubborn.left() == {}
 
 
-def test_the_second_guardian_is_not_needed_for_a_clean_stop(compose, stubborn):
-    child = compose_stubborn(compose, stubborn, ['plain', 'daemon'])
-    (guardian,) = guardians(child._process.pid)
-    (second,) = guardians(guardian)
+def test_the_second_guardian_is_not_needed_for_a_clean_stop(compose, stubborn, wait_for):
+    child = compose_stubborn(compose, stubborn, ['plain', 'daemon', 'nameless'])
+    guardian, second = guardians(child)
     os.kill(second, signal.SIGKILL)
 
     assert child.stop() == 0
+    assert stubborn.left() == {}
+    wait_for(lambda: guardian not in command_lines(), 'the end of the guardian')
+
+
+def test_a_guardian_that_hangs_is_ended_by_the_second_one(compose, stubborn, wait_for, scratch):
+    child = compose_stubborn(compose, stubborn)
+    guardian, second = guardians(child)
+    os.kill(guardian, signal.SIGSTOP)
+    child.stop(signal.SIGKILL)
+
+    wait_for(lambda: not stubborn.left(), 'the end of all processes')
+    wait_for(lambda: second not in command_lines(), 'the end of the second guardian')
+    assert list(scratch.iterdir()) == []
+
+
+def test_nothing_marked_is_left_after_the_death_of_both_guardians(compose, stubborn):
+    # What has left its session and emptied its environment is known to the guardians alone.
+    kinds = [kind for kind in KINDS if kind != 'nameless']
+    child = compose_stubborn(compose, stubborn, kinds)
+    both = guardians(child)
+    for number in (signal.SIGSTOP, signal.SIGKILL):
+        for pid in both:
+            os.kill(pid, number)
+
+    assert child.wait() == 1
+    assert child.matching('the guardian of the processes was killed, and so were they')
     assert stubborn.left() == {}
 
 

@@ -1,12 +1,18 @@
 """How systems come up, all of them or nothing, and how they go down."""
 
+import os
+import pty
 import signal
+import subprocess
+import sys
 
 import pytest
 
 pytest.importorskip('rclpy')
 
 from std_msgs.msg import String
+
+from tests.running import DEADLINE_SEC, ROOT
 
 pytestmark = pytest.mark.ros
 
@@ -51,7 +57,7 @@ def wait_for_peer(node):
 """
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_all_nodes_after_their_on_stop_with_exit_code_0(compose, number):
     text = """
         version: 1
@@ -385,3 +391,94 @@ def test_wrong_ros_arguments_are_a_usage_error(compose, arguments, message):
 
     assert child.wait() == 2
     assert child.lines[-1].startswith(f'error: ROS 2 cannot start: {message}')
+
+
+LEAVE_A_FILE = """
+import time
+from pathlib import Path
+
+def leave_a_file(node):
+    Path('stopping').touch()
+    time.sleep(0.5)
+    Path('stopped').touch()
+"""
+LEAVING_A_FILE = """
+version: 1
+nodes: {only: {on_stop: 'parts:leave_a_file'}}
+"""
+
+
+IN_ITS_TERMINAL = """
+import fcntl, os, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.executable, [sys.executable, '-m', 'composer', 'up', sys.argv[1]])
+"""
+
+
+def environment_of(compose):
+    return os.environ | {
+        'ROS_DOMAIN_ID': str(compose.domain_id),
+        'ROS_LOG_DIR': str(compose.folder / 'log'),
+        'PYTHONPATH': str(ROOT),
+    }
+
+
+def test_the_end_of_the_terminal_stops_the_system(compose):
+    path = compose.write(LEAVING_A_FILE, LEAVE_A_FILE)
+    terminal, inner_end = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-c', IN_ITS_TERMINAL, path.name],
+        cwd=compose.folder,
+        env=environment_of(compose),
+        stdin=inner_end,
+        stdout=inner_end,
+        stderr=inner_end,
+        start_new_session=True,
+    )
+    os.close(inner_end)
+    try:
+        output = b''
+        while b' ready in ' not in output:
+            output += os.read(terminal, 4096)
+        os.close(terminal)
+        assert process.wait(DEADLINE_SEC) == 0
+    finally:
+        process.kill()
+    assert (compose.folder / 'stopped').exists()
+
+
+def test_more_than_one_hang_up_is_no_reason_to_hurry(compose, wait_for):
+    child = compose(LEAVING_A_FILE, LEAVE_A_FILE)
+    child.wait_until_ready()
+    child.send(signal.SIGHUP)
+    wait_for((compose.folder / 'stopping').exists, 'the beginning of on_stop')
+
+    assert child.stop(signal.SIGHUP) == 0
+    assert (compose.folder / 'stopped').exists()
+
+
+def test_a_system_that_ignores_hang_ups_goes_on(compose):
+    text = """
+        version: 1
+        nodes: {only: {timers: {tick: {period: 0.02, behaviour: 'parts:tell'}}}}
+    """
+    path = compose.write(text, CODE)
+    with subprocess.Popen(
+        ['nohup', sys.executable, '-m', 'composer', 'up', path.name],
+        cwd=compose.folder,
+        env=environment_of(compose),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        try:
+            next(line for line in process.stdout if ' ready in ' in line)
+            process.send_signal(signal.SIGHUP)
+            for _ in range(20):
+                next(line for line in process.stdout if 'tick' in line)
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=DEADLINE_SEC)
+        finally:
+            process.kill()
+    assert process.returncode == 0

@@ -1,0 +1,93 @@
+"""Parameters of processes: what rcl would refuse, or read as something else, when they start.
+
+Source: `parse_value` and `parse_key` in rcl (`rcl_yaml_param_parser/src/parse.c`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.language.parameters import (
+    convert_parameter_value,
+    find_type_fault,
+    infer_parameter_type,
+)
+from composer.names import find_parameter_name_fault, with_article
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.positions import DataPath
+
+_RULE = 'bad-parameter'
+_NO_NULL = 'there is no value, and ROS has no null'
+
+
+def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
+    """Names and values are such that ROS takes them."""
+    for process in context.spec.processes.values():
+        path = (*process.path, 'parameters')
+        yield from _check_mapping(context, process.parameters, path, '', {})
+
+
+def _check_mapping(
+    context: CheckContext,
+    values: Mapping[str, Any],
+    path: DataPath,
+    prefix: str,
+    seen: dict[str, DataPath],
+) -> Iterator[Diagnostic]:
+    for key, value in values.items():
+        at, name = (*path, key), f'{prefix}{key}'
+        if fault := find_parameter_name_fault(name):
+            yield context.at_key(at, 'bad-name', f"'{name}': {fault}")
+        elif isinstance(value, dict) and value:
+            yield from _check_mapping(context, value, at, f'{name}.', seen)
+        elif name in seen:
+            yield context.at_key(at, _RULE, f"the parameter '{name}' stands here a second time")
+        else:
+            seen[name] = at
+            for place, message in _find_faults(value):
+                yield context.at_value((*at, *place), _RULE, f"parameter '{name}': {message}")
+
+
+def _find_faults(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:
+    """Yield what is wrong with a value; of items of a list with their index."""
+    if value is None:
+        yield (), _NO_NULL
+    elif isinstance(value, dict):
+        yield (), 'the mapping is empty, and ROS misreads what follows one'
+    elif isinstance(value, list):
+        # Integers among doubles become doubles.
+        yield from _find_list_faults(convert_parameter_value(value, infer_parameter_type(value)))
+    else:
+        yield from _find_scalar_faults(value, ())
+
+
+def _find_list_faults(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]:
+    for index, item in enumerate(items):
+        if item is None:
+            yield (index,), f'item {index}: {_NO_NULL}'
+        elif isinstance(item, list | dict):
+            what = 'lists' if isinstance(item, list) else 'mappings'
+            yield (index,), f'item {index}: a list of parameters holds no {what}'
+        elif infer_parameter_type([items[0], item]) is None:
+            types = (infer_parameter_type(each) for each in (item, items[0]))
+            own, first = (with_article(str(each)) for each in types)
+            yield (index,), f'item {index}: a list has one type, and this is {own}, not {first}'
+        else:
+            yield from _find_scalar_faults(item, (index,))
+            continue
+        # One is enough: what follows may be right or wrong for the same reason.
+        return
+
+
+def _find_scalar_faults(
+    value: Any, place: tuple[int, ...]
+) -> Iterator[tuple[tuple[int, ...], str]]:
+    type_name = str(infer_parameter_type(value))
+    fault = find_type_fault(value, type_name)
+    if fault:
+        yield place, fault

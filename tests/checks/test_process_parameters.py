@@ -1,0 +1,89 @@
+"""Parameters of processes, before their programs are started with them."""
+
+import pytest
+
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system_text
+from composer.runtime.process_commands import render_parameters
+
+SYSTEM = """
+version: 1
+processes:
+  driver: {command: ['true'], name: driver, parameters: {%s}}
+"""
+
+
+def findings(parameters):
+    system = load_system_text((SYSTEM % parameters).lstrip())
+    return [
+        (each.rule, each.span.text, each.message)
+        for each in check_system(system, InterfaceCatalogue())
+    ]
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'finding'),
+    [
+        (
+            'f: [1, a]',
+            "parameter 'f': item 1: a list has one type, and this is a string, not an integer",
+        ),
+        (
+            'f: [true, 2.5, x]',
+            "parameter 'f': item 1: a list has one type, and this is a double, not a bool",
+        ),
+        ('f: null', "parameter 'f': there is no value, and ROS has no null"),
+        ('f: [1.0, null]', "parameter 'f': item 1: there is no value, and ROS has no null"),
+        ('f: [[1]]', "parameter 'f': item 0: a list of parameters holds no lists"),
+        ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters holds no mappings"),
+        ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit 64 bits"),
+        (
+            'f: [0, -9223372036854775809]',
+            "parameter 'f': -9223372036854775809 does not fit 64 bits",
+        ),
+        (
+            'f: {g: {}}',
+            "parameter 'f.g': the mapping is empty, and ROS misreads what follows one",
+        ),
+        ('f.g: 1, f: {g: 2}', "the parameter 'f.g' stands here a second time"),
+    ],
+)
+def test_what_ros_refuses_or_misreads_is_a_finding(parameters, finding):
+    assert [(rule, message) for rule, _, message in findings(parameters)] == [
+        ('bad-parameter', finding)
+    ]
+
+
+def test_the_finding_is_at_the_item():
+    assert [text for _, text, _ in findings('f: {g: [1, two]}')] == ['two']
+
+
+def test_names_in_mappings_are_names_of_parameters():
+    assert findings('f: {g h: 1}') == [
+        ('bad-name', 'g h', "'f.g h': a parameter name has no spaces")
+    ]
+
+
+def test_what_is_left_out_is_checked_too():
+    system = load_system_text((SYSTEM % 'f: null').replace('{command', '{when: false, command'))
+    assert [each.rule for each in check_system(system, InterfaceCatalogue())] == ['bad-parameter']
+
+
+@pytest.mark.parametrize(
+    'parameters',
+    [
+        'f: []',
+        'f: [1, 2.5, 100000000000000000000]',
+        'f: .inf, g: -9223372036854775808, h: [true, false]',
+        "f: {g: {h: ''}, i: [a, '1']}, j.k: 1, j: {l: 2}",
+    ],
+)
+def test_what_ros_takes_has_no_finding(parameters):
+    assert findings(parameters) == []
+
+
+def test_integers_among_doubles_are_written_as_doubles():
+    text = render_parameters({'f': [1, 2.5], 'g': {'h': [1, 2]}})
+    assert '1.0' in text
+    assert text.count('- 2\n') == 1
