@@ -28,7 +28,7 @@ def generated():
 
 def sections_of(text):
     return {
-        line.lstrip('# ').lower().replace(' ', '-').replace('`', '')
+        re.sub('[`,]', '', line.lstrip('# ').lower()).replace(' ', '-')
         for line in text.splitlines()
         if re.match('#+ ', line)
     }
