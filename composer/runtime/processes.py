@@ -7,18 +7,24 @@ from __future__ import annotations
 
 import itertools
 import os
-import queue
 import signal
 import sys
 import tempfile
 import threading
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
 from composer.runtime.guarding import GuardianConnection
+from composer.runtime.live_process import (
+    LiveProcess,
+    ProcessRun,
+    describe_end,
+    describe_limit,
+    is_restarted,
+    next_delay_sec,
+)
 from composer.runtime.logs import system_logger
 from composer.runtime.process_commands import CommandWriter, find_folder
 from composer.runtime.process_output import ProcessOutputs
@@ -31,63 +37,7 @@ if TYPE_CHECKING:
 _LAST_WORDS_SEC = 1.0
 # What a process gets to be gone after it was killed.
 _KILLED_SEC = 2.0
-# A process that keeps dying is started again ever more slowly, as nodes are.
-_FIRST_BACKOFF_SEC = 0.1
-_LONGEST_BACKOFF_SEC = 30.0
-_RECOVERED_SEC = 60.0
-_MOST_FAILURES = 10
 _NO_GUARDIAN = {'kind': 'failed', 'doing': 'guardian'}
-
-
-@dataclass(slots=True)
-class _Run:
-    """One run of a process.
-
-    Attributes:
-        code: The exit code, or a signal's number, negative; `None` while it runs.
-        answer: What the guardian said about its start.
-        gone: Set when nothing of its process group is left.
-        heard: Set when nothing holds its output open any more.
-    """
-
-    number: int
-    process: LiveProcess
-    heard: threading.Event
-    code: int | None = None
-    begun: float = field(default_factory=time.monotonic)
-    answer: queue.SimpleQueue[dict[str, Any]] = field(default_factory=queue.SimpleQueue)
-    gone: threading.Event = field(default_factory=threading.Event)
-    was_killed: bool = False
-
-
-@dataclass(slots=True)
-class LiveProcess:
-    """A process of the system.
-
-    Attributes:
-        run: The last one; `None` before the first.
-        restarts: How often it was started again.
-        failures: How many runs in a row were short.
-        is_done: Whether it has ended, and is not started again.
-    """
-
-    spec: ProcessSpec
-    run: _Run | None = None
-    restarts: int = 0
-    failures: int = 0
-    is_done: bool = False
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether it runs, or has ended well."""
-        return self.run is not None and self.run.code in (None, 0)
-
-    @property
-    def state(self) -> str:
-        """How it is, in words."""
-        if self.run is None:
-            return 'it has not been started'
-        return 'it runs' if self.run.code is None else f'it {describe_end(self.run.code)}'
 
 
 class Processes:
@@ -114,7 +64,7 @@ class Processes:
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
         self._numbers = itertools.count()
-        self._runs: dict[int, _Run] = {}
+        self._runs: dict[int, ProcessRun] = {}
         self._watchers: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._stopping = threading.Event()
@@ -168,7 +118,7 @@ class Processes:
         if self._tools is not None:
             self._tools.guardian.abandon()
 
-    def _launch(self, process: LiveProcess) -> _Run | None:
+    def _launch(self, process: LiveProcess) -> ProcessRun | None:
         """Ask for a process; return its run, `None` after the stop."""
         spec = process.spec
         environment = {**_surroundings(), **spec.env}
@@ -180,7 +130,7 @@ class Processes:
             tools = self._tools
             command, folder = tools.commands.write(spec, environment), find_folder(spec)
             output, output_end = os.pipe()
-            run = _Run(next(self._numbers), process, tools.outputs.add(spec.name, output))
+            run = ProcessRun(next(self._numbers), process, tools.outputs.add(spec.name, output))
             self._runs[run.number] = run
             tools.guardian.start(run.number, command, environment, folder, output_end)
             os.close(output_end)
@@ -212,7 +162,7 @@ class Processes:
             run.gone.set()
             self._runs.pop(run.number, None)
 
-    def _note_killed(self, run: _Run) -> None:
+    def _note_killed(self, run: ProcessRun) -> None:
         spec = run.process.spec
         if spec.stop_signal != 'SIGKILL':
             run.was_killed = True
@@ -230,7 +180,7 @@ class Processes:
             run.answer.put(_NO_GUARDIAN)
             run.gone.set()
 
-    def _after(self, run: _Run, code: int) -> None:
+    def _after(self, run: ProcessRun, code: int) -> None:
         """Say that a process has ended, and do what is to be done then."""
         # What it has started may hold its output open for as long as it likes.
         run.heard.wait(_LAST_WORDS_SEC)
@@ -240,14 +190,14 @@ class Processes:
             asked = (0, -signal.Signals[process.spec.stop_signal])
             _tell(end, is_fault=code not in asked and not run.was_killed)
             return
-        if not _is_restarted(process, code):
+        if not is_restarted(process, code):
             process.is_done = True
-            _tell(end + _describe_limit(process, code), is_fault=code != 0)
+            _tell(end + describe_limit(process, code), is_fault=code != 0)
             if process.spec.required:
                 system_logger.error(f"process '{name}' is required: the system ends")
                 self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
             return
-        delay_sec = _next_delay_sec(process, time.monotonic() - run.begun)
+        delay_sec = next_delay_sec(process, time.monotonic() - run.begun)
         _tell(f'{end}; it is started again in {delay_sec:g} s', is_fault=code != 0)
         if not self._stopping.wait(delay_sec):
             self._restart(process)
@@ -285,50 +235,12 @@ class _Tools:
         self._folder.cleanup()
 
 
-def describe_end(code: int) -> str:
-    """Return how a process has ended, as in `has ended with exit code 1`.
-
-    Args:
-        code: The exit code, or a signal's number, negative.
-    """
-    if code >= 0:
-        return f'has ended with exit code {code}'
-    try:
-        return f'was ended by {signal.Signals(-code).name}'
-    except ValueError:
-        return f'was ended by signal {-code}'
-
-
 def _tell(text: str, *, is_fault: bool) -> None:
     # A logger of rclpy wants one level for each line of code that calls it.
     if is_fault:
         system_logger.error(text)
     else:
         system_logger.info(text)
-
-
-def _is_restarted(process: LiveProcess, code: int) -> bool:
-    spec = process.spec
-    if spec.restart == 'never' or (spec.restart == 'on_failure' and code == 0):
-        return False
-    return spec.most_restarts is None or process.restarts < spec.most_restarts
-
-
-def _describe_limit(process: LiveProcess, code: int) -> str:
-    """Return why a process is not started again, if that is for the number of times."""
-    spec = process.spec
-    if spec.restart == 'never' or (spec.restart == 'on_failure' and code == 0):
-        return ''
-    times = 'once' if spec.most_restarts == 1 else f'{spec.most_restarts} times'
-    return f', and was started again {times} already' if spec.most_restarts else ''
-
-
-def _next_delay_sec(process: LiveProcess, lived_sec: float) -> float:
-    if lived_sec > _RECOVERED_SEC:
-        process.failures = 0
-    backoff_sec = min(_FIRST_BACKOFF_SEC * 2.0**process.failures, _LONGEST_BACKOFF_SEC)
-    process.failures = min(process.failures + 1, _MOST_FAILURES)
-    return max(process.spec.restart_delay_sec, backoff_sec)
 
 
 def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:

@@ -7,56 +7,33 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
-from rclpy.node import Node as RosNode
-from rclpy.node import NodeNameNonExistentError
-from rclpy.parameter import Parameter
-
 from composer.errors import StartError
-from composer.names import did_you_mean, expand_name, join_names, remap_name
+from composer.names import expand_name, remap_name
+from composer.runtime.live_graph import LiveGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
 
     from rclpy.context import Context
+    from rclpy.node import Node as RosNode
 
     from composer.language.positions import SourceMap
-    from composer.language.specs import ConditionKind, ConditionSpec, ProcessSpec
+    from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.runtime.live_node import LiveNode
-    from composer.runtime.processes import LiveProcess, Processes
+    from composer.runtime.live_process import LiveProcess
+    from composer.runtime.processes import Processes
     from composer.runtime.waiting import StopSignal
 
 _POLL_SEC = 0.05
-_NODE_NAME = '_composer_waiting'
-# An action is there when the service is that takes its goals
-# (https://design.ros2.org/articles/actions.html).
-_GOALS = '/_action/send_goal'
-# What nearly every node has, and hardly anybody waits for.
-_COMMON_TOPICS = ('/rosout', '/parameter_events', '/diagnostics')
-_COMMON_SERVICES = (
-    '/describe_parameters',
-    '/get_parameter_types',
-    '/get_parameters',
-    '/get_type_description',
-    '/list_parameters',
-    '/set_parameters',
-    '/set_parameters_atomically',
-)
 _TROUBLES = {
     'topic': 'nobody publishes it',
     'service': 'nobody serves it',
     'action': 'nobody serves it',
     'node': 'it is not there',
-}
-_INTRODUCTIONS = {
-    'topic': 'published are',
-    'service': 'served are',
-    'action': 'served are',
-    'node': 'there are',
 }
 
 
@@ -105,7 +82,7 @@ class Readiness:
         pending = list(waiters)
         if not pending:
             return
-        node = _create_graph_node(self._context)
+        node = create_graph_node(self._context)
         woken = threading.Event()
         begun = time.monotonic()
         try:
@@ -122,7 +99,7 @@ class Readiness:
         self, pending: list[Waiter], node: RosNode, waited_sec: float, stop: StopSignal
     ) -> list[Waiter]:
         """Start those who need not wait any more, and return them."""
-        graph = _Graph(node, self._hidden())
+        graph = LiveGraph(node, self._hidden())
         ready = []
         for waiter in pending:
             missing = [each for each in waiter.conditions if not self._holds(waiter, each, graph)]
@@ -136,7 +113,7 @@ class Readiness:
                 waiter.start()
         return ready
 
-    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: _Graph) -> bool:
+    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: LiveGraph) -> bool:
         if condition.kind == 'process':
             return self._processes[condition.name].is_ready
         return graph.has(condition.kind, waiter.resolve(condition))
@@ -150,7 +127,7 @@ class Readiness:
         closed = [node for node in list(self._nodes.values()) if not node.gate.is_open]
         return frozenset(node.full_name for node in closed)
 
-    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: _Graph) -> StartError:
+    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: LiveGraph) -> StartError:
         span = self._positions.value(condition.path)
         who = f'{waiter.label} ({span.source.name}:{span.line})'
         waited = f'waited {condition.timeout_sec:g} s for the {condition.kind}'
@@ -169,93 +146,7 @@ class Readiness:
             nodes = ' and '.join(f"'{each}'" for each in late)
             verb = 'has' if len(late) == 1 else 'have'
             message += f' but {nodes} of this system, which {verb} not started'
-        return StartError(message, help=_describe_graph(condition.kind, name, graph))
-
-
-class _Graph:
-    """What is there now, without what nodes bring that have not started.
-
-    Attributes:
-        hidden: The full names of these nodes.
-    """
-
-    def __init__(self, node: RosNode, hidden: frozenset[str]) -> None:
-        self._node = node
-        self.hidden = hidden
-
-    def has(self, kind: ConditionKind, name: str) -> bool:
-        """Return whether something of a kind is there, by its full name."""
-        if kind == 'topic':
-            return self._is_published(name)
-        if kind == 'node':
-            return name in self._nodes
-        service = name + _GOALS if kind == 'action' else name
-        # This list is fast, but has those services, too, that only have clients.
-        listed = any(name == service for name, _ in self._node.get_service_names_and_types())
-        return listed and service in self._served
-
-    def names(self, kind: ConditionKind) -> Collection[str]:
-        """Return the full names of all that is there of a kind."""
-        found: Collection[str] = getattr(self, f'_{kind}s')
-        return found
-
-    def names_of(self, node: LiveNode, kind: ConditionKind) -> Collection[str]:
-        """Return what a node brings, started or not."""
-        if kind == 'node':
-            return [node.full_name]
-        where = node.ros.get_name(), node.ros.get_namespace()
-        if kind == 'topic':
-            return [name for name, _ in self._node.get_publisher_names_and_types_by_node(*where)]
-        return _select(kind, self._services_of(*where))
-
-    @cached_property
-    def _nodes(self) -> set[str]:
-        found = {join_names(namespace, name) for name, namespace in self._present}
-        return found - {f'/{_NODE_NAME}'}
-
-    @cached_property
-    def _topics(self) -> set[str]:
-        return {
-            topic
-            for topic, _ in self._node.get_topic_names_and_types()
-            if self._is_published(topic)
-        }
-
-    @cached_property
-    def _services(self) -> set[str]:
-        return set(_select('service', self._served))
-
-    @cached_property
-    def _actions(self) -> set[str]:
-        return set(_select('action', self._served))
-
-    @cached_property
-    def _present(self) -> list[tuple[str, str]]:
-        return [
-            (name, namespace)
-            for name, namespace in self._node.get_node_names_and_namespaces()
-            if join_names(namespace, name) not in self.hidden
-        ]
-
-    @cached_property
-    def _served(self) -> set[str]:
-        found: set[str] = set()
-        for name, namespace in self._present:
-            found.update(self._services_of(name, namespace))
-        return found
-
-    def _is_published(self, topic: str) -> bool:
-        return any(
-            join_names(each.node_namespace, each.node_name) not in self.hidden
-            for each in self._node.get_publishers_info_by_topic(topic)
-        )
-
-    def _services_of(self, name: str, namespace: str) -> list[str]:
-        # A node may leave between two questions.
-        with suppress(NodeNameNonExistentError):
-            services = self._node.get_service_names_and_types_by_node(name, namespace)
-            return [service for service, _ in services]
-        return []
+        return StartError(message, help=describe_graph(condition.kind, name, graph))
 
 
 def list_waiters(
@@ -310,33 +201,3 @@ def _resolve_of_process(spec: ProcessSpec, condition: ConditionSpec) -> str:
     if condition.kind not in ('topic', 'service'):
         return full
     return remap_name(full, spec.remap, name, namespace, f'ros{condition.kind}')
-
-
-def _create_graph_node(context: Context) -> RosNode:
-    """Return a node to ask; those of the system may be built anew at any time."""
-    return RosNode(
-        _NODE_NAME,
-        context=context,
-        use_global_arguments=False,
-        enable_rosout=False,
-        start_parameter_services=False,
-        parameter_overrides=[Parameter('start_type_description_service', value=False)],
-    )
-
-
-def _select(kind: ConditionKind, services: Iterable[str]) -> list[str]:
-    if kind == 'action':
-        return [name.removesuffix(_GOALS) for name in services if name.endswith(_GOALS)]
-    return [name for name in services if '/_' not in name]
-
-
-def _describe_graph(kind: ConditionKind, name: str, graph: _Graph) -> str:
-    """Return what was there instead of a name."""
-    names = [
-        each
-        for each in graph.names(kind)
-        if not (each in _COMMON_TOPICS or '/_' in each or each.endswith(_COMMON_SERVICES))
-    ]
-    nearest = did_you_mean(name, names, _INTRODUCTIONS[kind])
-    every = ' but those that every node has' if kind in ('topic', 'service') else ' at all'
-    return nearest or f'there is no {kind}{every}'
