@@ -212,7 +212,8 @@ class Lane:
                     self._thread = None
                     self._wait_set = None
                     return
-            self._wait(_UNUSED_SEC if unused else None)
+            # Whoever asked is waiting, and the poke may have been spent on the wait before.
+            self._wait(0 if asked > self._answer else _UNUSED_SEC if unused else None)
             self._sweep()
             if asked > self._answer:
                 with self._answered:

@@ -1,6 +1,7 @@
 """Tasks, coroutines and futures."""
 
 import asyncio
+import gc
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -12,6 +13,7 @@ pytest.importorskip('test_msgs')
 
 import rclpy
 from rclpy.context import Context
+from rclpy.task import Future
 from spinning import DEADLINE_SEC, spinning, wait_for
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -99,6 +101,32 @@ def test_a_suspended_callback_goes_on_when_its_node_is_back(
     assert steps == [1]
     rclpy.spin_once(node, executor=executor, timeout_sec=0)
     assert steps == [1, 2]
+
+
+def test_a_suspended_callback_of_a_destroyed_node_is_let_go_of(
+    node: Any,
+    context: Context,
+    executor: Any,
+) -> None:
+    awaited: Future = Future()
+    ended: list[int] = []
+
+    async def tick() -> None:
+        try:
+            await awaited
+        finally:
+            ended.append(1)
+
+    other = rclpy.create_node('other', context=context)
+    other.create_timer(0.01, tick)
+    rclpy.spin_once(other, executor=executor, timeout_sec=5)
+    awaited.set_result(None)
+    executor.spin_once(timeout_sec=0)
+    other.destroy_node()
+    assert not ended
+    executor.remove_node(node)
+    gc.collect()
+    assert ended == [1]
 
 
 def test_ten_thousand_tasks_from_many_threads_all_run(node: Any, executor: Any) -> None:

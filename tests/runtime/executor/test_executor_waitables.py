@@ -22,6 +22,9 @@ from spinning import DEADLINE_SEC, spinning, wait_for
 from std_msgs.msg import Empty
 from test_msgs.action import Fibonacci
 
+from composer.runtime.executor import lane
+from composer.runtime.executor.lane import Lane
+
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [
     pytest.mark.ros,
@@ -41,6 +44,27 @@ def test_a_guard_condition_runs_its_callback(node: Any, executor: Any) -> None:
             guard.trigger()
             wait_for(lambda count=count: len(called) == count)
         node.destroy_guard_condition(guard)
+
+
+def test_a_guard_condition_is_let_go_of_at_once(
+    node: Any,
+    executor: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Nothing else wakes the thread that waits for it.
+    monkeypatch.setattr(Lane, '_timeout', lambda _lane, most_sec: most_sec)
+    monkeypatch.setattr(lane, '_ANSWER_SEC', 10 * DEADLINE_SEC)
+    ticks: list[int] = []
+    node.create_timer(0.001, lambda: ticks.append(1))
+    with spinning(executor):
+        for _ in range(5):
+            called: list[int] = []
+            guard = node.create_guard_condition(lambda called=called: called.append(1))
+            guard.trigger()
+            wait_for(lambda called=called: called)
+            node.destroy_guard_condition(guard)
+            before = len(ticks)
+            wait_for(lambda before=before: len(ticks) > before + 1)
 
 
 def test_an_async_guard_condition(node: Any, executor: Any) -> None:
