@@ -151,13 +151,20 @@ def _entry_of(path: DataPath) -> DataPath:
 
 
 def _remove_entries(data: Any, paths: Iterable[DataPath]) -> None:
-    """Remove entries of nested mappings, if they are there."""
+    """Remove entries of nested mappings, also of those in lists, if they are there."""
     for path in paths:
         mapping = data
         for key in path[:-1]:
-            mapping = mapping.get(key) if isinstance(mapping, dict) else None
+            mapping = _child(mapping, key)
         if path and isinstance(mapping, dict):
             mapping.pop(path[-1], None)
+
+
+def _child(data: Any, key: Key) -> Any:
+    if isinstance(data, dict):
+        return data.get(key)
+    is_item = isinstance(data, list) and isinstance(key, int) and key < len(data)
+    return data[key] if is_item else None
 
 
 @dataclass(frozen=True, slots=True)
