@@ -9,10 +9,13 @@ from __future__ import annotations
 import ast
 import builtins
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from composer.python_source import find_texts
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from composer.python_source import FunctionNode
 
@@ -51,6 +54,7 @@ class NodeUse:
 
     Attributes:
         line: Of the name, counted from 1; `column` likewise.
+        length: Of what stands for the name there: itself, or that of a constant.
         is_optional: Whether it copes without: `node.parameters.get('x')`.
         has_default: Whether it brings a value for that case.
         is_certain: Whether it hangs on nothing that a file can decide: on parameters, the node's
@@ -63,6 +67,7 @@ class NodeUse:
     name: str
     line: int
     column: int
+    length: int
     is_optional: bool = False
     has_default: bool = False
     is_certain: bool = True
@@ -106,11 +111,17 @@ class NodeUses:
     reaches_ros: bool = False
 
 
-def read_node_uses(function: FunctionNode, node_name: str, given: Iterable[str]) -> NodeUses:
+def read_node_uses(
+    function: FunctionNode,
+    node_name: str,
+    given: Iterable[str],
+    texts: Mapping[str, str] = MappingProxyType({}),
+) -> NodeUses:
     """Return what a function does with its parameter `node_name`.
 
     Args:
         given: The parameters whose values no file decides: the node itself, a message.
+        texts: The names outside of the function that are a text for good.
     """
     parameters = {argument.arg for argument in _arguments(function.args)}
     stored = {name.id for name in _stored_names(function)}
@@ -118,7 +129,9 @@ def read_node_uses(function: FunctionNode, node_name: str, given: Iterable[str])
         return NodeUses()
     local = parameters | stored | _nested_names(function)
     chosen = _find_chosen(function, node_name, parameters - set(given))
-    reader = _UseReader(node_name, local, chosen)
+    known = {name: text for name, text in texts.items() if name not in local}
+    known |= {n: text for n, text in find_texts(function.body).items() if n not in parameters}
+    reader = _UseReader(node_name, local, chosen, known, _find_run(function))
     for statement in function.body:
         reader.visit(statement)
     return NodeUses(
@@ -205,16 +218,36 @@ def _is_name(node: ast.AST, name: str) -> bool:
     return isinstance(node, ast.Name) and node.id == name
 
 
-def _literal(node: ast.expr | None) -> str | None:
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return node.value
-    return None
+def _find_run(function: FunctionNode) -> set[str]:
+    """Return the names of the functions inside that the function itself runs to their ends."""
+    inner = {
+        each.name: isinstance(each, ast.AsyncFunctionDef)
+        for each in function.body
+        if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+    found: set[str] = set()
+    pending: list[tuple[ast.AST, bool]] = [(each, False) for each in function.body]
+    while pending and inner:
+        node, is_awaited = pending.pop()
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found |= {node.func.id} if inner.get(node.func.id) in (False, is_awaited) else set()
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            awaits = isinstance(node, ast.Await)
+            pending += [(each, awaits) for each in ast.iter_child_nodes(node)]
+    return found & inner.keys()
 
 
 class _UseReader(ast.NodeVisitor):
     """Walks a function's body with what is known of the way to each place."""
 
-    def __init__(self, node_name: str, local: set[str], chosen: set[str]) -> None:
+    def __init__(
+        self,
+        node_name: str,
+        local: set[str],
+        chosen: set[str],
+        texts: Mapping[str, str],
+        run: Collection[str],
+    ) -> None:
         self.uses: list[NodeUse] = []
         self.passes: list[NodePass] = []
         self.open_kinds: set[UseKind] = set()
@@ -223,6 +256,8 @@ class _UseReader(ast.NodeVisitor):
         self._node = node_name
         self._local = local
         self._chosen = chosen
+        self._texts = texts
+        self._run = run
         self._doubts = 0
         self._guards = 0
         self._depth = 0
@@ -254,7 +289,7 @@ class _UseReader(ast.NodeVisitor):
 
     def visit_Subscript(self, node: ast.Subscript) -> None:
         """`node.parameters['x']`."""
-        name = _literal(node.slice)
+        name = self._text(node.slice)
         if name is not None and self._is_parameters(node.value) and _is_load(node):
             self._use('parameter', name, node.slice)
         else:
@@ -262,7 +297,7 @@ class _UseReader(ast.NodeVisitor):
 
     def visit_Compare(self, node: ast.Compare) -> None:
         """`'x' in node.parameters` uses it, and copes without."""
-        name = _literal(node.left)
+        name = self._text(node.left)
         if name is not None and len(node.ops) == 1 and self._is_parameters(node.comparators[0]):
             self._use('parameter', name, node.left, is_optional=True, has_default=True)
         else:
@@ -297,7 +332,7 @@ class _UseReader(ast.NodeVisitor):
         else:
             by_keyword = [each.value for each in node.keywords if each.arg == 'name']
             named = next(iter([*node.args, *by_keyword]), None)
-            name = _literal(named)
+            name = self._text(named)
             if name is None or named is None:
                 self.open_kinds.add(kind)
             else:
@@ -308,7 +343,7 @@ class _UseReader(ast.NodeVisitor):
             self.visit(argument)
 
     def _visit_get(self, node: ast.Call) -> None:
-        name = _literal(node.args[0]) if node.args else None
+        name = self._text(node.args[0]) if node.args else None
         if name is None:
             self.open_kinds.add('parameter')
         else:
@@ -408,18 +443,23 @@ class _UseReader(ast.NodeVisitor):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         """A function inside runs when it is called, if ever."""
-        self._visit_nested(node, node.args, node.body)
+        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
 
     def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> None:
         """See `visit_FunctionDef`."""
-        self._visit_nested(node, node.args, node.body)
+        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
 
     def visit_Lambda(self, node: ast.Lambda) -> None:
         """See `visit_FunctionDef`."""
         self._visit_nested(node, node.args, [node.body])
 
     def _visit_nested(
-        self, node: ast.AST, arguments: ast.arguments, body: Iterable[ast.AST]
+        self,
+        node: ast.AST,
+        arguments: ast.arguments,
+        body: Iterable[ast.AST],
+        *,
+        runs: bool = False,
     ) -> None:
         for default in (*arguments.defaults, *filter(None, arguments.kw_defaults)):
             self.visit(default)
@@ -427,10 +467,15 @@ class _UseReader(ast.NodeVisitor):
             self.visit(decorator)
         if any(argument.arg == self._node for argument in _arguments(arguments)):
             return
-        self._depth += 1
+        self._depth += not runs
         for inner in body:
             self.visit(inner)
-        self._depth -= 1
+        self._depth -= not runs
+
+    def _text(self, node: ast.expr | None) -> str | None:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            return node.value
+        return self._texts.get(node.id) if isinstance(node, ast.Name) else None
 
     def _is_parameters(self, node: ast.expr) -> bool:
         return (
@@ -450,13 +495,16 @@ class _UseReader(ast.NodeVisitor):
         waits: bool = False,
     ) -> None:
         end = at.end_col_offset or 0
-        line, column = at.end_lineno or 1, end - len(name) + (isinstance(at, ast.Attribute))
+        length = len(at.id) if isinstance(at, ast.Name) else len(name)
+        is_bare = isinstance(at, ast.Attribute | ast.Name)
+        line, column = at.end_lineno or 1, end - length + is_bare
         self.uses.append(
             NodeUse(
                 kind,
                 name,
                 line,
                 column,
+                length,
                 is_optional=is_optional,
                 has_default=has_default,
                 is_certain=not self._doubts,

@@ -14,11 +14,12 @@ from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.language.filling import MAX_ENTRIES, SECTIONS
 from composer.language.flattening import Flattening, Inclusion, push_defaults
 from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
+from composer.language.namespaces import mend_namespace
 from composer.language.parameters import convert_parameter_value, find_type_fault
 from composer.language.paths import PathError, resolve_path
 from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -65,8 +66,9 @@ class Includer:
                 continue
             part = self._read(instance, at, entry, stack, chain)
             if part is None:
+                instance.dropped.add(at)
                 continue
-            flattening.add(Inclusion(part, at, entry))
+            flattening.add(Inclusion(part, at, mend_namespace(instance, at, entry)))
             if self._is_too_large(instance, at):
                 break
         return instance
@@ -210,7 +212,10 @@ def _give(
                 values[name] = value
                 origins[name] = _origin(instance, path)
             elif positions.value(path) not in instance.sampled_spans:
-                faults.append(diagnostic_at(positions.value(path), 'argument-type', fault))
+                near = _nearest_choice(argument, value)
+                faults.append(
+                    diagnostic_at(positions.value(path), 'argument-type', fault, help=near)
+                )
             if fault or positions.value(path) in instance.sampled_spans:
                 unknown.append(name)
         elif path in instance.dropped or section in instance.dropped:
@@ -233,6 +238,12 @@ def _missing_argument(argument: ArgumentSpec, file: str, place: Span) -> Diagnos
     return diagnostic_at(
         place, 'missing-argument', message, help=f"give it under 'args': {argument}"
     )
+
+
+def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
+    choices = [choice for choice in argument.choices if isinstance(choice, str)]
+    near = suggest(value, choices) if isinstance(value, str) else None
+    return f"did you mean '{near}'?" if near else None
 
 
 def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.language.forms import find_meant_form
 from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
@@ -134,11 +135,13 @@ def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
 def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
     expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
     path = _path(error)
+    meant = find_meant_form(error.instance, error.validator_value)
     yield StructureFault(
         'bad-value',
         f'expected {expected}; got {_shown(error.instance)}',
         path,
         _droppable(path),
+        help=f"did you mean '{meant}'?" if meant else None,
     )
 
 
