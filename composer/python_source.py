@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import inspect
+from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
@@ -53,6 +55,7 @@ class ModuleSource:
         constants: The names that cannot be called, and what they are.
         imports: What the names that are only ever imported stand for, in full with dots; imports
             for type checkers included.
+        texts: The names that are one text for good, and that text.
         lines: Its text.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: Why its text is not Python, or `None`.
@@ -62,6 +65,7 @@ class ModuleSource:
     functions: dict[str, FunctionSource] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
@@ -89,9 +93,36 @@ def read_module(path: Path) -> ModuleSource:
         reader.functions,
         reader.constants,
         {name: full_name for name, full_name in reader.imports.items() if full_name},
+        {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
         tuple(text.decode(errors='replace').splitlines()),
         reader.is_open,
     )
+
+
+def find_texts(body: list[ast.stmt]) -> dict[str, str]:
+    """Return the names that statements give one text, and never another value, with that text."""
+    texts = {name: text for statement in body for name, text in _read_text(statement)}
+    if not texts:
+        return {}
+    nodes = [node for statement in body for node in ast.walk(statement)]
+    stored = Counter(
+        node.id
+        for node in nodes
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    )
+    return {name: text for name, text in texts.items() if stored[name] == 1}
+
+
+def _read_text(statement: ast.stmt) -> Iterator[tuple[str, str]]:
+    if isinstance(statement, ast.Assign):
+        targets: list[ast.expr] = statement.targets
+        value: ast.expr | None = statement.value
+    elif isinstance(statement, ast.AnnAssign):
+        targets, value = [statement.target], statement.value
+    else:
+        return
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        yield from ((each.id, value.value) for each in targets if isinstance(each, ast.Name))
 
 
 class _ModuleReader:

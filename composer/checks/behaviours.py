@@ -19,10 +19,17 @@ if TYPE_CHECKING:
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     """Check all behaviours by the text of their modules; none is imported."""
+    broken: set[str] = set()
     for node in context.spec.nodes.values():
         for binding in node_bindings(node):
-            if not context.was_dropped(binding.behaviour.path):
-                yield from _check_source(context, binding)
+            if context.was_dropped(binding.behaviour.path):
+                continue
+            module = context.modules.find(binding.behaviour.module)
+            if isinstance(module, MissingModule) or not module.syntax_error:
+                yield from _check_source(context, binding, module)
+            elif binding.behaviour.module not in broken:
+                broken.add(binding.behaviour.module)
+                yield _explain_broken_module(context, binding, module)
 
 
 def check_behaviour_call(
@@ -45,19 +52,26 @@ def check_behaviour_call(
         yield from _check_signature(context, binding, signature)
 
 
-def _check_source(context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
+def _explain_broken_module(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    """Say it where the module is named first: it is one fault, however many behaviours it has."""
     behaviour = binding.behaviour
-    module = context.modules.find(behaviour.module)
+    return context.at_value(
+        behaviour.path,
+        'broken-module',
+        f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
+        part=behaviour.module,
+        first=True,
+    )
+
+
+def _check_source(
+    context: CheckContext, binding: Binding, module: ModuleSource | MissingModule
+) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
     if isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
-    elif module.syntax_error:
-        yield context.at_value(
-            behaviour.path,
-            'broken-module',
-            f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
-            part=behaviour.module,
-            first=True,
-        )
     elif function := module.functions.get(behaviour.function):
         yield from check_behaviour_call(context, binding, function.kind, function.signature)
     elif not module.is_open:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language import LoadedSystem
     from composer.language.positions import DataPath
-    from composer.language.specs import SystemSpec
+    from composer.language.specs import EndSpec, SystemSpec
     from composer.module_finder import ModuleFinder
 
 
@@ -39,6 +39,17 @@ class CheckContext:
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing only because its own fault was reported already."""
         return path in self.system.dropped
+
+    def has_real_type(self, entity: EndSpec) -> bool:
+        """Return whether the type of an entity is the one that is meant, as far as can be known.
+
+        It is none that stands in for a missing one, hangs on a sample, or does not exist.
+        """
+        span = self.system.positions.value(self.inner(entity.path, 'type'))
+        stands_in = self.was_dropped((*entity.path, 'type')) or self.was_dropped(entity.path)
+        if stands_in or span in self.system.sampled:
+            return False
+        return not self.catalogue.available or self.catalogue.has(entity.type)
 
     def at_value(
         self,

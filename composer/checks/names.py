@@ -69,7 +69,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     first: dict[str, NodeSpec] = {}
     for node in context.spec.nodes.values():
         other = first.setdefault(node.full_name, node)
-        if other is not node:
+        if other is not node and not _are_misplaced(context, node, other):
             yield context.at_key(
                 node.path,
                 'duplicate-node',
@@ -77,6 +77,18 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
                 help="give one of them another name, or a 'namespace'",
                 related=[Related('the other one', context.system.positions.key(other.path))],
             )
+
+
+def _are_misplaced(context: CheckContext, *nodes: NodeSpec) -> bool:
+    """Return whether the namespace of a node is not known, for its own fault."""
+    lost = [path for path in context.system.dropped if path[-1:] == ('namespace',)]
+    sections = {path[0] for path in lost}
+    included = any(context.system.chains.get(node.path[:2]) for node in nodes)
+    return (
+        'defaults' in sections
+        or ('include' in sections and included)
+        or any((*node.path, 'namespace') in lost for node in nodes)
+    )
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:

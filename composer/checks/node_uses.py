@@ -11,6 +11,8 @@ from composer.python_source import FunctionKind, ModuleSource
 from composer.python_uses import ALL_KINDS, NodeUses, find_parameter, read_node_uses
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.language.bindings import Binding
     from composer.module_finder import ModuleFinder
     from composer.python_source import FunctionSource
@@ -88,11 +90,9 @@ class UseReader:
         given: int,
         callers: tuple[str, ...],
     ) -> BehaviourUses:
-        own = _read(source, position, given)
+        own = _read(source, position, given, module.texts)
         file = SourceFile(_displayed(module.path), module.lines)
-        found = [
-            FoundUse(use, Span(file, use.line, use.column, len(use.name))) for use in own.uses
-        ]
+        found = [FoundUse(use, Span(file, use.line, use.column, use.length)) for use in own.uses]
         open_kinds, reads_others = own.open_kinds, own.reads_others
         reaches_ros = own.reaches_ros
         for passed in own.passes:
@@ -110,7 +110,9 @@ class UseReader:
         return source is not None and source.kind in (None, FunctionKind.COROUTINE)
 
 
-def _read(source: FunctionSource, position: int | str, given: int) -> NodeUses:
+def _read(
+    source: FunctionSource, position: int | str, given: int, texts: Mapping[str, str]
+) -> NodeUses:
     """Return what a function does itself.
 
     Args:
@@ -123,7 +125,7 @@ def _read(source: FunctionSource, position: int | str, given: int) -> NodeUses:
         return NodeUses()
     arguments = source.definition.args
     positional = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
-    return read_node_uses(source.definition, name, {name, *positional[:given]})
+    return read_node_uses(source.definition, name, {name, *positional[:given]}, texts)
 
 
 def _as_passed(found: FoundUse, passed: NodePass, *, is_late: bool) -> FoundUse:

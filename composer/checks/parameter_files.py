@@ -18,7 +18,13 @@ from composer.language.parameter_overrides import find_overrides
 from composer.language.parameter_patterns import matches_pattern
 from composer.language.paths import PathError, resolve_path
 from composer.language.specs import NodeSpec
-from composer.names import did_you_mean, join_names, with_article
+from composer.names import (
+    did_you_mean,
+    find_namespace_fault,
+    find_node_name_fault,
+    join_names,
+    with_article,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -62,7 +68,8 @@ def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
     for path, file in library.files.items():
         of_file = [user for user in users if path in user.files]
         if all(user.full_name is not None for user in of_file):
-            yield from _check_names(file, of_file)
+            if not _may_miss_users(context):
+                yield from _check_names(file, of_file)
             yield from _check_entries(context, path, file, of_file)
     yield from _check_values(context, users)
 
@@ -119,6 +126,25 @@ def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
     if owner.node_name is None or owner.namespace is None:
         return None
     return join_names(owner.namespace, owner.node_name)
+
+
+def _may_miss_users(context: CheckContext) -> bool:
+    """Return whether some node uses a file, or has a name, that is not known for its own fault."""
+    lost = any(
+        path in (('defaults',), ('defaults', 'namespace'))
+        or path[:1] == ('include',)
+        or (path[:1] == ('nodes',) and (len(path) <= _DEPTH or path[_DEPTH] in _DECIDING))
+        for path in context.system.dropped
+    )
+    return lost or any(
+        find_node_name_fault(node.name) or find_namespace_fault(node.namespace)
+        for node in context.spec.nodes.values()
+    )
+
+
+# Of the paths of `nodes: {<name>: {<key>: …}}`.
+_DEPTH = 2
+_DECIDING = ('namespace', 'parameter_files')
 
 
 def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:

@@ -110,7 +110,10 @@ def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
     processes = context.spec.processes
     for waiter in _waiters(context):
         for condition in waiter.wait_for:
-            if condition.kind == 'process' and condition.name not in processes:
+            lost = context.was_dropped(('processes',)) or context.was_dropped(
+                ('processes', condition.name)
+            )
+            if condition.kind == 'process' and condition.name not in processes and not lost:
                 yield context.at_value(
                     condition.path,
                     'unknown-process',

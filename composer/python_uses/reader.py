@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import ast
 import builtins
+from typing import TYPE_CHECKING
 
 from composer.python_uses.names import is_name
 from composer.python_uses.records import ALL_KINDS, NodePass, NodeUse, UseKind
 from composer.python_uses.ways import WayReader
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
 
 _METHODS: dict[str, UseKind] = {
     'publish': 'publisher',
@@ -22,10 +26,24 @@ _OF_MAPPINGS = {'get', 'items', 'keys', 'values'}
 
 
 class UseReader(WayReader):
-    """Notes what each place does with the node, and what is known of the way there."""
+    """Notes what each place does with the node, and what is known of the way there.
 
-    def __init__(self, node_name: str, local: set[str], chosen: set[str]) -> None:
-        super().__init__(node_name, local, chosen)
+    Args:
+        texts: The names that are a text for good, as `find_texts` tells.
+
+    The others are as in `WayReader`.
+    """
+
+    def __init__(
+        self,
+        node_name: str,
+        local: set[str],
+        chosen: set[str],
+        run: Collection[str],
+        texts: Mapping[str, str],
+    ) -> None:
+        super().__init__(node_name, local, chosen, run)
+        self._texts = texts
         self.uses: list[NodeUse] = []
         self.passes: list[NodePass] = []
         self.open_kinds: set[UseKind] = set()
@@ -59,7 +77,7 @@ class UseReader(WayReader):
 
     def visit_Subscript(self, node: ast.Subscript) -> None:
         """`node.parameters['x']`."""
-        name = _literal(node.slice)
+        name = self._text(node.slice)
         if name is not None and self._is_parameters(node.value) and _is_load(node):
             self._use('parameter', name, node.slice)
         else:
@@ -67,7 +85,7 @@ class UseReader(WayReader):
 
     def visit_Compare(self, node: ast.Compare) -> None:
         """`'x' in node.parameters` uses it, and copes without."""
-        name = _literal(node.left)
+        name = self._text(node.left)
         if name is not None and len(node.ops) == 1 and self._is_parameters(node.comparators[0]):
             self._use('parameter', name, node.left, is_optional=True, has_default=True)
         else:
@@ -102,7 +120,7 @@ class UseReader(WayReader):
         else:
             by_keyword = [each.value for each in node.keywords if each.arg == 'name']
             named = next(iter([*node.args, *by_keyword]), None)
-            name = _literal(named)
+            name = self._text(named)
             if name is None or named is None:
                 self.open_kinds.add(kind)
             else:
@@ -113,7 +131,7 @@ class UseReader(WayReader):
             self.visit(argument)
 
     def _visit_get(self, node: ast.Call) -> None:
-        name = _literal(node.args[0]) if node.args else None
+        name = self._text(node.args[0]) if node.args else None
         if name is None:
             self.open_kinds.add('parameter')
         else:
@@ -143,6 +161,11 @@ class UseReader(WayReader):
             else:
                 self.visit(value)
 
+    def _text(self, node: ast.expr | None) -> str | None:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            return node.value
+        return self._texts.get(node.id) if isinstance(node, ast.Name) else None
+
     def _is_parameters(self, node: ast.expr) -> bool:
         return (
             isinstance(node, ast.Attribute)
@@ -161,13 +184,16 @@ class UseReader(WayReader):
         waits: bool = False,
     ) -> None:
         end = at.end_col_offset or 0
-        line, column = at.end_lineno or 1, end - len(name) + (isinstance(at, ast.Attribute))
+        length = len(at.id) if isinstance(at, ast.Name) else len(name)
+        is_bare = isinstance(at, ast.Attribute | ast.Name)
+        line, column = at.end_lineno or 1, end - length + is_bare
         self.uses.append(
             NodeUse(
                 kind,
                 name,
                 line,
                 column,
+                length,
                 is_optional=is_optional,
                 has_default=has_default,
                 is_certain=not self.doubts,
@@ -175,12 +201,6 @@ class UseReader(WayReader):
                 waits=waits and not self.depth,
             )
         )
-
-
-def _literal(node: ast.expr | None) -> str | None:
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return node.value
-    return None
 
 
 def _is_load(node: ast.Subscript) -> bool:

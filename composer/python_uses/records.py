@@ -18,6 +18,7 @@ class NodeUse:
 
     Attributes:
         line: Of the name, counted from 1; `column` likewise.
+        length: Of what stands for the name there: itself, or that of a constant.
         is_optional: Whether it copes without: `node.parameters.get('x')`.
         has_default: Whether it brings a value for that case.
         is_certain: Whether it hangs on nothing that a file can decide: on parameters, the node's
@@ -30,6 +31,7 @@ class NodeUse:
     name: str
     line: int
     column: int
+    length: int
     is_optional: bool = False
     has_default: bool = False
     is_certain: bool = True

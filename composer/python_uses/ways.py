@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from composer.python_uses.names import hangs_on, list_arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
+
+    from composer.python_source import FunctionNode
 
 # What `node.publish('x')` raises for a name that is not declared, and what catches it.
 _CATCHING = {
@@ -31,6 +33,7 @@ class WayReader(ast.NodeVisitor):
         node_name: The parameter that is the node.
         local: All names of the function itself.
         chosen: Those of them whose values a file decides.
+        run: The functions inside that the function runs to their ends (`find_run`).
 
     Attributes:
         doubts: On how many decisions of a file the place hangs.
@@ -38,13 +41,16 @@ class WayReader(ast.NodeVisitor):
         depth: How many functions inside the function it lies in.
     """
 
-    def __init__(self, node_name: str, local: set[str], chosen: set[str]) -> None:
+    def __init__(
+        self, node_name: str, local: set[str], chosen: set[str], run: Collection[str]
+    ) -> None:
         self.node_name = node_name
         self.local = local
         self.doubts = 0
         self.guards = 0
         self.depth = 0
         self._chosen = chosen
+        self._run = run
 
     def visit_If(self, node: ast.If) -> None:
         """What a file decides makes both branches, and all behind a jump, uncertain."""
@@ -95,11 +101,11 @@ class WayReader(ast.NodeVisitor):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         """A function inside runs when it is called, if ever."""
-        self._visit_nested(node, node.args, node.body)
+        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
 
     def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> None:
         """See `visit_FunctionDef`."""
-        self._visit_nested(node, node.args, node.body)
+        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
 
     def visit_Lambda(self, node: ast.Lambda) -> None:
         """See `visit_FunctionDef`."""
@@ -127,7 +133,12 @@ class WayReader(ast.NodeVisitor):
         return not names & self.local
 
     def _visit_nested(
-        self, node: ast.AST, arguments: ast.arguments, body: Iterable[ast.AST]
+        self,
+        node: ast.AST,
+        arguments: ast.arguments,
+        body: Iterable[ast.AST],
+        *,
+        runs: bool = False,
     ) -> None:
         for default in (*arguments.defaults, *filter(None, arguments.kw_defaults)):
             self.visit(default)
@@ -135,10 +146,29 @@ class WayReader(ast.NodeVisitor):
             self.visit(decorator)
         if any(argument.arg == self.node_name for argument in list_arguments(arguments)):
             return
-        self.depth += 1
+        self.depth += not runs
         for inner in body:
             self.visit(inner)
-        self.depth -= 1
+        self.depth -= not runs
+
+
+def find_run(function: FunctionNode) -> set[str]:
+    """Return the names of the functions inside that the function itself runs to their ends."""
+    inner = {
+        each.name: isinstance(each, ast.AsyncFunctionDef)
+        for each in function.body
+        if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+    found: set[str] = set()
+    pending: list[tuple[ast.AST, bool]] = [(each, False) for each in function.body]
+    while pending and inner:
+        node, is_awaited = pending.pop()
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found |= {node.func.id} if inner.get(node.func.id) in (False, is_awaited) else set()
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            awaits = isinstance(node, ast.Await)
+            pending += [(each, awaits) for each in ast.iter_child_nodes(node)]
+    return found & inner.keys()
 
 
 def _catches(handler: ast.ExceptHandler) -> bool:
