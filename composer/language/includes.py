@@ -16,7 +16,7 @@ from composer.language.flattening import Flattening, Inclusion, push_defaults
 from composer.language.instances import ArgumentValues, Instance, read_instance, sample_values
 from composer.language.namespaces import mend_namespace
 from composer.language.parameters import convert_parameter_value, find_type_fault
-from composer.language.paths import PathError, resolve_path
+from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.profiles import drop_unknown_profiles
 from composer.language.source import Document, read_document
 from composer.names import did_you_mean, suggest
@@ -158,16 +158,8 @@ def _locate(text: str, place: Span) -> Path:
     path = resolve_path(text, place.source.folder)
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{_shown(path)}'"
-        raise PathError(message, help=_help_for(path))
+        raise PathError(message, help=did_you_mean(path.name, list_neighbours(path), 'there are'))
     return path
-
-
-def _help_for(path: Path) -> str | None:
-    try:
-        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
-    except OSError:
-        return None
-    return did_you_mean(path.name, names, 'there are')
 
 
 def _shown(path: Path) -> str:
