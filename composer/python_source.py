@@ -7,11 +7,13 @@ import inspect
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
+
+from composer.diagnostics import SourceFile, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
@@ -59,6 +61,7 @@ class ModuleSource:
         lines: Its text.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: Why its text is not Python, or `None`.
+        error_line: Where, counted from 1, if that can be told.
     """
 
     path: Path | None
@@ -69,21 +72,33 @@ class ModuleSource:
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
+    error_line: int | None = None
+
+    def place_of(self, line: int) -> Span:
+        """Return the span of a line, with the path as a user in the current folder writes it."""
+        path, here = self.path or Path(), Path.cwd()
+        name = str(path.relative_to(here) if path.is_relative_to(here) else path)
+        source = SourceFile(name, self.lines)
+        text = source.line(line)
+        return Span(source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
 
 
 def read_module(path: Path) -> ModuleSource:
     """Return what the text of a module says; nothing of it is run."""
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
+    lines: tuple[str, ...] = ()
     try:
         text = path.read_bytes()
+        lines = tuple(text.decode(errors='replace').splitlines())
         tree = ast.parse(text, str(path))
         # The compiler finds what the parser lets pass: `return` outside a function, say.
         compile(tree, str(path), 'exec', dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = getattr(error, 'lineno', None)
         where = f'{path}:{line}' if line else str(path)
-        return ModuleSource(path, syntax_error=f'{where}: {getattr(error, "msg", error)}')
+        reason = f'{where}: {getattr(error, "msg", error)}'
+        return ModuleSource(path, lines=lines, syntax_error=reason, error_line=line)
     except OSError as error:
         return ModuleSource(path, syntax_error=f'{path}: {error.strerror}')
     reader = _ModuleReader()
@@ -94,7 +109,7 @@ def read_module(path: Path) -> ModuleSource:
         reader.constants,
         {name: full_name for name, full_name in reader.imports.items() if full_name},
         {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
-        tuple(text.decode(errors='replace').splitlines()),
+        lines,
         reader.is_open,
     )
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from composer.language.specs import NodeSpec
-from composer.names import expand_name, find_topic_name_fault, remap_name
+from composer.names import expand_name, find_namespace_fault, find_topic_name_fault, remap_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,6 +70,12 @@ class Endpoint:
     def qos(self) -> QosSpec | None:
         """The QoS as declared; actions have none."""
         return getattr(self.entity, 'qos', None)
+
+    @property
+    def written(self) -> str:
+        """The name of the channel as the file has it."""
+        kind = 'topic' if self.noun in ('publisher', 'subscription') else self.noun.split()[0]
+        return str(getattr(self.entity, kind))
 
     def __str__(self) -> str:
         """Return `publisher 'scan' of node 'lidar'`."""
@@ -136,7 +142,7 @@ def build_graph(context: CheckContext) -> Graph:
             continue
         name = full_name(node, kind, getattr(entity, kind))
         # Without a type, too, it would be a reason to say nothing of any other.
-        if _is_misnamed(getattr(entity, kind), name) and context.has_real_type(entity):
+        if _is_doubtful(context, node, getattr(entity, kind)) and context.has_real_type(entity):
             unsure.add((kind, provides, entity.type))
         channel = channels.setdefault((kind, name), Channel(kind, name))
         ends = channel.providers if provides else channel.users
@@ -157,6 +163,15 @@ def _entities(spec: SystemSpec) -> Iterator[tuple[NodeSpec, str, EndSpec]]:
 def _is_bad_rule(rule: tuple[str, str]) -> bool:
     source, target = rule
     return _is_misnamed(source.rpartition('://')[2], target)
+
+
+def _is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
+    """Return whether a name, or the namespace that this node alone has, is none of ROS."""
+    if _is_misnamed(name):
+        return True
+    own = (*node.path, 'namespace')
+    is_own = own in context.system.positions.values
+    return is_own and find_namespace_fault(node.namespace) is not None
 
 
 def _is_misnamed(*names: str) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Related
+from composer.language.specs import NodeSpec
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath
-    from composer.language.specs import NodeSpec
+    from composer.language.specs import ProcessSpec
 
 _RULE = 'bad-name'
 
@@ -47,7 +48,7 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
             fault = find_parameter_name_fault(parameter.name)
             if fault:
                 yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {fault}")
-        yield from _check_remap(context, node)
+        yield from check_rules(context, node)
 
 
 def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
@@ -140,7 +141,8 @@ def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> st
     return fault and f"in full it is '{longest}', and {fault}"
 
 
-def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator[Diagnostic]:
+    """Check the remapping rules of a node, or of the nodes in a process."""
     for source, target in node.remap:
         path = (*node.path, 'remap', source)
         if source.startswith('__'):
@@ -155,7 +157,9 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = _find_rule_name_fault(name) or _find_full_name_fault(node, name)
+            fault = _find_rule_name_fault(name)
+            if fault is None and isinstance(node, NodeSpec):
+                fault = _find_full_name_fault(node, name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import SourceFile, Span
+from composer.diagnostics import Span
 from composer.python_source import FunctionKind, ModuleSource
 from composer.python_uses import ALL_KINDS, NodeUses, find_parameter, read_node_uses
 
@@ -91,7 +90,7 @@ class UseReader:
         callers: tuple[str, ...],
     ) -> BehaviourUses:
         own = _read(source, position, given, module.texts)
-        file = SourceFile(_displayed(module.path), module.lines)
+        file = module.place_of(1).source
         found = [FoundUse(use, Span(file, use.line, use.column, use.length)) for use in own.uses]
         open_kinds, reads_others = own.open_kinds, own.reads_others
         reaches_ros = own.reaches_ros
@@ -137,10 +136,3 @@ def _as_passed(found: FoundUse, passed: NodePass, *, is_late: bool) -> FoundUse:
         waits=use.waits and passed.waits and not is_late,
     )
     return FoundUse(use, found.place)
-
-
-def _displayed(path: Path | None) -> str:
-    """Return a path as a user would write it who is in the current folder."""
-    if path is not None and path.is_relative_to(Path.cwd()):
-        return str(path.relative_to(Path.cwd()))
-    return str(path)

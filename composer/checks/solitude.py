@@ -64,7 +64,8 @@ def _is_alone(graph: Graph, channel: Channel) -> bool:
     if channel.name in _OF_ROS or channel.name in graph.of_ros or _OF_ACTIONS in channel.name:
         return False
     # A name with a fault is a finding of its own.
-    return find_topic_name_fault(channel.name) is None and not graph.may_have_more(channel)
+    is_misnamed = any(find_topic_name_fault(end.written) for end in channel.ends)
+    return not is_misnamed and not graph.may_have_more(channel)
 
 
 def _explain(

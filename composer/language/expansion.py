@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
+# What a variable without a list of values stands for.
+_SAMPLE = 1
 
 
 def has_conditions(data: Mapping[str, Any]) -> bool:
@@ -146,12 +148,12 @@ class _Expansion:
             self._report(at, f"'{name}' cannot stand in an expression as a name")
             return
         values = filler.fill(foreach[name], at)
-        if at in self._filled.failed:
-            return
-        if not isinstance(values, list):
-            self._report(at, f"'{name}' takes a list of values, not {values!r}")
-            return
         is_sample = filler.is_sampled(at)
+        if not isinstance(values, list):
+            if at not in self._filled.failed:
+                self._report(at, f"'{name}' takes a list of values, not {values!r}")
+            # So that the rest of the entry is read once, too.
+            values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:
             inner = filler.within(name, value, _FOREACH, is_sample=is_sample)

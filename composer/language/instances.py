@@ -113,7 +113,7 @@ def read_instance(
     faults = list(_check_arguments(declared, positions))
     sound = not faults and is_sound({'args': document.data.get('args', {})})
     # Values are not held against declarations that are wrong: those have to be mended first.
-    given = give_values(declared) if sound else sample_values(declared, all_of_them=True)
+    given = give_values(declared) if sound else sample_values(declared)
     filled = _fill(written, given, positions)
     data, dropped, structure_faults = check_structure(
         filled.data, positions, filled.failed, filled.sampled
@@ -134,18 +134,18 @@ def read_instance(
     )
 
 
-def sample_values(
-    declared: Mapping[str, ArgumentSpec], *, all_of_them: bool = False
-) -> ArgumentValues:
-    """Return values to check a file with.
-
-    Args:
-        all_of_them: Whether defaults are only samples, too.
-    """
+def sample_values(declared: Mapping[str, ArgumentSpec]) -> ArgumentValues:
+    """Return values to check a file with: defaults, and samples where none is known."""
     return ArgumentValues(
         {name: argument.sample for name, argument in declared.items()},
-        {name for name, argument in declared.items() if all_of_them or argument.is_open},
+        {name for name, argument in declared.items() if _is_unknown(argument)},
     )
+
+
+def _is_unknown(argument: ArgumentSpec) -> bool:
+    """Return whether the declaration says no value, or none that can be meant."""
+    is_wrong = isinstance(argument.default, list | dict) or any(find_argument_faults(argument))
+    return argument.is_open or is_wrong
 
 
 def _fill(data: dict[str, Any], given: ArgumentValues, positions: SourceMap) -> FilledDocument:
