@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import faulthandler
 import io
 import platform
 import re
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _SET_HELP = 'Change a value, as in nodes.talker.log_level=debug; null removes it.'
+_LONGEST_EXIT_SEC = 10.0
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
 
 
@@ -29,7 +32,11 @@ def main() -> None:
         # File names and YAML may hold what the terminal's encoding has no character for.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    # What behaviours leave behind, as threads or functions of `atexit`, does not keep the process.
+    with suppress(RuntimeError, ValueError):
+        faulthandler.dump_traceback_later(_LONGEST_EXIT_SEC, exit=True)
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from contextlib import suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rclpy.context import Context
@@ -64,7 +64,7 @@ class System:
     ) -> None:
         self._spec = spec
         self.has_ended = False
-        self._begun = time.monotonic()
+        self._begun = monotonic()
         self._exit_code: int = ExitCode.DONE
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._stop_signal = StopSignal()
@@ -153,7 +153,7 @@ class System:
             raise
         if self.stop_requested:
             return
-        elapsed = time.monotonic() - self._begun
+        elapsed = monotonic() - self._begun
         parts = describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._open(prompt)
