@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import faulthandler
 import io
 import platform
 import sys
 import traceback
+from contextlib import suppress
 
 import click
 
 from composer.command_line import cli
 from composer.errors import ComposerError, ExitCode, UsageError
+
+_LONGEST_EXIT_SEC = 10.0
 
 
 def main() -> None:
@@ -19,7 +23,11 @@ def main() -> None:
         # File names and YAML may hold what the terminal's encoding has no character for.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    # What behaviours leave behind, as threads or functions of `atexit`, does not keep the process.
+    with suppress(RuntimeError, ValueError):
+        faulthandler.dump_traceback_later(_LONGEST_EXIT_SEC, exit=True)
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from collections import deque
 from functools import partial
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
@@ -84,14 +84,14 @@ class ActionClient:
             SystemStoppingError: A stop was requested while it waited.
         """
         message = self._convert(payload)
-        begun = time.monotonic()
+        begun = monotonic()
         waits = self._node.waits
         if not waits.until_true(self._client.server_is_ready, timeout_sec):
             text = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
             raise ActionNotAvailableError(text)
         goal = Goal(self._name, self._node)
         future = self._client.send_goal_async(message, partial(self._take_feedback, goal))
-        left = None if timeout_sec is None else max(begun + timeout_sec - time.monotonic(), 0.0)
+        left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
         if not waits.until_done(future, left):
             text = f"the server of '{self._name}' did not answer within {timeout_sec:g} s"
             raise GoalTimeoutError(text)

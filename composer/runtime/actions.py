@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import aclosing, closing
 from functools import partial
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -148,9 +148,9 @@ class _Server(ActionServer):
 
     def _end_cancelled(self, goal: Any) -> None:
         """Give a goal that was cancelled while it waited its final state."""
-        deadline = time.monotonic() + _CANCEL_SEC
-        while not goal.is_cancel_requested and time.monotonic() < deadline:
-            time.sleep(_POLL_SEC)
+        deadline = monotonic() + _CANCEL_SEC
+        while not goal.is_cancel_requested and monotonic() < deadline:
+            sleep(_POLL_SEC)
         _start(goal)
 
 

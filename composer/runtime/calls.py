@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 from dataclasses import dataclass
+from threading import get_ident
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.python_source import FunctionKind
@@ -39,7 +40,7 @@ class Pace:
 
     def resumed(self) -> None:
         """Measure from now on."""
-        self.resumed_ns = time.monotonic_ns()
+        self.resumed_ns = monotonic_ns()
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +230,7 @@ class BehaviourCall:
         ledger, entries, tokens = self._ledger, self._ledger.entries, self._ledger.tokens
         add_time = None if self._times is None else self._times.add
         admits, pace = self._admits, self._pace
-        now_ns, get_thread = time.monotonic_ns, threading.get_ident
+        now_ns, get_thread = monotonic_ns, get_ident
 
         def call_behaviour(*arguments: Any) -> bool:
             token = next(tokens)
@@ -262,7 +263,7 @@ class BehaviourCall:
         ledger, times = self._ledger, self._times
 
         async def await_behaviour(*arguments: Any) -> None:
-            begun_ns = time.monotonic_ns()
+            begun_ns = monotonic_ns()
             token = None
             try:
                 # A wrapper of an async function may itself be a plain one, and raise at once.
@@ -285,7 +286,7 @@ class BehaviourCall:
                 self._failed(self._owner, error)
             finally:
                 if times is not None:
-                    times.add(time.monotonic_ns() - begun_ns)
+                    times.add(monotonic_ns() - begun_ns)
                 if token is not None:
                     ledger.end(token)
 

@@ -17,7 +17,7 @@ def summarize(error: BaseException) -> str:
         text = str(error)
     except BaseException as fault:  # noqa: BLE001 - it is the behaviour's code that runs here
         text = f'<its __str__ raised {type(fault).__name__}>'
-    return _cut(f'{type(error).__name__}: {text}', _LONGEST_SUMMARY)
+    return f'{_cut(type(error).__name__, _LONGEST_SUMMARY)}: {_cut(text, _LONGEST_SUMMARY)}'
 
 
 def represent(error: BaseException) -> str:
@@ -49,6 +49,15 @@ def format_error(error: BaseException) -> str:
         text = f'(its traceback cannot be shown: {type(fault).__name__})'
     help_text = _help_of(error)
     return _cut(text, _LONGEST_TRACEBACK) + (f'\nhelp: {help_text}' if help_text else '')
+
+
+def format_fault(error: BaseException) -> str:
+    """Return its traceback with all frames, for what is no error of a behaviour; never raise."""
+    try:
+        text = ''.join(traceback.format_exception(error)).rstrip()
+    except BaseException:  # noqa: BLE001 - as above
+        text = represent(error)
+    return _cut(text, _LONGEST_TRACEBACK)
 
 
 def _help_of(error: BaseException) -> str | None:
@@ -83,8 +92,12 @@ def _drop_own_frames(described: traceback.TracebackException, error: BaseExcepti
 
 
 def _cut(text: str, longest: int) -> str:
-    if len(text) <= longest:
-        return text
-    half = longest // 2
-    left_out = len(text) - 2 * half
-    return f'{text[:half]} … ({left_out} characters) … {text[-half:]}'
+    """Return no more than `longest` characters of it, all of which ROS can log.
+
+    What it cannot is in the names of files that are not in UTF-8, for example.
+    """
+    if len(text) > longest:
+        half = longest // 2
+        left_out = len(text) - 2 * half
+        text = f'{text[:half]} … ({left_out} characters) … {text[-half:]}'
+    return text.encode(errors='backslashreplace').decode().replace('\0', '\\x00')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
+from time import monotonic
 
 
 class ServiceFailures:
@@ -16,7 +16,7 @@ class ServiceFailures:
     def note(self, service: str) -> None:
         """Note that a request got no response because the behaviour raised."""
         with self._lock:
-            self._times[service] = time.monotonic()
+            self._times[service] = monotonic()
 
     def since(self, service: str, begun: float) -> bool:
         """Return whether the service failed after `begun`, a time of `time.monotonic`."""

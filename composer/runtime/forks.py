@@ -31,7 +31,8 @@ _forking = threading.local()
 coroutine_codes: set[CodeType] = set()
 
 
-def _flush() -> None:
+def flush_output() -> None:
+    """Write what is in the buffers, if there is still somewhere to write it."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(Exception):
             stream.flush()
@@ -39,7 +40,7 @@ def _flush() -> None:
 
 def _prepare() -> None:
     # What is in the buffers is the system's to write, not the child's again.
-    _flush()
+    flush_output()
     # A signal that comes to the child before it has its own handlers must wait for them.
     _forking.mask = signal.pthread_sigmask(signal.SIG_BLOCK, signal_handlers)
 

@@ -6,7 +6,7 @@ themselves only note when they began.
 
 from __future__ import annotations
 
-import time
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from composer.runtime.calls import RunningCall
@@ -50,7 +50,7 @@ class HangLimit:
 
     def is_exceeded_by(self, call: RunningCall) -> bool:
         """Return whether a call has been running for too long."""
-        ran_sec = (time.monotonic_ns() - call.since_ns) * 1e-9
+        ran_sec = (monotonic_ns() - call.since_ns) * 1e-9
         return self.after_sec is not None and ran_sec >= self.after_sec
 
     def look_at(self, ledger: CallLedger, token: int, call: RunningCall) -> None:
@@ -60,7 +60,7 @@ class HangLimit:
             if call.since_ns > reported_ns:
                 self._tell_end(token, 'went on', call.since_ns)
             return
-        now_ns = time.monotonic_ns()
+        now_ns = monotonic_ns()
         ran_sec = (now_ns - call.since_ns) * 1e-9
         if self.after_sec is None or ran_sec < self.after_sec:
             return
@@ -77,7 +77,7 @@ class HangLimit:
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
             f'it is at\n{call.format_stack()}'
         )
-        ledger.hear_end(token, lambda: self._tell_end(token, 'returned', time.monotonic_ns()))
+        ledger.hear_end(token, lambda: self._tell_end(token, 'returned', monotonic_ns()))
 
     def _tell_end(self, token: int, what: str, now_ns: int) -> None:
         reported_ns = self._reported.pop(token, None)

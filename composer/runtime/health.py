@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from composer.runtime.error_texts import summarize
 from composer.runtime.executor import Missed
 
 if TYPE_CHECKING:
@@ -146,10 +147,7 @@ class EntityHealth:
     def note_error(self, error: BaseException) -> None:
         """Note that a call raised."""
         self._errors += 1
-        try:
-            self._last_error = f'{type(error).__name__}: {error}'
-        except BaseException:  # noqa: BLE001 - it is the behaviour's code that runs here
-            self._last_error = type(error).__name__
+        self._last_error = summarize(error)
 
     def follow(self, look: Callable[[], Missed]) -> None:
         """From now on, ask here for what it has missed: its node was built, or built anew."""

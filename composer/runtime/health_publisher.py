@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import threading
-import time
+from time import monotonic, monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node as RosNode
@@ -95,11 +95,11 @@ class HealthPublisher:
         from composer.runtime.health_status import StatusWriter
 
         writers: dict[tuple[str, str], StatusWriter] = {}
-        begun = time.monotonic()
+        begun = monotonic()
         due = begun + self._period_sec
-        while not self._ended.wait(max(0.0, due - time.monotonic())):
-            now = time.monotonic()
-            reports = self._board.reports(now - begun, self._overdue(), time.monotonic_ns())
+        while not self._ended.wait(max(0.0, due - monotonic())):
+            now = monotonic()
+            reports = self._board.reports(now - begun, self._overdue(), monotonic_ns())
             begun = now
             due = max(due, now) + self._period_sec
             if not self._publisher.get_subscription_count():

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
+import os
 import sys
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import signal
@@ -42,8 +44,17 @@ def arm(stop_sec: float, nodes: int) -> None:
         stop_sec: What it may take.
     """
     after_sec = stop_sec + _MARGIN_SEC + nodes * _MARGIN_PER_NODE_SEC
-    if sys.__stderr__ is not None:
-        faulthandler.dump_traceback_later(after_sec, exit=True, file=sys.__stderr__)
+    stderr: Any = sys.__stderr__
+    try:
+        faulthandler.dump_traceback_later(after_sec, exit=True, file=stderr)
+    except (AttributeError, RuntimeError, ValueError):
+        # There is no standard error, or a behaviour has closed it.
+        faulthandler.dump_traceback_later(after_sec, exit=True, file=_open_nothing())
+
+
+@cache
+def _open_nothing() -> int:
+    return os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
 
 
 def disarm() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import queue
 import signal
 import threading
-import time
 from dataclasses import dataclass, field
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class ProcessRun:
     process: LiveProcess
     heard: threading.Event
     code: int | None = None
-    begun: float = field(default_factory=time.monotonic)
+    begun: float = field(default_factory=monotonic)
     answer: queue.SimpleQueue[dict[str, Any]] = field(default_factory=queue.SimpleQueue)
     gone: threading.Event = field(default_factory=threading.Event)
     was_killed: bool = False

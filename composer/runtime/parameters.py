@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import suppress
 from functools import partial
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import (
@@ -156,4 +156,4 @@ class _BehaviourHearing:
         with suppress(StopIteration):
             while True:
                 coroutine.send(None)
-                time.sleep(_POLL_SEC)
+                sleep(_POLL_SEC)

@@ -11,8 +11,8 @@ import signal
 import sys
 import tempfile
 import threading
-import time
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
@@ -100,14 +100,14 @@ class Processes:
         tools = self._tools
         if tools is None:
             return True
-        begun = time.monotonic()
+        begun = monotonic()
         for run in runs:
             spec = run.process.spec
             number = signal.Signals[spec.stop_signal]
             tools.guardian.stop(run.number, number, self._timeout_of(spec))
         for run in runs:
             patience = self._timeout_of(run.process.spec) + _KILLED_SEC
-            run.gone.wait(max(0.0, begun + patience - time.monotonic()))
+            run.gone.wait(max(0.0, begun + patience - monotonic()))
         tools.close()
         for watcher in self._watchers:
             watcher.join()
@@ -197,7 +197,7 @@ class Processes:
                 system_logger.error(f"process '{name}' is required: the system ends")
                 self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
             return
-        delay_sec = next_delay_sec(process, time.monotonic() - run.begun)
+        delay_sec = next_delay_sec(process, monotonic() - run.begun)
         _tell(f'{end}; it is started again in {delay_sec:g} s', is_fault=code != 0)
         if not self._stopping.wait(delay_sec):
             self._restart(process)

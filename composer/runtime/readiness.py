@@ -6,9 +6,9 @@ The graph is only asked while somebody waits, at most twenty times a second.
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import dataclass
 from functools import partial
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from composer.errors import StartError
@@ -84,11 +84,11 @@ class Readiness:
             return
         node = create_graph_node(self._context)
         woken = threading.Event()
-        begun = time.monotonic()
+        begun = monotonic()
         try:
             with stop.waking(woken.set):
                 while pending and not stop.is_set:
-                    started = self._start_ready(pending, node, time.monotonic() - begun, stop)
+                    started = self._start_ready(pending, node, monotonic() - begun, stop)
                     pending = [each for each in pending if each not in started]
                     if not started:
                         woken.wait(_POLL_SEC)

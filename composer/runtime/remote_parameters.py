@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.srv import GetParameters, SetParameters
@@ -80,13 +80,13 @@ class RemoteParameters:
             advice = "write 'parameter_services: true' where the file declares it"
             raise ServiceNotAvailableError(message, help=advice)
         client = self._client(kind, join_names(full_name, service))
-        begun = time.monotonic()
+        begun = monotonic()
         waits = self._node.waits
         if not waits.until_true(client.service_is_ready, timeout_sec):
             message = f"no node '{full_name}' with parameter services appeared in time"
             raise ServiceNotAvailableError(message)
         future = client.call_async(request)
-        left = None if timeout_sec is None else max(begun + timeout_sec - time.monotonic(), 0.0)
+        left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
         try:
             if not waits.until_done(future, left):
                 message = f"node '{full_name}' did not answer in time"

@@ -34,8 +34,8 @@ would let a value win that a file gives to this node by name, or one whose type 
 from __future__ import annotations
 
 import threading
-import time
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
@@ -113,12 +113,12 @@ class ComposedRosNode(Node):
         until it wakes up. A new node of that name would meanwhile get no publisher of `/rosout`,
         and lose the next one with the end of the old node.
         """
-        deadline = time.monotonic() + timeout_sec
+        deadline = monotonic() + timeout_sec
         name = self.get_logger().name
         while has_rosout_publisher(name):
-            if time.monotonic() > deadline:
+            if monotonic() > deadline:
                 return False
-            time.sleep(_POLL_SEC)
+            sleep(_POLL_SEC)
         return True
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -53,9 +52,12 @@ def run_system(
         with _stopped_by_signals(system, spec):
             try:
                 system.start()
-                system.wait()
-                last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
-                code, ended = system.stop()
+                try:
+                    system.wait()
+                finally:
+                    # Also if something was thrown into this thread.
+                    last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
+                    code, ended = system.stop()
             except ComposerError as error:
                 if system.has_ended:
                     raise
@@ -100,6 +102,5 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
 
 
 def _leave(code: int) -> None:
-    sys.stdout.flush()
-    sys.stderr.flush()
+    forks.flush_output()
     os._exit(code)

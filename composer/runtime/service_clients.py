@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import (
@@ -54,7 +54,7 @@ class ServiceClient:
             SystemStoppingError: A stop was requested while it waited.
         """
         request = self._convert(payload)
-        begun = time.monotonic()
+        begun = monotonic()
         waits = self._node.waits
         if not waits.until_true(self._client.service_is_ready, timeout_sec):
             raise self._not_available(timeout_sec)
@@ -69,7 +69,7 @@ class ServiceClient:
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
         """As `call`, without holding a thread while it waits."""
         request = self._convert(payload)
-        begun = time.monotonic()
+        begun = monotonic()
         waits = self._node.coroutine_waits
         if not await waits.until_true(self._client.service_is_ready, timeout_sec):
             raise self._not_available(timeout_sec)
@@ -104,4 +104,4 @@ class ServiceClient:
 def _remaining(timeout_sec: float | None, begun: float) -> float | None:
     if timeout_sec is None:
         return None
-    return max(begun + timeout_sec - time.monotonic(), 0.0)
+    return max(begun + timeout_sec - monotonic(), 0.0)

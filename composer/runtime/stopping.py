@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import suppress
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
@@ -31,23 +31,17 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     Returns:
         Whether all of them ended in time; the stacks of those that did not have been logged.
     """
-    deadline = time.monotonic() + timeout_sec
+    deadline = monotonic() + timeout_sec
     for node in nodes:
         node.gate.is_open = False
         _cancel_timers(node)
-    ends = [
-        threading.Thread(target=_end, args=(node, timeout_sec), daemon=True)
-        for node in reversed(nodes)
-        if _has_an_end(node)
-    ]
-    for thread in ends:
-        thread.start()
-    for thread in ends:
-        thread.join(max(deadline - time.monotonic(), 0.0))
+    ends = [_End(node, timeout_sec) for node in reversed(nodes) if _has_an_end(node)]
+    for end in ends:
+        end.wait(deadline)
     for node in nodes:
         node.gate.close()
     ended = [_wait_until_idle(node, deadline) for node in nodes]
-    return all(ended) and not any(thread.is_alive() for thread in ends)
+    return all(ended) and all(end.is_over for end in ends)
 
 
 def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) -> bool:
@@ -83,11 +77,45 @@ def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) 
 def _wait_for(
     wait: Callable[[float], bool], timeout_sec: float, gives_up: Callable[[], bool]
 ) -> bool:
-    deadline = time.monotonic() + timeout_sec
+    deadline = monotonic() + timeout_sec
     while not wait(_POLL_SEC):
-        if gives_up() or time.monotonic() > deadline:
+        if gives_up() or monotonic() > deadline:
             return False
     return True
+
+
+class _End:
+    """The end of one node, in a thread of its own if there can be one.
+
+    There is none where the process has all threads that it may have, and one that begins may
+    break off at once, at a tracing function that a behaviour has set for all of them.
+
+    Attributes:
+        is_over: Whether it has come to its end.
+    """
+
+    def __init__(self, node: LiveNode, timeout_sec: float) -> None:
+        self.is_over = False
+        self._has_begun = False
+        self._node = node
+        self._timeout_sec = timeout_sec
+        self._thread: threading.Thread | None = None
+        with suppress(RuntimeError):
+            thread = threading.Thread(target=self._run, daemon=True)
+            thread.start()
+            self._thread = thread
+
+    def wait(self, deadline: float) -> None:
+        """Wait until it is over, or until a time of `time.monotonic`."""
+        if self._thread is not None:
+            self._thread.join(max(deadline - monotonic(), 0.0))
+        if self._thread is None or not (self._has_begun or self._thread.is_alive()):
+            self._run()
+
+    def _run(self) -> None:
+        self._has_begun = True
+        _end(self._node, self._timeout_sec)
+        self.is_over = True
 
 
 def _has_an_end(node: LiveNode) -> bool:
@@ -123,7 +151,7 @@ def _end(node: LiveNode, timeout_sec: float) -> None:
 
 
 def _wait_until_idle(node: LiveNode, deadline: float) -> bool:
-    if node.ledger.wait_until_idle(max(deadline - time.monotonic(), 0.0)):
+    if node.ledger.wait_until_idle(max(deadline - monotonic(), 0.0)):
         return True
     for call in node.ledger.running():
         system_logger.error(

@@ -6,8 +6,8 @@ A behaviour that raises never takes another node down; this is the only place th
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import dataclass, field
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.runtime.error_texts import format_error, place_of, summarize
@@ -57,7 +57,7 @@ class ErrorReporter:
         summary = summarize(error)
         with self._lock:
             count = self._counts.setdefault((owner, place), _ErrorCount())
-            now = time.monotonic()
+            now = monotonic()
             if now - count.last_line < _QUIET_SEC:
                 count.unsaid += 1
                 count.last_error = summary
@@ -76,7 +76,7 @@ class ErrorReporter:
     def flush_old(self) -> None:
         """Say the counts for which the time has come, though no error came that brought them."""
         if self._counts:
-            self._flush(time.monotonic() - _QUIET_SEC)
+            self._flush(monotonic() - _QUIET_SEC)
 
     def flush(self) -> None:
         """Say the counts that have not been said yet."""
@@ -88,7 +88,7 @@ class ErrorReporter:
             for (owner, place), count in self._counts.items():
                 if count.unsaid and count.last_line <= before:
                     texts.append(_say_count(owner, place, count))
-                    count.last_line = time.monotonic()
+                    count.last_line = monotonic()
         for text in texts:
             self._log(text)
 
@@ -109,7 +109,7 @@ class Backoff:
 
     def next_delay_sec(self) -> float:
         """Return the delay before the restart that is due now."""
-        now = time.monotonic()
+        now = monotonic()
         if now - self._last_restart > _RECOVERED_SEC:
             self._delay_sec = _FIRST_BACKOFF_SEC
         delay = self._delay_sec

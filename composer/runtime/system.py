@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode
@@ -59,7 +59,7 @@ class System:
     ) -> None:
         self._spec = spec
         self.has_ended = False
-        self._begun = time.monotonic()
+        self._begun = monotonic()
         self._stop_request = StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
@@ -152,7 +152,7 @@ class System:
             raise
         if self.stop_requested:
             return
-        elapsed = time.monotonic() - self._begun
+        elapsed = monotonic() - self._begun
         parts = describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)

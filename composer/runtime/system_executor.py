@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import threading
-import time
-import traceback
 import warnings
+from contextlib import suppress
+from time import sleep
 from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
+from composer.runtime.error_texts import format_fault
 from composer.runtime.executor import ComposerExecutor
 from composer.runtime.ownership import release
 
@@ -72,7 +73,9 @@ class SystemExecutor(ComposerExecutor):
     def report(self, error: BaseException) -> None:
         """Log what a callback raised; where others spin, rclpy's executors end by it."""
         if not isinstance(error, NoResponseError):
-            self._log(''.join(traceback.format_exception(error)).rstrip())
+            # What comes out of here would end the thread that spins.
+            with suppress(Exception):
+                self._log(format_fault(error))
 
     def _keep_spinning(self) -> None:
         self._spin_on()
@@ -87,4 +90,4 @@ class SystemExecutor(ComposerExecutor):
                 return
             except BaseException as error:  # noqa: BLE001 - one fault must not end all nodes
                 self.report(error)
-                time.sleep(_PAUSE_SEC)
+                sleep(_PAUSE_SEC)

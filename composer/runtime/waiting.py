@@ -8,9 +8,9 @@ nothing except `on_stop` waits for somebody who is not there yet.
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import contextmanager
 from functools import partial
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from rclpy.task import Future
@@ -117,14 +117,14 @@ class ThreadWaits:
         """
         if condition():
             return True
-        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        deadline = None if timeout_sec is None else monotonic() + timeout_sec
         with self.make_room():
             while not condition():
                 if self.gives_up():
                     raise stopping_error()
-                if deadline is not None and time.monotonic() >= deadline:
+                if deadline is not None and monotonic() >= deadline:
                     return False
-                time.sleep(_POLL_SEC)
+                sleep(_POLL_SEC)
         return True
 
     def ended(self, future: Future, wake: Callable[..., None], *, yields: bool) -> bool:
@@ -185,11 +185,11 @@ class CoroutineWaits:
 
     async def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
         """See `ThreadWaits.until_true`."""
-        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        deadline = None if timeout_sec is None else monotonic() + timeout_sec
         while not condition():
             if self._threads.gives_up():
                 raise stopping_error()
-            if deadline is not None and time.monotonic() >= deadline:
+            if deadline is not None and monotonic() >= deadline:
                 return False
             pause: Future = Future()
             await self._or_later(_POLL_SEC, partial(pause.set_result, None), pause)

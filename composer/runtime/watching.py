@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-import traceback
 from typing import TYPE_CHECKING
 
+from composer.runtime.error_texts import format_fault
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -42,8 +42,8 @@ class Watch:
         while not self._ended.wait(self._pause_sec):
             try:
                 self._look()
-            except Exception:  # noqa: BLE001 - one fault must not leave the system unwatched
-                self._report(traceback.format_exc())
+            except Exception as error:  # noqa: BLE001 - one fault must not leave the system unwatched
+                self._report(format_fault(error))
 
     def _report(self, fault: str) -> None:
         if fault not in self._faults:

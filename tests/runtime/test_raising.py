@@ -21,6 +21,7 @@ ERRORS = {
     'generator_exit': 'GeneratorExit: gone',
     'mute': 'Mute: <its __str__ raised ZeroDivisionError>',
     'group': 'ExceptionGroup: two (2 sub-exceptions)',
+    'unsayable': r'ValueError: \udcff\x00',
 }
 
 CODE = """
@@ -46,6 +47,8 @@ def fail(error):
         raise Mute
     if error == 'group':
         raise ExceptionGroup('two', [ValueError(1), KeyError(2)])
+    if error == 'unsayable':
+        raise ValueError(chr(0xdcff) + chr(0))
 
 def plain(node, *_, error):
     fail(error)
@@ -211,7 +214,9 @@ def test_on_start_and_on_stop_may_raise_anything(compose, kind):
     child = compose(f'version: 1\nnodes:\n{stops}\n  last: {start}\n', CODE)
 
     assert child.wait() == 1
-    assert child.matching('[ERROR] [last]: on_start (system.yaml:10) raised SystemExit: 5')
+    assert child.matching(
+        f'[ERROR] [last]: on_start (system.yaml:{len(ERRORS) + 3}) raised SystemExit: 5'
+    )
     assert child.lines[-1] == "error: node 'last': on_start raised SystemExit(5)"
     for index, (name, error) in enumerate(ERRORS.items()):
         assert child.matching(

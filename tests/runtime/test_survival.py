@@ -4,6 +4,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from std_msgs.msg import Int32
+
 pytestmark = pytest.mark.ros
 
 CODE = """
@@ -116,3 +118,101 @@ def test_the_other_nodes_of_a_system_miss_not_one_message(compose):
         assert child.matching(f"[ERROR] [bad_{name}]: timer 't' ")
     for name in ('hang', 'hang_in_c'):
         assert child.matching(f"node 'bad_{name}': timer 't' did not end in time; it is at")
+
+
+SABOTAGE = """
+import ctypes
+import sys
+import threading
+import time
+from pathlib import Path
+
+def say(node):
+    node.logger.info('stopping')
+
+def fail(*_):
+    raise ValueError('sabotage')
+
+def refuse(thread):
+    raise RuntimeError("can't start new thread")
+
+def close_output():
+    sys.stdout.close()
+    sys.stderr.close()
+
+def stop_clocks():
+    time.monotonic = time.monotonic_ns = time.time = lambda: 0
+    time.sleep = fail
+
+def trace():
+    threading.settrace(fail)
+
+def refuse_threads():
+    threading.Thread.start = refuse
+
+def throw_into_main():
+    main = ctypes.c_ulong(threading.main_thread().ident)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(main, ctypes.py_object(ZeroDivisionError))
+
+def harm(node, how):
+    if not Path('harmed').exists():
+        Path('harmed').touch()
+        globals()[how]()
+"""
+
+
+@pytest.mark.parametrize(
+    ('how', 'exit_code'),
+    [
+        ('close_output', 0),
+        ('stop_clocks', 0),
+        ('trace', 0),
+        ('refuse_threads', 0),
+        ('throw_into_main', 3),
+    ],
+)
+def test_what_harms_the_whole_process_keeps_no_other_node_from_running_and_stopping(
+    compose, peer, wait_for, how, exit_code
+):
+    text = f"""
+        version: 1
+        nodes:
+          good:
+            publishers: {{numbers: std_msgs/msg/Int32}}
+            timers: {{tell: {{period: 0.02, publish: numbers, message: 1}}}}
+            on_stop: parts:say
+          bad:
+            timers: {{harm: {{period: 0.2, behaviour: 'parts:harm', with: {{how: {how}}}}}}}
+    """
+    numbers = peer.listen(Int32, 'numbers')
+    child = compose(text, SABOTAGE)
+    wait_for((compose.folder / 'harmed').exists, 'the harm')
+    if exit_code == 0:
+        heard = len(numbers)
+        wait_for(lambda: len(numbers) > heard + 5, 'what the other node says')
+        assert child.stop() == 0
+    else:
+        assert child.wait() == exit_code
+    assert child.matching('[good]: stopping')
+
+
+def test_what_behaviours_leave_to_the_end_of_the_process_does_not_keep_it_alive(compose):
+    text = """
+        version: 1
+        nodes: {bad: {on_start: 'parts:stay'}}
+    """
+    code = """
+        import atexit
+        import threading
+
+        from composer import cli
+
+        def stay(node):
+            cli._LONGEST_EXIT_SEC = 0.5
+            atexit.register(threading.Event().wait)
+    """
+    child = compose(text, code)
+    child.wait_until_ready()
+
+    assert child.stop() == 1
+    assert child.matching('Timeout (0:00:00.5')

@@ -3,8 +3,8 @@
 import heapq
 import itertools
 import threading
-import time
 from collections import deque
+from time import monotonic_ns
 from typing import Any, Protocol
 
 from rclpy.clock import JumpThreshold, ROSClock
@@ -79,7 +79,7 @@ class Alarms:
         self.timer.read()
         due = []
         with self._lock:
-            now = time.monotonic_ns()
+            now = monotonic_ns()
             while self._heap and self._heap[0][0] <= now:
                 deadline_ns, _number, alarm = heapq.heappop(self._heap)
                 if alarm.deadline_ns == deadline_ns:
@@ -128,7 +128,7 @@ class Delay:
         self.deadline_ns: int | None = None
         self._alarms = alarms
         self._function = function
-        alarms.set(self, time.monotonic_ns() + int(delay_sec * 1e9))
+        alarms.set(self, monotonic_ns() + int(delay_sec * 1e9))
 
     def cancel(self) -> None:
         """Call it no more, if that is yet to come."""

@@ -10,10 +10,12 @@ A callback that was slow last time makes the standby lead at once. Spare threads
 
 import _thread
 import math
+import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from threading import get_ident
+from time import monotonic, sleep
 from typing import Any
 
 from composer.runtime.executor.forks import end_child
@@ -37,8 +39,8 @@ class Worker:
         _thread.start_new_thread(self._work, ())  # Unlike `Thread.start`, it does not wait.
 
     def _work(self) -> None:
-        threading.current_thread().name = 'executor-worker'
         with self._crew.enlisted(self):
+            _introduce_thread()
             while self.job is not None:
                 self.job(self)
                 if self._crew.is_inherited:
@@ -47,15 +49,39 @@ class Worker:
                 self._crew.rest(self)
 
 
-class Crew:
-    """The threads of one executor."""
+def _introduce_thread() -> None:
+    """Be named, traced and profiled as a `threading.Thread` is, if nothing stands against it."""
+    with suppress(BaseException):
+        threading.current_thread().name = 'executor-worker'
+        if (profile := threading.getprofile()) is not None:
+            sys.setprofile(profile)
+        if (trace := threading.gettrace()) is not None:
+            sys.settrace(trace)
+        # Python drops a hook that raises, which it may do here; debuggers' and coverage's do not.
+        _be_called()
 
-    def __init__(self, lead: Callable[[Worker], None]) -> None:
+
+def _be_called() -> None:
+    """Do nothing."""
+
+
+class Crew:
+    """The threads of one executor.
+
+    Args:
+        lead: The job of the leader.
+        report: Takes what was thrown into a thread from outside while it had no callback.
+    """
+
+    def __init__(
+        self, lead: Callable[[Worker], None], report: Callable[[BaseException], None]
+    ) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
         self.is_inherited = False
         self._standby: Worker | None = None
         self._lead = lead
+        self._report = report
         self._timer = TimerFd(blocking=True)
         self._armed = False
         self._put_off_at = 0.0
@@ -67,26 +93,31 @@ class Crew:
 
     @contextmanager
     def enlisted(self, worker: Worker) -> Iterator[None]:
-        """Know `worker`, which is the present thread, meanwhile."""
-        ident = threading.get_ident()
+        """Know `worker`, which is the present thread, meanwhile; it ends whatever it raises."""
+        ident = get_ident()
         self._workers[ident] = worker
+        lost: BaseException | None = None
         try:
             yield
-        finally:
-            # Python 3.11 keeps what it knows of such a thread for ever.
-            threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
-            with self.lock:
-                del self._workers[ident]
-                self._hired -= 1
+        except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
+            lost = error
+        # Python 3.11 keeps what it knows of such a thread for ever.
+        threading._active.pop(ident, None)  # type: ignore[attr-defined]  # noqa: SLF001
+        with self.lock:
+            del self._workers[ident]
+            self._hired -= 1
+            self._strike_off(worker)
+        if lost is not None:
+            self._report(lost)
 
     def is_in_callback(self) -> bool:
         """Tell whether this is called from a callback that a worker runs."""
-        worker = self._workers.get(threading.get_ident())
+        worker = self._workers.get(get_ident())
         return worker is not None and worker.busy_since > 0
 
     def step_aside(self) -> bool:
         """Lead no more if the present thread does; returns whether it runs a callback at all."""
-        worker = self._workers.get(threading.get_ident())
+        worker = self._workers.get(get_ident())
         if worker is None or not worker.busy_since:
             return False
         self.pass_on(worker)
@@ -122,7 +153,7 @@ class Crew:
 
     def begin(self, worker: Worker) -> None:
         """Note that `worker` begins a callback."""
-        worker.busy_since = now = time.monotonic()
+        worker.busy_since = now = monotonic()
         if not self._armed or now > self._put_off_at:
             self._armed = True
             self._put_off_at = now + PATIENCE_SEC / 2
@@ -141,7 +172,10 @@ class Crew:
         Wait until it does, lest it has to wrest the interpreter from a computing callback.
         """
         with self.lock:
-            if self.leader is not worker or self._standby is None:
+            if self.leader is not worker:
+                return
+            self._appoint_standby()
+            if self._standby is None:
                 return
             self.leader = self._standby
             self._handover = handover = threading.Lock()
@@ -157,10 +191,10 @@ class Crew:
                 spare.called.release()
             self._spares.clear()
             self._wake_standby()
-        deadline = time.monotonic() + timeout_sec
-        mine = int(threading.get_ident() in self._workers)
-        while self._hired > mine and time.monotonic() < deadline:
-            time.sleep(_POLL_SEC)
+        deadline = monotonic() + timeout_sec
+        mine = int(get_ident() in self._workers)
+        while self._hired > mine and monotonic() < deadline:
+            sleep(_POLL_SEC)
         with self.lock:
             if not self._hired:
                 self._timer.close()
@@ -170,7 +204,7 @@ class Crew:
         self.is_inherited = True
         self.leader = self._standby = None
         self._spares.clear()
-        mine = threading.get_ident()
+        mine = get_ident()
         self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
         self._hired = len(self._workers)
         self._timer.leave_to_parent()
@@ -203,9 +237,20 @@ class Crew:
         self._hired += 1
         return worker
 
+    def _strike_off(self, worker: Worker) -> None:
+        """Let nobody wait for what `worker` would do; whoever spins again musters others."""
+        if worker in self._spares:
+            self._spares.remove(worker)
+        if self._standby is worker:
+            self._standby = None
+        if self.leader is worker:
+            self.leader = None
+
     def _appoint_standby(self) -> None:
-        if self._standby is None:
-            self._standby = self._call(self._stand_by)
+        if self._standby is None and not self._dismissed:
+            # A process that has all threads it may have goes on with a leader alone.
+            with suppress(RuntimeError):
+                self._standby = self._call(self._stand_by)
 
     def _wake_standby(self) -> None:
         if self._standby is not None:
@@ -236,7 +281,7 @@ class Crew:
         since = leader.busy_since
         if not since:
             return False
-        left = PATIENCE_SEC - (time.monotonic() - since)
+        left = PATIENCE_SEC - (monotonic() - since)
         if left <= 0:
             return True
         self._armed = True

@@ -1,10 +1,10 @@
 """The parts of one executor together, and what spinning is."""
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from time import monotonic
 from typing import Any
 
 from rclpy.exceptions import InvalidHandle
@@ -49,7 +49,7 @@ class Engine:
         desk.look_again = self.lane.look_again
         desk.peek = self.polling.peek
         self.registry = Registry(desk, self.lane)
-        self.crew = Crew(Leader(self).lead)
+        self.crew = Crew(Leader(self).lead, self.report)
         self._sessions = 0
         self._loners = 0
         self._session_lock = threading.Lock()
@@ -109,7 +109,7 @@ class Engine:
         self.raise_error()
         if timeout_sec is not None and timeout_sec < 0:
             timeout_sec = None
-        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        deadline = None if timeout_sec is None else monotonic() + timeout_sec
         self.lane.enter()
         with self._session_lock:
             self._loners += 1
@@ -117,7 +117,7 @@ class Engine:
             if self.is_alive():
                 self._look_at_everything()
             while self.is_alive() and not condition() and not self._run_one():
-                left = None if deadline is None else deadline - time.monotonic()
+                left = None if deadline is None else deadline - monotonic()
                 if left is not None and left <= 0:
                     break
                 self._await_work(left)
@@ -247,10 +247,10 @@ class _Attempt:
         self._over.acquire()
 
     def __call__(self, worker: Worker) -> None:
-        worker.busy_since = begin = time.monotonic()
+        worker.busy_since = begin = monotonic()
         self._ran = self._execute(self._work)
         worker.busy_since = 0.0
-        self._work.slow = time.monotonic() - begin > PATIENCE_SEC
+        self._work.slow = monotonic() - begin > PATIENCE_SEC
         self._over.release()
 
     def has_run(self, timeout_sec: float) -> bool:

@@ -9,9 +9,9 @@ set until it has run.
 """
 
 import threading
-import time
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
+from time import monotonic
 from typing import Any
 
 from rclpy.event_handler import EventHandler
@@ -53,14 +53,14 @@ class _EventWatch:
 
     def sweep(self, wait_set: Any) -> None:
         """Announce the events that have happened."""
-        begin = time.monotonic()
+        begin = monotonic()
         for source in tuple(self.sources):
             if source.entity._executor_event or not source.alive:  # noqa: SLF001
                 continue
             with suppress(InvalidHandle), source.entity:
                 if look(source.entity, wait_set):
                     source.announce()
-        end = time.monotonic()
+        end = monotonic()
         self._soonest = end + _REST_SHARE * (end - begin)
         pause = min(self._most_sec, max(self._least_sec, (end - begin) / self._share))
         if self._hurried:
@@ -71,7 +71,7 @@ class _EventWatch:
     def hurry(self) -> None:
         """Look a few times in the next moments, without spending more than a tenth of the time."""
         self._hurried = _HURRIED_TIMES
-        self.due = min(self.due, max(time.monotonic() + _SOON_SEC, self._soonest))
+        self.due = min(self.due, max(monotonic() + _SOON_SEC, self._soonest))
 
 
 class Lane:
@@ -204,10 +204,8 @@ class Lane:
                 if not unused:
                     unused_since = None
                 elif unused_since is None:
-                    unused_since = time.monotonic()
-                over = unused_since is not None and (
-                    time.monotonic() - unused_since >= _UNUSED_SEC
-                )
+                    unused_since = monotonic()
+                over = unused_since is not None and (monotonic() - unused_since >= _UNUSED_SEC)
                 if self._closing or over or not self._engine.context_is_valid():
                     self._thread = None
                     self._wait_set = None
@@ -240,7 +238,7 @@ class Lane:
                 if _is_ready(source, wait_set, triggered):
                     source.announce()
             if self._sigint_guard.handle.pointer in triggered:
-                self._signalled_until = time.monotonic() + _SIGNAL_SEC
+                self._signalled_until = monotonic() + _SIGNAL_SEC
                 self._engine.wake()
 
     def _filled(self, sources: Iterable[PolledSource]) -> Any:
@@ -276,7 +274,7 @@ class Lane:
         return wait_set
 
     def _timeout(self, most_sec: float | None) -> float | None:
-        now = time.monotonic()
+        now = monotonic()
         dues = [watch.due for watch in (self._given, self._default) if watch.sources]
         if most_sec is not None:
             dues.append(now + most_sec)
@@ -285,7 +283,7 @@ class Lane:
         return max(0.0, min(dues) - now) if dues else None
 
     def _sweep(self) -> None:
-        now = time.monotonic()
+        now = monotonic()
         due = [w for w in (self._given, self._default) if w.sources and w.due <= now]
         if not due:
             return

@@ -1,6 +1,6 @@
 """What the leader does: it looks for events and executes what is ready."""
 
-import time
+from time import monotonic
 from typing import Any
 
 from composer.runtime.executor.alarms import Delay
@@ -52,7 +52,7 @@ class Leader:
             if work.slow:
                 crew.pass_on(me)
             execute(work)
-            work.slow = time.monotonic() - me.busy_since > PATIENCE_SEC
+            work.slow = monotonic() - me.busy_since > PATIENCE_SEC
             me.busy_since = 0.0
             if crew.leader is not me:
                 return False

@@ -1,8 +1,8 @@
 """What threads that wait for a condition are told by others."""
 
 import threading
-import time
 from collections.abc import Callable
+from time import monotonic
 
 
 class News:
@@ -20,14 +20,12 @@ class News:
 
     def wait_for(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
         """Wait until `condition()`, which is called with no lock held; False after the timeout."""
-        deadline = (
-            None if timeout_sec is None or timeout_sec < 0 else (time.monotonic() + timeout_sec)
-        )
+        deadline = None if timeout_sec is None or timeout_sec < 0 else (monotonic() + timeout_sec)
         while True:
             seen = self._count
             if condition():
                 return True
-            left = None if deadline is None else deadline - time.monotonic()
+            left = None if deadline is None else deadline - monotonic()
             if left is not None and left <= 0:
                 return False
             with self._changed:

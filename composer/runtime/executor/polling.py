@@ -1,7 +1,7 @@
 """How threads wait for events, and how they are told of more."""
 
-import threading
 from collections.abc import Callable
+from threading import get_ident
 
 from composer.runtime.executor.alarms import Alarms
 from composer.runtime.executor.signals import SignalBoard
@@ -33,7 +33,7 @@ class Polling:
 
     def wait_if(self, has_nothing: Callable[[], bool], timeout_sec: float | None) -> None:
         """Wait for signals; whoever makes `has_nothing()` false meanwhile calls `wake`."""
-        me = threading.get_ident()
+        me = get_ident()
         self._pollers.add(me)
         try:
             arrived = self.board.wait(timeout_sec if has_nothing() else 0)

@@ -14,8 +14,8 @@ Fast DDS takes the event's lock before the reader's, and delivery takes them the
 
 import ctypes
 import os
-import time
 from collections.abc import Callable
+from time import monotonic_ns
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -236,7 +236,7 @@ class TimerFd:
 
     def after_ns(self, delay_ns: int) -> None:
         """Expire once in `delay_ns`."""
-        self.set_ns(time.monotonic_ns() + delay_ns)
+        self.set_ns(monotonic_ns() + delay_ns)
 
     def read(self) -> None:
         """Wait for the expiry (if blocking) and forget it."""

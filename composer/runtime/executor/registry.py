@@ -1,8 +1,8 @@
 """Which entities there are: the nodes' lists compared with what is listened to."""
 
 import threading
-import time
 from contextlib import suppress
+from time import monotonic
 from typing import Any
 
 from rclpy.action.client import ActionClient
@@ -51,19 +51,19 @@ class Registry:
 
     def rest_sec(self) -> float:
         """How long the next comparison should wait, so that comparing stays a small part."""
-        return max(0.0, self._rest_until - time.monotonic())
+        return max(0.0, self._rest_until - monotonic())
 
     def refresh(self, nodes: list[Any]) -> None:
         """Listen to all entities of `nodes` and to nothing else."""
         with self._lock:
             self.is_stale = False
-            begin = time.monotonic()
+            begin = monotonic()
             changed = False
             for node in self._nodes.keys() - set(nodes):
                 self.drop(node)
             for node in nodes:
                 changed |= self._refresh_node(node)
-            end = time.monotonic()
+            end = monotonic()
             self._rest_until = end + _REST_SHARE * (end - begin)
         if changed:
             self._lane.look_soon()

@@ -1,7 +1,7 @@
 """Timers as sources: due at a deadline, or when their ROS clock gets there."""
 
 import threading
-import time
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
@@ -72,7 +72,7 @@ class TimerSource(Source):
         elif watch is not None and watch.clock.ros_time_is_active:
             self.desk.alarms.set(self, None)
         else:
-            self.desk.alarms.set(self, time.monotonic_ns() + until_ns)
+            self.desk.alarms.set(self, monotonic_ns() + until_ns)
 
     def run(self) -> Any:
         """See the base class."""
@@ -96,7 +96,7 @@ class TimerSource(Source):
 
     def _call(self, handle: Any) -> bool:
         """Tell rcl that the tick begins, and count what was missed; False if it is not due."""
-        begin_ns = time.monotonic_ns()
+        begin_ns = monotonic_ns()
         until_ns = handle.time_until_next_call()
         if until_ns is None or until_ns > 0:
             return False
@@ -108,6 +108,6 @@ class TimerSource(Source):
         if -until_ns > LATE_LEAST_NS and -until_ns > LATE_SHARE * period_ns:
             self._late += 1
         # rcl sets the next tick to the next multiple of the period that has not passed.
-        advance_ns = next_until_ns - until_ns + time.monotonic_ns() - begin_ns
+        advance_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
         self._skipped += max(0, advance_ns // period_ns - 1)
         return True

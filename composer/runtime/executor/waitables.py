@@ -1,8 +1,8 @@
 """Actions, guard conditions and other waitables as sources."""
 
 import threading
-import time
 from contextlib import ExitStack, suppress
+from time import monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
@@ -38,7 +38,7 @@ class _WaitablePart:
         if until_ns is None:
             desk.alarms.set(self, None)
         else:
-            desk.alarms.set(self, time.monotonic_ns() + max(0, until_ns))
+            desk.alarms.set(self, monotonic_ns() + max(0, until_ns))
 
 
 class ActionSource(Source):
