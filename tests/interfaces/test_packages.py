@@ -146,6 +146,15 @@ exec g++ "$@"
 """
 
 
+@pytest.fixture
+def slow_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let compilers write `started`, and wait for `go`."""
+    compiler = tmp_path / 'slow'
+    compiler.write_text(SLOW_COMPILER.format(folder=tmp_path))
+    compiler.chmod(0o755)
+    monkeypatch.setenv('CXX', str(compiler))
+
+
 def is_locked(path: Path) -> bool:
     with path.open() as lock:
         try:
@@ -155,16 +164,12 @@ def is_locked(path: Path) -> bool:
         return False
 
 
+@pytest.mark.usefixtures('slow_compiler')
 def test_a_killed_build_is_locked_until_its_compilers_are_done(
     start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    compiler = tmp_path / 'slow'
-    compiler.write_text(SLOW_COMPILER.format(folder=tmp_path))
-    compiler.chmod(0o755)
-    monkeypatch.setenv('CXX', str(compiler))
     start = start_provider(tmp_path, write_definitions(ROBOTS))
     assert kill_in_mid_build(start, tmp_path, '../../started')
     [lock] = (tmp_path / 'composer' / 'interfaces').glob('*.lock')
@@ -173,17 +178,18 @@ def test_a_killed_build_is_locked_until_its_compilers_are_done(
     wait_for(lambda: not is_locked(lock))
 
 
+@pytest.mark.usefixtures('slow_compiler')
 def test_an_interrupted_build_leaves_nothing(
     start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
 ) -> None:
     start = start_provider(tmp_path, write_definitions(ROBOTS))
-    cache = tmp_path / 'composer' / 'interfaces'
-    wait_for(lambda: any(cache.glob('robots-*.partial/build/units')))
+    wait_for((tmp_path / 'started').exists)
     start.send_signal(signal.SIGINT)
     start.communicate(timeout=60)
     assert start.returncode != 0
+    cache = tmp_path / 'composer' / 'interfaces'
     assert [path.suffix for path in cache.iterdir()] == ['.lock']
 
 
