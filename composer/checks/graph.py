@@ -224,7 +224,8 @@ class _Doubts:
             path[1]
             for path in self._paths
             if path[:1] == ('nodes',) and len(path) > 1 and _moves_node(path)
-        } | {
+        }
+        self._misruled = {
             node.path[-1]
             for node in context.spec.nodes.values()
             if any(map(_is_bad_rule, node.remap))
@@ -233,7 +234,9 @@ class _Doubts:
 
     def about_name(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
         """Return whether an entity may have another name than it seems."""
-        if not (self._paths or self._nodes):
+        if kind in _SCHEMES and node.path[-1] in self._misruled:
+            return True
+        if not self._paths:
             return False
         return (
             self._all

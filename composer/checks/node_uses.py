@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Span
+from composer.module_finder import MissingModule
 from composer.python_source import FunctionKind, ModuleSource
 from composer.python_uses import ALL_KINDS, NodeUses, find_parameter, read_node_uses
 
@@ -46,6 +47,8 @@ class BehaviourUses:
 
 
 _UNKNOWN = BehaviourUses()
+# Of a behaviour that is nowhere, which is a finding of its own.
+_MISSING = BehaviourUses(reaches_ros=False)
 
 
 class UseReader:
@@ -64,6 +67,8 @@ class UseReader:
     def _uses(
         self, module: object, name: str, position: int | str, given: int, callers: tuple[str, ...]
     ) -> BehaviourUses:
+        if isinstance(module, MissingModule):
+            return _MISSING
         if not isinstance(module, ModuleSource) or module.path is None:
             return _UNKNOWN
         if name in module.imports:
@@ -74,6 +79,8 @@ class UseReader:
             return self._uses(self._modules.find(home), original, position, given, callers)
         source = module.functions.get(name)
         caller = f'{module.path}:{name}'
+        if source is None and not (module.is_open or name in module.constants):
+            return _MISSING
         if source is None or len(callers) > _DEEPEST:
             return _UNKNOWN
         key = (caller, position, given)

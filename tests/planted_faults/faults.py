@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from composer.language.qos import BUILTIN_PROFILES
 from tests.fuzz.mutations import misspell
 from tests.planted_faults.systems import RANGES
+from tests.planted_faults.wiring import OTHER_ENDS, WIRING_FAULTS, find_partners
 
 ENTITIES = ('publishers', 'subscriptions', 'timers', 'services', 'service_clients', 'actions', 'action_clients')  # fmt: skip
 CHOICES = ('clock', 'concurrency', 'log_level', 'on_error', 'reliability', 'durability', 'history')
@@ -29,12 +30,12 @@ def plant(chance, system, count):
         place = _choose(chance, system, kind, taken)
         if place is None:
             continue
-        publisher = _publisher(system, place)
+        involved = _involved(system, place)
         found = FAULTS[kind][1](chance, system, place)
         if found:
             planted.append(Planted(kind, *found))
             # One fault in a part, so that none hides another.
-            taken |= {place[:4], found[1][:4], publisher}
+            taken |= {place[:4], found[1][:4], *involved}
         if len(planted) == count:
             break
     return planted
@@ -45,17 +46,32 @@ def _choose(chance, system, kind, taken):
         path
         for path in _paths(system.data)
         if FAULTS[kind][0](path, _at(system, path))
-        and not any(path[: len(each)] == each or each[: len(path)] == path for each in taken)
-        and _publisher(system, path) not in taken
+        and not _overlap(taken, {path})
+        and not _overlap(taken, _involved(system, path))
     ]
     return chance.choice(places) if places else None
 
 
-def _publisher(system, path):
-    """Return the path of the publisher that a payload is held against, else of the part."""
-    if not is_payload(path, True):
-        return path[:4]
-    return (*path[:2], 'publishers', _at(system, (*path[:4], 'publish')))
+def _overlap(some, others):
+    """Return whether a path of some lies within one of the others, or the other way round."""
+    return any(
+        one[: len(other)] == other or other[: len(one)] == one for one in some for other in others
+    )
+
+
+def _involved(system, path):
+    """Return the paths of a part, of its other ends, and of what its payload is held against."""
+    ends = {path[:4], *find_partners(system, path)}
+    ends |= {
+        users
+        for section in OTHER_ENDS
+        for node, content in system.data['nodes'].items()
+        for name in content.get(section, ())
+        if path[:4] in find_partners(system, users := ('nodes', node, section, name))
+    }
+    if is_payload(path, True):
+        ends.add((*path[:2], 'publishers', _at(system, (*path[:4], 'publish'))))
+    return ends
 
 
 def _paths(data, path=()):
@@ -384,6 +400,7 @@ FAULTS: dict[str, tuple[Callable, Callable]] = {
     'signature': (is_behaviour, plant_signature),
     'generator': (is_behaviour, plant_generator),
     'constant': (is_behaviour, plant_constant),
+    **WIRING_FAULTS,
     'duplicate key': (lambda path, _: is_entity(path), plant_duplicate),
     'bad name': (
         lambda path, _: (

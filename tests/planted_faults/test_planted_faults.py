@@ -7,9 +7,9 @@ from tests.planted_faults.measurement import measure
 
 @pytest.mark.ros
 def test_planted_faults_are_found_in_their_lines_with_the_right_suggestions(tmp_path):
-    score = measure(tmp_path, seed=3, systems=80)
+    score = measure(tmp_path, seed=3, systems=120)
     assert score.false_alarms == []
     assert score.extra == []
     assert score.missed == []
-    assert score.planted.total() > 100
-    assert len(score.planted) == 18
+    assert score.planted.total() > 200
+    assert len(score.planted) == 27
