@@ -36,6 +36,7 @@ clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache
 
 .venv/ready: pyproject.toml Makefile
-	$(PYTHON) -m venv $(VENV_FLAGS) .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	@echo 'setting up .venv, which takes about a minute'
+	@$(PYTHON) -m venv $(VENV_FLAGS) .venv
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
 	@touch $@

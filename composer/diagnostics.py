@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from typing import Unpack
 
 
 # Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
@@ -128,21 +129,29 @@ class Diagnostic:
         return self.file, line, column, self.rule, self.message
 
 
-def diagnostic_at(
-    span: Span,
-    rule: str,
-    message: str,
-    *,
-    help: str | None = None,  # noqa: A002 - the word that the finding shows
-    severity: Severity = Severity.ERROR,
-    related: Iterable[Related] = (),
-) -> Diagnostic:
+class Remarks(TypedDict, total=False):
+    """What a finding says beside its message; see `Diagnostic`."""
+
+    help: str | None
+    severity: Severity
+    related: Iterable[Related]
+
+
+def diagnostic_at(span: Span, rule: str, message: str, **remarks: Unpack[Remarks]) -> Diagnostic:
     """Return a finding whose file is that of its span.
 
     What it quotes of the file may be enormous, or no text that a terminal can show.
     """
-    message, help = _printable(message), help and _printable(help)  # noqa: A001
-    return Diagnostic(rule, message, span.source.name, span, severity, help, tuple(related))
+    advice = remarks.get('help')
+    return Diagnostic(
+        rule,
+        _printable(message),
+        span.source.name,
+        span,
+        remarks.get('severity', Severity.ERROR),
+        advice and _printable(advice),
+        tuple(remarks.get('related', ())),
+    )
 
 
 def _printable(text: str) -> str:

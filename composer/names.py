@@ -24,6 +24,7 @@ MAX_TOPIC_NAME = 247
 _MOST_OPTIONS = 2000
 _LONGEST_WORD = 255
 _PRESELECTED = 100
+_LONGEST_COMPARED = 64
 
 _NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
 _TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
@@ -49,8 +50,30 @@ def _find_nearest(word: str, choices: tuple[str, ...]) -> str | None:
     lowered = _lower(choices)
     if word in lowered:
         return lowered[word]
-    close = difflib.get_close_matches(word, _preselect(word, lowered), n=1, cutoff=0.6)
-    return lowered[close[0]] if close else None
+    close = difflib.get_close_matches(word, _preselect(word, lowered), n=5, cutoff=0.6)
+    if not close:
+        return None
+    # Of those that look alike, the one that takes the fewest slips; else the first.
+    return lowered[min(close, key=lambda option: count_slips(word, option))]
+
+
+def count_slips(word: str, other: str) -> int:
+    """Return how many slips of the pen make one word of another.
+
+    A slip is a letter too many, one too few, another one, or two that are swapped (the distance
+    of Damerau and Levenshtein, in its restricted form). Of long words only the beginning counts.
+    """
+    word, other = word[:_LONGEST_COMPARED], other[:_LONGEST_COMPARED]
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for i, letter in enumerate(word):
+        above, before, row = before, row, [i + 1]
+        for j, wanted in enumerate(other):
+            cost = min(before[j + 1] + 1, row[j] + 1, before[j] + (letter != wanted))
+            if i and j and (letter, word[i - 1]) == (other[j - 1], wanted):
+                cost = min(cost, above[j - 1] + 1)
+            row.append(cost)
+    return row[-1]
 
 
 @lru_cache(maxsize=64)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import ast
 import inspect
+from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.diagnostics import SourceFile, Span
+
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterator
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
@@ -53,33 +57,48 @@ class ModuleSource:
         constants: The names that cannot be called, and what they are.
         imports: What the names that are only ever imported stand for, in full with dots; imports
             for type checkers included.
+        texts: The names that are one text for good, and that text.
         lines: Its text.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: Why its text is not Python, or `None`.
+        error_line: Where, counted from 1, if that can be told.
     """
 
     path: Path | None
     functions: dict[str, FunctionSource] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
+    error_line: int | None = None
+
+    def place_of(self, line: int) -> Span:
+        """Return the span of a line, with the path as a user in the current folder writes it."""
+        path, here = self.path or Path(), Path.cwd()
+        name = str(path.relative_to(here) if path.is_relative_to(here) else path)
+        source = SourceFile(name, self.lines)
+        text = source.line(line)
+        return Span(source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
 
 
 def read_module(path: Path) -> ModuleSource:
     """Return what the text of a module says; nothing of it is run."""
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
+    lines: tuple[str, ...] = ()
     try:
         text = path.read_bytes()
+        lines = tuple(text.decode(errors='replace').splitlines())
         tree = ast.parse(text, str(path))
         # The compiler finds what the parser lets pass: `return` outside a function, say.
         compile(tree, str(path), 'exec', dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = getattr(error, 'lineno', None)
         where = f'{path}:{line}' if line else str(path)
-        return ModuleSource(path, syntax_error=f'{where}: {getattr(error, "msg", error)}')
+        reason = f'{where}: {getattr(error, "msg", error)}'
+        return ModuleSource(path, lines=lines, syntax_error=reason, error_line=line)
     except OSError as error:
         return ModuleSource(path, syntax_error=f'{path}: {error.strerror}')
     reader = _ModuleReader()
@@ -89,9 +108,36 @@ def read_module(path: Path) -> ModuleSource:
         reader.functions,
         reader.constants,
         {name: full_name for name, full_name in reader.imports.items() if full_name},
-        tuple(text.decode(errors='replace').splitlines()),
+        {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
+        lines,
         reader.is_open,
     )
+
+
+def find_texts(body: list[ast.stmt]) -> dict[str, str]:
+    """Return the names that statements give one text, and never another value, with that text."""
+    texts = {name: text for statement in body for name, text in _read_text(statement)}
+    if not texts:
+        return {}
+    nodes = [node for statement in body for node in ast.walk(statement)]
+    stored = Counter(
+        node.id
+        for node in nodes
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    )
+    return {name: text for name, text in texts.items() if stored[name] == 1}
+
+
+def _read_text(statement: ast.stmt) -> Iterator[tuple[str, str]]:
+    if isinstance(statement, ast.Assign):
+        targets: list[ast.expr] = statement.targets
+        value: ast.expr | None = statement.value
+    elif isinstance(statement, ast.AnnAssign):
+        targets, value = [statement.target], statement.value
+    else:
+        return
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        yield from ((each.id, value.value) for each in targets if isinstance(each, ast.Name))
 
 
 class _ModuleReader:

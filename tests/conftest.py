@@ -6,8 +6,19 @@ import sys
 from contextlib import ExitStack
 
 import pytest
+from hypothesis import HealthCheck, settings
 
-from tests.running import ROOT, Composing, Peer, allocate_domain, wait_for
+from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
+
+# What hypothesis tries is the same in each run, and no test fails for the time that it takes.
+settings.register_profile(
+    'steady',
+    database=None,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile('steady')
 
 
 @pytest.fixture(name='wait_for')
@@ -18,9 +29,16 @@ def wait_for_fixture():
 @pytest.fixture
 def domain_id(monkeypatch):
     """Return a ROS domain of the test's own, which holds for its child processes too."""
-    domain = allocate_domain()
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
-    return domain
+    with reserved_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        yield domain
+
+
+@pytest.fixture
+def other_domain_id():
+    """Return a second ROS domain of the test's own."""
+    with reserved_domain() as domain:
+        yield domain
 
 
 @pytest.fixture(scope='session')
@@ -98,7 +116,7 @@ def executor(context):
 
     executor = ComposerExecutor(context=context)
     yield executor
-    executor.shutdown(5.0)
+    executor.shutdown(DEADLINE_SEC)
 
 
 @pytest.fixture
@@ -115,9 +133,10 @@ def node(context, executor):
 @pytest.fixture(scope='module')
 def shared_compose(tmp_path_factory):
     """Run systems that all tests of a module look at."""
-    composing = Composing(tmp_path_factory.mktemp('shared'), allocate_domain())
-    yield composing
-    composing.end()
+    with reserved_domain() as domain:
+        composing = Composing(tmp_path_factory.mktemp('shared'), domain)
+        yield composing
+        composing.end()
 
 
 @pytest.fixture(scope='module')

@@ -7,6 +7,7 @@ JSON and ends. Both have their types from packages that this process provides fo
 import json
 import sys
 import threading
+import time
 from pathlib import Path
 
 import rclpy
@@ -21,9 +22,12 @@ PACKAGES = ('example_interfaces', 'action_tutorials_interfaces')
 
 provide_packages({name: FOLDER / name for name in PACKAGES}, print)
 
+from action_msgs.msg import GoalInfo  # noqa: E402
+from action_msgs.srv import CancelGoal  # noqa: E402
 from action_tutorials_interfaces.action import Fibonacci  # noqa: E402
 from example_interfaces.srv import AddTwoInts  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
+from unique_identifier_msgs.msg import UUID  # noqa: E402
 
 
 def finish(future):
@@ -38,6 +42,15 @@ def call(service_class, name, **fields):
     if not client.wait_for_service(DEADLINE_SEC):
         sys.exit(f'there is no service {name}')
     return finish(client.call_async(service_class.Request(**fields)))
+
+
+def meet_action_server(name):
+    """Return when the server of an action has found all ends that the node has by now.
+
+    They are found in the order in which they were made; the last of them is made here.
+    """
+    nobody = GoalInfo(goal_id=UUID(uuid=[1] * 16))
+    call(CancelGoal, f'{name}/_action/cancel_goal', goal_info=nobody)
 
 
 def serve():
@@ -67,6 +80,9 @@ def serve_calculator():
 
 def serve_fibonacci(answer='accept'):
     def compute(goal):
+        # The client's ends are found one after the other, that for feedback before this one.
+        while not node.count_subscribers('fibonacci/_action/status'):
+            time.sleep(0.01)
         sequence = [0, 1]
         for _ in range(1, goal.request.order):
             sequence.append(sequence[-1] + sequence[-2])
@@ -96,6 +112,7 @@ def send_goal(order, cancel='no'):
     client = ActionClient(node, Fibonacci, 'fibonacci')
     if not client.wait_for_server(DEADLINE_SEC):
         sys.exit('there is no action fibonacci')
+    meet_action_server('fibonacci')
     feedback = []
 
     def hear(message):

@@ -3,6 +3,8 @@
 from tests.running import Peer
 
 INFRASTRUCTURE = ('/rosout', '/parameter_events', '/diagnostics')
+# An end may be found before the name of its node.
+UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 OWN_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 
 
@@ -21,7 +23,7 @@ class Graph:
         )
 
     def ends(self):
-        """Return all ends of topics: the topic, type, node, and policies."""
+        """Return all ends of topics whose nodes are known: topic, type, node, and policies."""
         node = self._peer.node
         found = []
         for topic, _ in node.get_topic_names_and_types():
@@ -31,6 +33,8 @@ class Graph:
                 *node.get_publishers_info_by_topic(topic),
                 *node.get_subscriptions_info_by_topic(topic),
             ):
+                if info.node_name == UNKNOWN_NAME:
+                    continue
                 profile = info.qos_profile
                 policies = (profile.reliability, profile.durability, profile.liveliness)
                 durations = (profile.deadline, profile.lifespan)

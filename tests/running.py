@@ -7,8 +7,8 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
-from itertools import count
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import count, islice
 from pathlib import Path
 from textwrap import dedent
 
@@ -33,18 +33,30 @@ def wait_for(condition, what):
     return result
 
 
-def allocate_domain():
-    """Return a ROS domain that no process of this machine is in."""
-    for offset in _domain_offsets:
-        domain = _FIRST_DOMAIN + offset % _DOMAINS
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                # The port that the first participant of a domain listens on.
-                probe.bind(('', 7400 + 250 * domain + 10))
-            except OSError:
-                continue
-        return domain
-    raise AssertionError
+@contextmanager
+def reserved_domain():
+    """Return a ROS domain that no process is in, and that no other run of tests takes meanwhile."""
+    with ExitStack() as reserved:
+        yield next(domain for domain in _domains() if _reserve(domain, reserved))
+
+
+def _domains():
+    for offset in islice(_domain_offsets, _DOMAINS):
+        yield _FIRST_DOMAIN + offset % _DOMAINS
+    pytest.fail('every ROS domain is in use')
+
+
+def _reserve(domain, reserved):
+    """Return whether a domain is free; it is held until `reserved` ends."""
+    sign = reserved.enter_context(socket.socket(socket.AF_UNIX))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            sign.bind(f'\0composer-tests-domain-{domain}')
+            # The port that all participants of a domain share.
+            probe.bind(('', 7400 + 250 * domain))
+        except OSError:
+            return False
+    return True
 
 
 class Child:
@@ -224,6 +236,18 @@ class Peer:
         for client in clients:
             self.node.destroy_client(client)
         return [call.result() for call in calls]
+
+    def meet_action_server(self, name):
+        """Return when the server of an action has found all ends that this peer has by now.
+
+        They are found in the order in which they were made; the last of them is made here.
+        """
+        from action_msgs.msg import GoalInfo
+        from action_msgs.srv import CancelGoal
+        from unique_identifier_msgs.msg import UUID
+
+        nobody = GoalInfo(goal_id=UUID(uuid=[1] * 16))
+        self.call(CancelGoal, f'{name}/_action/cancel_goal', goal_info=nobody)
 
     def close(self):
         self._spinning = False

@@ -1,6 +1,7 @@
 """The command line: what it takes, what it says, and what it exits with."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -43,7 +44,7 @@ def start(command, folder=ROOT, **variables):
         env=os.environ | {'PYTHONPATH': str(ROOT), **variables},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
 
@@ -173,6 +174,23 @@ def test_names_of_files_may_be_any_bytes(tmp_path):
         ['up', 'a.yaml', '--fast'],
         ['up', 'a.yaml', '--log-level', 'loud'],
         ['up', 'a.yaml', '--log-level', 'talker:=loud'],
+        ['up', '-x'],
+        ['up', ''],
+        ['up', 'a.yaml', '--set'],
+        ['show'],
+        ['show', 'a.yaml', '--fast'],
+        ['show', 'a.yaml', '--args', '--params'],
+        ['show', 'a.yaml', '--origin', '--format', 'json'],
+        ['graph'],
+        ['graph', 'a.yaml', '--output', 'a.pdf'],
+        ['check', 'a.yaml', '--format', 'yaml'],
+        ['check', 'a.yaml', '--ignore', 'bad-nam'],
+        ['check', 'a.yaml', '--ignore', 'bad-name', '--expect', 'bad-name'],
+        ['explain', 'bad-nam'],
+        ['new'],
+        ['new', 'My-Robot'],
+        ['interfaces', 'bild'],
+        ['interfaces', 'build'],
         ['--nonsense'],
     ],
 )
@@ -180,13 +198,39 @@ def test_wrong_usage_is_exit_code_2(run, arguments):
     code, out, err = run(*arguments)
     assert code == 2
     assert out == ''
-    assert 'Usage: composer' in err
-    assert 'Error: ' in err
+    assert re.fullmatch(r'error: [^\n]*[^\n.]\n  help: [^\n]*\n', err)
 
 
 def test_a_wrong_level_says_the_right_ones(run):
     _, _, err = run('up', GREETER, '--log-level', 'loud')
-    assert "'loud' is no level: debug, info, warn, error, fatal, or NODE:=LEVEL" in err
+    assert err == (
+        "error: 'loud' is no log level\n  help: debug, info, warn, error or fatal, or NODE:=LEVEL\n"
+    )
+
+
+def test_a_wrong_option_says_the_nearest_right_one_and_where_the_others_stand(run):
+    _, _, err = run('show', GREETER, '--orign')
+    assert err.startswith("error: no such option '--orign'")
+    assert "'--origin'" in err
+    assert err.endswith("\n  help: 'composer show --help' shows how it is used\n")
+
+
+@pytest.mark.parametrize('command', ['show', 'graph'])
+def test_a_negative_number_is_a_value_for_all_that_take_a_system(run, command):
+    code, _, err = run(command, ROOT / 'configs' / 'add_two_ints_client.yaml', '-5', '3')
+    assert (code, err) == (0, '')
+
+
+def test_a_group_without_a_command_shows_what_it_has(run):
+    code, out, err = run('interfaces')
+    assert (code, out) == (2, '')
+    assert err.startswith('Usage: composer interfaces ')
+
+
+def test_the_help_of_each_command_fits_its_line(run):
+    _, out, _ = run('--help')
+    _, of_interfaces, _ = run('interfaces', '--help')
+    assert '...\n' not in (out + of_interfaces).replace('COMMAND [ARGS]...\n', '')
 
 
 @pytest.mark.parametrize('arguments', [['--help'], ['-h'], ['check', '--help'], ['up', '-h']])

@@ -26,6 +26,14 @@ def generated():
     return module.generate()
 
 
+def sections_of(text):
+    return {
+        re.sub('[`,]', '', line.lstrip('# ').lower()).replace(' ', '-')
+        for line in text.splitlines()
+        if re.match('#+ ', line)
+    }
+
+
 @pytest.mark.parametrize('name', ['reference.md', 'rules.md'])
 def test_a_generated_page_is_current(name):
     current = (ROOT / 'docs' / name).read_text() == generated()[name]
@@ -34,12 +42,7 @@ def test_a_generated_page_is_current(name):
 
 def test_the_links_of_a_page_lead_to_its_sections():
     for text in generated().values():
-        sections = {
-            line.lstrip('# ').lower().replace(' ', '-').replace('`', '')
-            for line in text.splitlines()
-            if re.match('#+ ', line)
-        }
-        assert set(re.findall(r'\]\(#([^)]*)\)', text)) <= sections
+        assert set(re.findall(r'\]\(#([^)]*)\)', text)) <= sections_of(text)
 
 
 def test_every_key_has_its_row():
@@ -100,7 +103,7 @@ def test_the_hook_runs_a_command_that_there_is(tmp_path):
         env={'PYTHONPATH': str(ROOT), 'PATH': ''},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert result.returncode == 1
@@ -130,7 +133,7 @@ def test_the_action_checks_what_its_inputs_say(tmp_path):
         },
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert result.returncode == 1
@@ -138,9 +141,28 @@ def test_the_action_checks_what_its_inputs_say(tmp_path):
     assert not (tmp_path / 'ran').exists()
 
 
-@pytest.mark.parametrize('path', ['README.md'])
+PAGES = ['README.md', *(f'docs/{path.name}' for path in sorted((ROOT / 'docs').glob('*.md')))]
+
+
+@pytest.mark.parametrize('path', PAGES)
 def test_the_commands_of_the_recipes_take_their_options(path):
     text = (ROOT / path).read_text()
     context = cli.cli.commands['check'].make_context
-    for line in re.findall(r'^\s*(?:\$|-) composer check (.*)$', text, re.MULTILINE):
+    for line in re.findall(r'^\s*(?:\$|-|- run:|entry:) composer check (.*)$', text, re.MULTILINE):
         context('check', line.split(), resilient_parsing=True)
+
+
+@pytest.mark.parametrize('path', PAGES)
+def test_the_links_of_a_page_lead_to_files_and_sections(path):
+    for target in re.findall(r'\]\(([^)\s]+)\)', (ROOT / path).read_text()):
+        if target.startswith('https://'):
+            continue
+        name, _, section = target.partition('#')
+        page = (ROOT / path).parent / name if name else ROOT / path
+        assert page.is_file(), target
+        assert not section or section in sections_of(page.read_text()), target
+
+
+def test_the_first_page_leads_to_all_others():
+    text = (ROOT / 'README.md').read_text()
+    assert [page for page in PAGES if page != 'README.md' and f']({page}' not in text] == []

@@ -235,8 +235,9 @@ def test_what_is_shown_runs_as_the_same_system(system, shown, compose, wait_for)
     graphs = []
     for arguments, folder in ((ARGUMENTS, system), ((flat,), compose.folder)):
         child = compose.run(*arguments, folder=folder)
-        child.wait_until_ready()
+        node_count = int(re.search(r'(\d+) nodes ready', child.wait_until_ready())[1])
         graph = Graph(compose.domain_id)
+        wait_for(lambda graph=graph, n=node_count: len(graph.nodes()) >= n, 'the nodes')
         wait_for(lambda graph=graph: len(graph.ends()) >= count, 'the ends of topics')
         driver = '/left/joint_1/driver'
         graphs.append((graph.nodes(), graph.ends(), graph.parameters([driver])))

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from tests.graphs import Graph
-from tests.running import allocate_domain
 
 pytestmark = pytest.mark.ros
 
@@ -209,19 +208,18 @@ OPTIONAL_PROGRAMS = [
 
 
 @pytest.fixture
-def plain(tmp_path, start_program):
+def plain(tmp_path, start_program, other_domain_id):
     """Run plain nodes in a domain of their own."""
 
     def run(programs):
-        domain_id = allocate_domain()
         process = start_program(
             Path(__file__).with_name('plain_nodes.py'),
             json.dumps(programs),
             cwd=tmp_path,
-            env=os.environ | {'ROS_DOMAIN_ID': str(domain_id), 'ROS_LOG_DIR': str(tmp_path / 'l')},
+            env=os.environ
+            | {'ROS_DOMAIN_ID': str(other_domain_id), 'ROS_LOG_DIR': str(tmp_path / 'l')},
         )
         assert process.stdout.readline() == 'ready\n'
-        return domain_id
 
     return run
 
@@ -244,15 +242,15 @@ CASES = {
 
 
 @pytest.mark.parametrize('case', CASES)
-def test_the_graph_is_that_of_the_launch_file(case, compose, plain, wait_for):
+def test_the_graph_is_that_of_the_launch_file(case, compose, plain, other_domain_id, wait_for):
     files, words, programs, with_parameters = CASES[case]
     for name, text in (FILES | files).items():
         (compose.folder / name).write_text(text.lstrip())
     (compose.folder / 'parts.py').write_text(BEHAVIOURS)
-    domain_id = plain(programs)
+    plain(programs)
     child = compose.run(compose.folder / 'system.yaml', *words)
     child.wait_until_ready()
-    wanted, real = Graph(domain_id), Graph(compose.domain_id)
+    wanted, real = Graph(other_domain_id), Graph(compose.domain_id)
     try:
         count = sum(len(each['publishers'] + each['subscriptions']) for each in programs)
         for graph in (wanted, real):

@@ -45,7 +45,7 @@ class Foreigners:
     def ask(self, *arguments):
         """Return the result of a client."""
         client = self._start(arguments)
-        output, _ = client.communicate(timeout=60)
+        output, _ = client.communicate(timeout=200)
         assert client.returncode == 0, output
         (result,) = (line for line in output.splitlines() if line.startswith('result '))
         return json.loads(result.removeprefix('result '))

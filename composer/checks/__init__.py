@@ -20,11 +20,12 @@ from composer.checks.processes import (
     check_environment,
     check_executables,
     check_processes,
-    check_waits,
 )
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.slips import check_slips
 from composer.checks.transforms import check_transforms
 from composer.checks.uses import check_uses
+from composer.checks.waits import check_waits
 from composer.checks.wiring import check_wiring
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -63,6 +64,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_waits,
     check_environment,
     check_wiring,
+    check_slips,
 )
 _MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 

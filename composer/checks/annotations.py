@@ -64,7 +64,7 @@ def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
 def _wires_of(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
     """Return what each behaviour of a node is wired to, by its path."""
     published = {
-        name: None if _stands_in(context, publisher.path) else publisher.type
+        name: publisher.type if context.has_real_type(publisher) else None
         for name, publisher in node.publishers.items()
     }
     wires: dict[DataPath, _Wire] = {}
@@ -73,12 +73,12 @@ def _wires_of(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
         wires[*timer.path, 'behaviour'] = _Wire(yielded=sent, returned=sent)
     for subscription in node.subscriptions.values():
         sent = published.get(subscription.publish or '')
-        unsure = _stands_in(context, subscription.path)
+        unsure = not context.has_real_type(subscription)
         wire = _Wire(subscription.type, returned=sent, is_unsure=unsure)
         wires[*subscription.path, 'behaviour'] = wire
     for service in node.services.values():
         name = service.type
-        unsure = _stands_in(context, service.path)
+        unsure = not context.has_real_type(service)
         wire = _Wire(f'{name}_Request', returned=f'{name}_Response', is_unsure=unsure)
         wires[*service.path, 'behaviour'] = wire
     return wires | _wires_of_actions(context, node)
@@ -87,20 +87,15 @@ def _wires_of(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
 def _wires_of_actions(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
     wires: dict[DataPath, _Wire] = {}
     for action in node.actions.values():
-        name, unsure = action.type, _stands_in(context, action.path)
+        name, unsure = action.type, not context.has_real_type(action)
         goal, feedback, result = (f'{name}_{part}' for part in ('Goal', 'Feedback', 'Result'))
         wires[*action.path, 'behaviour'] = _Wire(goal, feedback, result, unsure)
         wires[*action.path, 'accept'] = _Wire(goal, is_unsure=unsure)
     for client in node.action_clients.values():
-        name, unsure = client.type, _stands_in(context, client.path)
+        name, unsure = client.type, not context.has_real_type(client)
         wires[*client.path, 'feedback'] = _Wire(f'{name}_Feedback', is_unsure=unsure)
         wires[*client.path, 'result'] = _Wire(f'{name}_Result', is_unsure=unsure)
     return wires
-
-
-def _stands_in(context: CheckContext, entity: DataPath) -> bool:
-    span = context.system.positions.value(context.inner(entity, 'type'))
-    return context.was_dropped((*entity, 'type')) or span in context.system.sampled
 
 
 def _check_behaviour(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from composer.diagnostics import Related
 from composer.language.bindings import Binding, node_bindings
 from composer.module_finder import MissingModule
 from composer.names import did_you_mean, suggest
@@ -19,10 +20,17 @@ if TYPE_CHECKING:
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     """Check all behaviours by the text of their modules; none is imported."""
+    broken: set[str] = set()
     for node in context.spec.nodes.values():
         for binding in node_bindings(node):
-            if not context.was_dropped(binding.behaviour.path):
-                yield from _check_source(context, binding)
+            if context.was_dropped(binding.behaviour.path):
+                continue
+            module = context.modules.find(binding.behaviour.module)
+            if isinstance(module, MissingModule) or not module.syntax_error:
+                yield from _check_source(context, binding, module)
+            elif binding.behaviour.module not in broken:
+                broken.add(binding.behaviour.module)
+                yield _explain_broken_module(context, binding, module)
 
 
 def check_behaviour_call(
@@ -45,19 +53,28 @@ def check_behaviour_call(
         yield from _check_signature(context, binding, signature)
 
 
-def _check_source(context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
+def _explain_broken_module(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    """Say it where the module is named first: it is one fault, however many behaviours it has."""
     behaviour = binding.behaviour
-    module = context.modules.find(behaviour.module)
+    place = module.place_of(module.error_line) if module.error_line else None
+    return context.at_value(
+        behaviour.path,
+        'broken-module',
+        f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
+        part=behaviour.module,
+        first=True,
+        related=[Related('this is what Python does not take', place)] if place else [],
+    )
+
+
+def _check_source(
+    context: CheckContext, binding: Binding, module: ModuleSource | MissingModule
+) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
     if isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
-    elif module.syntax_error:
-        yield context.at_value(
-            behaviour.path,
-            'broken-module',
-            f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
-            part=behaviour.module,
-            first=True,
-        )
     elif function := module.functions.get(behaviour.function):
         yield from check_behaviour_call(context, binding, function.kind, function.signature)
     elif not module.is_open:
@@ -130,6 +147,7 @@ def _check_signature(
                 f"{behaviour.name} takes no argument '{keyword}'",
                 help=did_you_mean(keyword, free, 'it takes') or 'it takes no more arguments',
             )
+    yield from _check_values(context, binding, signature)
     try:
         keywords = dict.fromkeys(given - {'', *taken})
         signature.bind(*binding.parameters, **keywords)
@@ -141,6 +159,55 @@ def _check_signature(
             f'{behaviour.function}{shown} is called as {binding.call}: {error}',
             part=behaviour.function,
         )
+
+
+def _check_values(
+    context: CheckContext, binding: Binding, signature: inspect.Signature
+) -> Iterator[Diagnostic]:
+    """Check constant arguments against the annotations with built-in types."""
+    behaviour = binding.behaviour
+    for keyword, value in behaviour.arguments.items():
+        parameter = signature.parameters.get(keyword)
+        wanted = _annotated_types(parameter) if parameter else set()
+        if wanted and not any(_fits(value, each) for each in wanted):
+            yield context.at_value(
+                (*behaviour.path[:-1], 'with', keyword),
+                'bad-argument',
+                f"{behaviour.name} takes {' or '.join(sorted(wanted))} as '{keyword}', "
+                f'and is given {_shown(value)}',
+            )
+
+
+def _annotated_types(parameter: inspect.Parameter) -> set[str]:
+    """Return the built-in types that an annotation names; none if it names anything else."""
+    annotation = parameter.annotation
+    text = annotation if isinstance(annotation, str) else getattr(annotation, '__name__', '')
+    names = {name.strip() for name in text.strip('\'"').split('|')} - {'None'}
+    return names if names <= _SCALARS.keys() else set()
+
+
+def _fits(value: Any, wanted: str) -> bool:
+    if value is None or (wanted == 'int' and isinstance(value, float) and value.is_integer()):
+        return True
+    types = _SCALARS[wanted]
+    return isinstance(value, types) and (bool in types or not isinstance(value, bool))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, dict | list):
+        return 'a mapping' if isinstance(value, dict) else 'a list'
+    return repr(value)
+
+
+# What a value of YAML may be for a parameter with such an annotation.
+_SCALARS: dict[str, tuple[type, ...]] = {
+    'bool': (bool,),
+    'float': (float, int),
+    'int': (int,),
+    'str': (str,),
+}
 
 
 def _positional_parameters(signature: inspect.Signature) -> list[str]:

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, Related, Severity, Span, diagnostic_at
+from composer.diagnostics import Related, diagnostic_at
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from typing import Unpack
 
     from composer.checks.node_uses import UseReader
+    from composer.diagnostics import Diagnostic, Remarks, Span
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language import LoadedSystem
     from composer.language.positions import DataPath
-    from composer.language.specs import SystemSpec
+    from composer.language.specs import EndSpec, SystemSpec
     from composer.module_finder import ModuleFinder
 
 
@@ -39,7 +40,18 @@ class CheckContext:
         """Return whether an entry is missing only because its own fault was reported already."""
         return path in self.system.dropped
 
-    def at_value(  # noqa: PLR0913 - the words of a finding
+    def has_real_type(self, entity: EndSpec) -> bool:
+        """Return whether the type of an entity is the one that is meant, as far as can be known.
+
+        It is none that stands in for a missing one, hangs on a sample, or does not exist.
+        """
+        span = self.system.positions.value(self.inner(entity.path, 'type'))
+        stands_in = self.was_dropped((*entity.path, 'type')) or self.was_dropped(entity.path)
+        if stands_in or span in self.system.sampled:
+            return False
+        return not self.catalogue.available or self.catalogue.has(entity.type)
+
+    def at_value(
         self,
         path: DataPath,
         rule: str,
@@ -47,34 +59,25 @@ class CheckContext:
         *,
         part: str = '',
         first: bool = False,
-        help: str | None = None,  # noqa: A002 - the word that the finding shows
-        severity: Severity = Severity.ERROR,
-        related: Iterable[Related] = (),
+        **remarks: Unpack[Remarks],
     ) -> Diagnostic:
         """Return a finding at a value, or at the last (or `first`) `part` of its text."""
         span = self.system.positions.value(path).narrowed_to(part, first=first)
-        places = (*related, *self._includes(path, span))
-        return diagnostic_at(span, rule, message, help=help, severity=severity, related=places)
+        return diagnostic_at(span, rule, message, **self._with_includes(path, span, remarks))
 
     def at_key(
-        self,
-        path: DataPath,
-        rule: str,
-        message: str,
-        *,
-        help: str | None = None,  # noqa: A002 - the word that the finding shows
-        severity: Severity = Severity.ERROR,
-        related: Iterable[Related] = (),
+        self, path: DataPath, rule: str, message: str, **remarks: Unpack[Remarks]
     ) -> Diagnostic:
         """Return a finding at a key."""
         span = self.system.positions.key(path)
-        places = (*related, *self._includes(path, span))
-        return diagnostic_at(span, rule, message, help=help, severity=severity, related=places)
+        return diagnostic_at(span, rule, message, **self._with_includes(path, span, remarks))
 
-    def _includes(self, path: DataPath, span: Span) -> tuple[Related, ...]:
-        """Return where the file of a finding is included, if it is not the first one."""
-        is_own = span.source is self.system.positions.source
-        return () if is_own else self.system.chains.get(path[:2], ())
+    def _with_includes(self, path: DataPath, span: Span, remarks: Remarks) -> Remarks:
+        """Return the remarks with where the file of a finding is included, if it is."""
+        if span.source is self.system.positions.source:
+            return remarks
+        chain = self.system.chains.get(path[:2], ())
+        return {**remarks, 'related': (*remarks.get('related', ()), *chain)}
 
     def related(self, path: DataPath, message: str) -> Related:
         """Return a second place of a finding: that of a key."""

@@ -38,6 +38,7 @@ class _Wait:
 
     Attributes:
         group: The group that it keeps meanwhile, `None` for none.
+        client: The end that it calls through.
         server: The end that would answer.
         answering: The behaviour that would, by its path.
         answering_group: The group that it needs, `None` for none.
@@ -47,6 +48,7 @@ class _Wait:
     binding: Binding
     group: Group | None
     service: str
+    client: Endpoint
     server: Endpoint
 
     @property
@@ -74,7 +76,7 @@ def check_deadlocks(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]
 
 def _find_waits(context: CheckContext, graph: Graph) -> Iterator[_Wait]:
     servers = {
-        (end.node.name, end.entity.name): channel
+        (end.node.name, end.entity.name): (channel, end)
         for channel in graph.of_kind('service')
         for end in channel.users
         if len(channel.providers) == 1
@@ -92,10 +94,11 @@ def _find_waits(context: CheckContext, graph: Graph) -> Iterator[_Wait]:
                 if found.use.kind == 'service client' and found.use.waits and found.use.is_certain
             }
             for name in sorted(names):
-                channel = servers.get((node.name, name))
-                if channel:
+                if (node.name, name) in servers:
+                    channel, client = servers[node.name, name]
                     group = groups.get(binding.behaviour.path)
-                    yield _Wait(node, binding, group, channel.name, channel.providers[0])
+                    server = channel.providers[0]
+                    yield _Wait(node, binding, group, channel.name, client, server)
 
 
 def _groups_by_path(node: NodeSpec) -> dict[DataPath, Group]:
@@ -128,7 +131,7 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
             'service-deadlock',
             f"{wait} waits for service '{wait.service}', which answers only {when}",
             help=_HOOK_HELP.get(hook) if is_own else 'put that node before this one',
-            related=[_served_here(context, wait)],
+            related=_places(context, [wait]),
         )
 
 
@@ -207,9 +210,16 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         part=first.binding.behaviour.function,
         help=f"give {last.server.noun} '{last.server.entity.name}' a group of its own, "
         "or 'group: reentrant'",
-        related=[_served_here(context, wait) for wait in chain[:_MOST_SHOWN]],
+        related=_places(context, chain[:_MOST_SHOWN]),
     )
 
 
-def _served_here(context: CheckContext, wait: _Wait) -> Related:
-    return context.related(wait.server.path, f"'{wait.service}' is served here")
+def _places(context: CheckContext, chain: list[_Wait]) -> list[Related]:
+    return [
+        place
+        for wait in chain
+        for place in (
+            context.related(wait.server.path, f"'{wait.service}' is served here"),
+            context.related(wait.client.path, f"node '{wait.node.name}' calls it by this name"),
+        )
+    ]

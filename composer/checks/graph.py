@@ -10,34 +10,18 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from composer.language.specs import NodeSpec
-from composer.names import expand_name, remap_name
+from composer.names import expand_name, find_namespace_fault, find_topic_name_fault, remap_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.language.positions import DataPath
-    from composer.language.specs import (
-        ActionClientSpec,
-        ActionSpec,
-        ProcessSpec,
-        PublisherSpec,
-        QosSpec,
-        ServiceClientSpec,
-        ServiceSpec,
-        SubscriptionSpec,
-    )
-
-    Entity: TypeAlias = (
-        PublisherSpec
-        | SubscriptionSpec
-        | ServiceSpec
-        | ServiceClientSpec
-        | ActionSpec
-        | ActionClientSpec
-    )
+    from composer.language.specs import EndSpec, ProcessSpec, QosSpec, SystemSpec
 
 ChannelKind: TypeAlias = Literal['topic', 'service', 'action']
+# An end that may be there: its kind, whether it provides, and its type, `None` for any.
+Doubt: TypeAlias = tuple[ChannelKind, bool, str | None]
 
 # By the sections of a node: what meets under one name, and the entity in words.
 _SECTIONS: dict[str, tuple[ChannelKind, str]] = {
@@ -74,7 +58,7 @@ class Endpoint:
     """
 
     node: NodeSpec
-    entity: Entity
+    entity: EndSpec
     noun: str
 
     @property
@@ -86,6 +70,12 @@ class Endpoint:
     def qos(self) -> QosSpec | None:
         """The QoS as declared; actions have none."""
         return getattr(self.entity, 'qos', None)
+
+    @property
+    def written(self) -> str:
+        """The name of the channel as the file has it."""
+        kind = 'topic' if self.noun in ('publisher', 'subscription') else self.noun.split()[0]
+        return str(getattr(self.entity, kind))
 
     def __str__(self) -> str:
         """Return `publisher 'scan' of node 'lidar'`."""
@@ -118,48 +108,81 @@ class Graph:
 
     Attributes:
         of_ros: The full names of the services that ROS itself gives to the nodes.
-        unsure: The kinds of channels that may have further ends: a name hangs on an argument
-            that is not given yet, or is missing for a fault of its own.
+        doubts: The ends that channels may have beside: their names hang on an argument that is
+            not given yet, or they are missing or misnamed for a fault of their own.
         left_out: What nodes have that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
     of_ros: frozenset[str]
-    unsure: frozenset[ChannelKind]
+    doubts: frozenset[Doubt]
     left_out: frozenset[tuple[ChannelKind, str]]
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
         return (channel for channel in self.channels.values() if channel.kind == kind)
 
+    def may_have_more(self, channel: Channel) -> bool:
+        """Return whether the end that a channel lacks may be one that nobody knows."""
+        is_provider = not channel.providers
+        types = (None, *(end.entity.type for end in channel.ends))
+        return any((channel.kind, is_provider, type_) in self.doubts for type_ in types)
+
 
 def build_graph(context: CheckContext) -> Graph:
     """Return who meets whom in a system."""
     doubts = _Doubts(context)
     channels: dict[tuple[ChannelKind, str], Channel] = {}
-    unsure = set(doubts.lacking)
-    for node in context.spec.nodes.values():
-        for section, (kind, noun) in _SECTIONS.items():
-            for entity in getattr(node, section).values():
-                if doubts.about_name(node, entity.path, kind):
-                    unsure.add(kind)
-                    continue
-                name = full_name(node, kind, getattr(entity, kind))
-                channel = channels.setdefault((kind, name), Channel(kind, name))
-                ends = channel.providers if section in _PROVIDING else channel.users
-                ends.append(Endpoint(node, entity, noun))
+    unsure: set[Doubt] = set(doubts.lacking)
+    for node, section, entity in _entities(context.spec):
+        kind, noun = _SECTIONS[section]
+        provides = section in _PROVIDING
+        if doubts.about_name(node, entity.path, kind):
+            unsure.add((kind, provides, None))
+            continue
+        name = full_name(node, kind, getattr(entity, kind))
+        # Without a type, too, it would be a reason to say nothing of any other.
+        if _is_doubtful(context, node, getattr(entity, kind)) and context.has_real_type(entity):
+            unsure.add((kind, provides, entity.type))
+        channel = channels.setdefault((kind, name), Channel(kind, name))
+        ends = channel.providers if provides else channel.users
+        ends.append(Endpoint(node, entity, noun))
     of_ros = (name for node in context.spec.nodes.values() for name in _services_of_ros(node))
     return Graph(
         channels, frozenset(of_ros), frozenset(unsure), frozenset(_channels_left_out(context))
     )
 
 
+def _entities(spec: SystemSpec) -> Iterator[tuple[NodeSpec, str, EndSpec]]:
+    for node in spec.nodes.values():
+        for section in _SECTIONS:
+            for entity in getattr(node, section).values():
+                yield node, section, entity
+
+
+def _is_bad_rule(rule: tuple[str, str]) -> bool:
+    source, target = rule
+    return _is_misnamed(source.rpartition('://')[2], target)
+
+
+def _is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
+    """Return whether a name, or the namespace that this node alone has, is none of ROS."""
+    if _is_misnamed(name):
+        return True
+    own = (*node.path, 'namespace')
+    is_own = own in context.system.positions.values
+    return is_own and find_namespace_fault(node.namespace) is not None
+
+
+def _is_misnamed(*names: str) -> bool:
+    return any(find_topic_name_fault(name) for name in names)
+
+
 def _channels_left_out(context: CheckContext) -> Iterator[tuple[ChannelKind, str]]:
     unused = context.system.unused
-    for node in unused.nodes.values() if unused else ():
-        for section, (kind, _) in _SECTIONS.items():
-            for entity in getattr(node, section).values():
-                yield kind, full_name(node, kind, getattr(entity, kind))
+    for node, section, entity in _entities(unused) if unused else ():
+        kind, _ = _SECTIONS[section]
+        yield kind, full_name(node, kind, getattr(entity, kind))
 
 
 def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
@@ -191,21 +214,26 @@ class _Doubts:
         }
         self._paths = paths | context.system.dropped
         self.lacking = {
-            kind
+            doubt
             for path in context.system.dropped
-            if path[:1] == ('nodes',) and len(path) <= _DEPTH_OF_ENTITIES
-            for kind in _kinds_in(path)
+            if path[:1] == ('include',)
+            or (path[:1] == ('nodes',) and len(path) <= _DEPTH_OF_ENTITIES)
+            for doubt in _doubts_about(path)
         }
         self._nodes = {
             path[1]
             for path in self._paths
             if path[:1] == ('nodes',) and len(path) > 1 and _moves_node(path)
+        } | {
+            node.path[-1]
+            for node in context.spec.nodes.values()
+            if any(map(_is_bad_rule, node.remap))
         }
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
     def about_name(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
         """Return whether an entity may have another name than it seems."""
-        if not self._paths:
+        if not (self._paths or self._nodes):
             return False
         return (
             self._all
@@ -225,13 +253,14 @@ _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
 }
 
 
-def _kinds_in(path: DataPath) -> set[ChannelKind]:
-    """Return of what kinds of channels ends are missing without the data at a path."""
+def _doubts_about(path: DataPath) -> set[Doubt]:
+    """Return what ends may be missing without the data at a path."""
     section = str(path[_DEPTH_OF_SECTIONS]) if len(path) > _DEPTH_OF_SECTIONS else ''
-    if section in _SECTIONS:
-        return {_SECTIONS[section][0]}
+    if section in _WITHOUT_CHANNELS and path[0] == 'nodes':
+        return set()
     # An unknown key may be any section, misspelt.
-    return set() if section in _WITHOUT_CHANNELS else {'topic', 'service', 'action'}
+    sections = [section] if section in _SECTIONS else list(_SECTIONS)
+    return {(_SECTIONS[each][0], each in _PROVIDING, None) for each in sections}
 
 
 def _moves_node(path: DataPath) -> bool:

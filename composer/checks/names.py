@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Related
+from composer.language.specs import NodeSpec
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath
-    from composer.language.specs import NodeSpec
+    from composer.language.specs import ProcessSpec
 
 _RULE = 'bad-name'
 
@@ -47,7 +48,7 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
             fault = find_parameter_name_fault(parameter.name)
             if fault:
                 yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {fault}")
-        yield from _check_remap(context, node)
+        yield from check_rules(context, node)
 
 
 def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
@@ -69,7 +70,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     first: dict[str, NodeSpec] = {}
     for node in context.spec.nodes.values():
         other = first.setdefault(node.full_name, node)
-        if other is not node:
+        if other is not node and not _are_misplaced(context, node, other):
             yield context.at_key(
                 node.path,
                 'duplicate-node',
@@ -77,6 +78,18 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
                 help="give one of them another name, or a 'namespace'",
                 related=[Related('the other one', context.system.positions.key(other.path))],
             )
+
+
+def _are_misplaced(context: CheckContext, *nodes: NodeSpec) -> bool:
+    """Return whether the namespace of a node is not known, for its own fault."""
+    lost = [path for path in context.system.dropped if path[-1:] == ('namespace',)]
+    sections = {path[0] for path in lost}
+    included = any(context.system.chains.get(node.path[:2]) for node in nodes)
+    return (
+        'defaults' in sections
+        or ('include' in sections and included)
+        or any((*node.path, 'namespace') in lost for node in nodes)
+    )
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
@@ -128,7 +141,8 @@ def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> st
     return fault and f"in full it is '{longest}', and {fault}"
 
 
-def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator[Diagnostic]:
+    """Check the remapping rules of a node, or of the nodes in a process."""
     for source, target in node.remap:
         path = (*node.path, 'remap', source)
         if source.startswith('__'):
@@ -143,7 +157,9 @@ def _check_remap(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = _find_rule_name_fault(name) or _find_full_name_fault(node, name)
+            fault = _find_rule_name_fault(name)
+            if fault is None and isinstance(node, NodeSpec):
+                fault = _find_full_name_fault(node, name)
             if fault:
                 yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
 

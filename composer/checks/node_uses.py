@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import SourceFile, Span
+from composer.diagnostics import Span
 from composer.python_source import FunctionKind, ModuleSource
 from composer.python_uses import ALL_KINDS, NodeUses, find_parameter, read_node_uses
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.language.bindings import Binding
     from composer.module_finder import ModuleFinder
     from composer.python_source import FunctionSource
@@ -88,11 +89,9 @@ class UseReader:
         given: int,
         callers: tuple[str, ...],
     ) -> BehaviourUses:
-        own = _read(source, position, given)
-        file = SourceFile(_displayed(module.path), module.lines)
-        found = [
-            FoundUse(use, Span(file, use.line, use.column, len(use.name))) for use in own.uses
-        ]
+        own = _read(source, position, given, module.texts)
+        file = module.place_of(1).source
+        found = [FoundUse(use, Span(file, use.line, use.column, use.length)) for use in own.uses]
         open_kinds, reads_others = own.open_kinds, own.reads_others
         reaches_ros = own.reaches_ros
         for passed in own.passes:
@@ -110,7 +109,9 @@ class UseReader:
         return source is not None and source.kind in (None, FunctionKind.COROUTINE)
 
 
-def _read(source: FunctionSource, position: int | str, given: int) -> NodeUses:
+def _read(
+    source: FunctionSource, position: int | str, given: int, texts: Mapping[str, str]
+) -> NodeUses:
     """Return what a function does itself.
 
     Args:
@@ -123,7 +124,7 @@ def _read(source: FunctionSource, position: int | str, given: int) -> NodeUses:
         return NodeUses()
     arguments = source.definition.args
     positional = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
-    return read_node_uses(source.definition, name, {name, *positional[:given]})
+    return read_node_uses(source.definition, name, {name, *positional[:given]}, texts)
 
 
 def _as_passed(found: FoundUse, passed: NodePass, *, is_late: bool) -> FoundUse:
@@ -135,10 +136,3 @@ def _as_passed(found: FoundUse, passed: NodePass, *, is_late: bool) -> FoundUse:
         waits=use.waits and passed.waits and not is_late,
     )
     return FoundUse(use, found.place)
-
-
-def _displayed(path: Path | None) -> str:
-    """Return a path as a user would write it who is in the current folder."""
-    if path is not None and path.is_relative_to(Path.cwd()):
-        return str(path.relative_to(Path.cwd()))
-    return str(path)

@@ -11,14 +11,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.ament import list_packages
-from composer.checks.parameters import OF_EVERY_NODE, find_refusal
+from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, Severity, diagnostic_at
 from composer.language.parameter_files import read_parameter_file
 from composer.language.parameter_overrides import find_overrides
 from composer.language.parameter_patterns import matches_pattern
-from composer.language.paths import PathError, resolve_path
+from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
-from composer.names import did_you_mean, join_names, with_article
+from composer.names import (
+    did_you_mean,
+    find_namespace_fault,
+    find_node_name_fault,
+    join_names,
+    suggest,
+    with_article,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -62,7 +69,8 @@ def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
     for path, file in library.files.items():
         of_file = [user for user in users if path in user.files]
         if all(user.full_name is not None for user in of_file):
-            yield from _check_names(file, of_file)
+            if not _may_miss_users(context):
+                yield from _check_names(file, of_file)
             yield from _check_entries(context, path, file, of_file)
     yield from _check_values(context, users)
 
@@ -93,11 +101,21 @@ class _Library:
                 self.findings += [each for each in self.files[path].faults if each.span]
             unreadable = [each for each in self.files[path].faults if each.span is None]
             self.findings += [
-                self._context.at_value(at, each.rule, f'{path}: {each.message}', help=each.help)
+                self._context.at_value(
+                    at,
+                    each.rule,
+                    f'{path}: {each.message}',
+                    help=each.help or _help_for_missing(Path(path)),
+                )
                 for each in unreadable
             ]
             if not unreadable:
                 yield path
+
+
+def _help_for_missing(path: Path) -> str | None:
+    near = suggest(path.name, list_neighbours(path))
+    return f"did you mean '{near}'?" if near else None
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
@@ -119,6 +137,25 @@ def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
     if owner.node_name is None or owner.namespace is None:
         return None
     return join_names(owner.namespace, owner.node_name)
+
+
+def _may_miss_users(context: CheckContext) -> bool:
+    """Return whether some node uses a file, or has a name, that is not known for its own fault."""
+    lost = any(
+        path in (('defaults',), ('defaults', 'namespace'))
+        or path[:1] == ('include',)
+        or (path[:1] == ('nodes',) and (len(path) <= _DEPTH or path[_DEPTH] in _DECIDING))
+        for path in context.system.dropped
+    )
+    return lost or any(
+        find_node_name_fault(node.name) or find_namespace_fault(node.namespace)
+        for node in context.spec.nodes.values()
+    )
+
+
+# Of the paths of `nodes: {<name>: {<key>: …}}`.
+_DEPTH = 2
+_DECIDING = ('namespace', 'parameter_files')
 
 
 def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:
@@ -246,8 +283,9 @@ def _find_fault(
         got = with_article(entry.type) if entry.type else 'an empty list'
         fault = f'expected {with_article(wanted)}, and ROS takes this for {got}'
         return fault, _help_for(wanted, entry)
-    refusal = find_refusal(declared, entry.value) if declared else None
-    return refusal, None
+    if declared is None:
+        return None, None
+    return find_refusal(declared, entry.value), find_nearest_choice(declared, entry.value)
 
 
 def _help_for(wanted: str, entry: ParameterEntry) -> str | None:

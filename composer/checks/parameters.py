@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Severity
 from composer.language.parameters import find_type_fault, find_type_faults
+from composer.names import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,7 +79,9 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
     if not limits and parameter.value is not None:
         refusal = find_refusal(parameter, parameter.value)
         if refusal:
-            yield context.at_value(path, _RULE, f"parameter '{parameter.name}': {refusal}")
+            near = find_nearest_choice(parameter, parameter.value)
+            message = f"parameter '{parameter.name}': {refusal}"
+            yield context.at_value(path, _RULE, message, help=near)
 
 
 def _value_path(context: CheckContext, parameter: ParameterSpec) -> DataPath:
@@ -137,6 +140,13 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
         return
     for index, fault in faults.items():
         yield context.at_value((*path, index), _RULE, f'choice {index}: {fault}')
+
+
+def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:
+    """Return the help for a text that is none of the choices, but near one."""
+    choices = [each for each in parameter.choices or () if isinstance(each, str)]
+    near = suggest(value, choices) if isinstance(value, str) else None
+    return f"did you mean '{near}'?" if near else None
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:

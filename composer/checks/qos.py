@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from composer.checks.graph import Channel, Endpoint, Graph
     from composer.diagnostics import Diagnostic, Related
     from composer.language.positions import DataPath
+    from composer.language.specs import QosSpec
 
 Policies = tuple[tuple[str, Any], ...]
 
@@ -44,7 +45,7 @@ def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Polici
     found: dict[Policies, Endpoint] = {}
     for end in ends:
         spec = end.qos
-        if spec is None or _is_unknown(context, spec.path):
+        if spec is None or any(_is_unknown(context, path) for path in _sources(context, spec)):
             continue
         try:
             policies = resolve_qos(spec, context.spec.qos)
@@ -52,6 +53,17 @@ def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Polici
             continue
         found.setdefault(tuple(sorted(policies.items())), end)
     return found
+
+
+def _sources(context: CheckContext, spec: QosSpec) -> Iterator[DataPath]:
+    """Yield the paths of all that has a say in a QoS: its own, and those of its profiles."""
+    yield spec.path
+    profiles = context.spec.qos
+    seen: set[str] = set()
+    while spec.profile in profiles and spec.profile not in seen:
+        seen.add(spec.profile)
+        spec = profiles[spec.profile]
+        yield spec.path
 
 
 def _is_unknown(context: CheckContext, path: DataPath) -> bool:

@@ -53,7 +53,7 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
         )
         if not relays or publisher is None or publisher.type == subscription.type:
             continue
-        if not any(context.was_dropped((*end.path, 'type')) for end in (subscription, publisher)):
+        if all(context.has_real_type(end) for end in (subscription, publisher)):
             yield context.at_value(
                 (*subscription.path, 'publish'),
                 'type-mismatch',
@@ -106,8 +106,9 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
             package = entity.type.partition('/')[0]
-            dropped = context.was_dropped(('interfaces', package))
-            unreadable = dropped or package in context.unreadable
+            unreadable = package in context.unreadable or any(
+                context.was_dropped(path) for path in (('interfaces',), ('interfaces', package))
+            )
             stands_in = context.was_dropped((*entity.path, 'type'))
             if unreadable or stands_in or catalogue.has(entity.type):
                 continue

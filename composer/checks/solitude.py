@@ -61,10 +61,11 @@ def _is_alone(graph: Graph, channel: Channel) -> bool:
         return False
     if (channel.kind, channel.name) in graph.left_out:
         return False
-    if channel.kind in graph.unsure or channel.name in _OF_ROS or channel.name in graph.of_ros:
+    if channel.name in _OF_ROS or channel.name in graph.of_ros or _OF_ACTIONS in channel.name:
         return False
     # A name with a fault is a finding of its own.
-    return _OF_ACTIONS not in channel.name and find_topic_name_fault(channel.name) is None
+    is_misnamed = any(find_topic_name_fault(end.written) for end in channel.ends)
+    return not is_misnamed and not graph.may_have_more(channel)
 
 
 def _explain(

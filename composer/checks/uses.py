@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.diagnostics import Related, Severity
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -155,6 +155,7 @@ def _check_unused(
         open_kinds = _open_kinds(node, uses, are_read=are_read)
         names = {(found.use.kind, found.use.name) for each in uses for found in each.found}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
+        names |= set(_meant(node, names))
         for kind, section in _SECTIONS.items():
             for name, entity in getattr(node, section).items():
                 span = context.system.positions.key(entity.path)
@@ -163,6 +164,18 @@ def _check_unused(
                 elif span not in unused:
                     unused[span] = _explain_unused(context, kind, name, entity.path)
     yield from (finding for span, finding in unused.items() if span not in used)
+
+
+def _meant(node: NodeSpec, used: set[tuple[UseKind, str]]) -> Iterator[tuple[UseKind, str]]:
+    """Yield what was meant by names that the node does not declare, all of it where none is near.
+
+    That these are not declared is one fault; that what they mean is not used, no other one.
+    """
+    for kind, name in used:
+        declared = getattr(node, _SECTIONS[kind])
+        if name and name not in declared and not _is_of_ros(kind, name):
+            near = suggest(name, declared)
+            yield from ((kind, each) for each in (declared if near is None else (near,)))
 
 
 def _open_kinds(

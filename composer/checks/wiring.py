@@ -30,7 +30,8 @@ def check_wiring(context: CheckContext) -> Iterator[Diagnostic]:
 def _check_types(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
     """All ends of a channel have one type; Fast DDS refuses a second one in the same process."""
     for channel in graph.channels.values():
-        ends = [end for end in channel.ends if not _stands_in(context, end)]
+        # Of a type that there is not, that has been said.
+        ends = [end for end in channel.ends if context.has_real_type(end.entity)]
         if len({end.entity.type for end in ends}) > 1:
             yield from _explain_types(context, channel, ends)
 
@@ -38,12 +39,6 @@ def _check_types(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
 def _explain_types(
     context: CheckContext, channel: Channel, ends: list[Endpoint]
 ) -> Iterator[Diagnostic]:
-    catalogue = context.catalogue
-    if catalogue.available:
-        # Of a type that there is not, that has been said.
-        ends = [end for end in ends if catalogue.has(end.entity.type)]
-    if not ends:
-        return
     # Among equals the type of the publisher or server counts, which comes first.
     (usual, _), *_ = Counter(end.entity.type for end in ends).most_common()
     example = next(end for end in ends if end.entity.type == usual)
@@ -57,14 +52,6 @@ def _explain_types(
                 help=f'give both ends one type, or name {with_article(channel.kind)} of its own',
                 related=[context.related(example.path, f'{example} has {usual}')],
             )
-
-
-def _stands_in(context: CheckContext, end: Endpoint) -> bool:
-    """Return whether an end's type is not the real one."""
-    path = (*end.path, 'type')
-    is_missing = context.was_dropped(path) or context.was_dropped(end.path)
-    span = context.system.positions.value(context.inner(end.path, 'type'))
-    return is_missing or span in context.system.sampled
 
 
 def _check_servers(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks import check_system
+from composer.commands.output import wants_colour, write_file
 from composer.commands.selection import select_files
-from composer.commands.terminal import wants_colour
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system, load_system_content
 from composer.language.source import MAX_BYTES
@@ -63,13 +63,22 @@ def check(words: Sequence[str], options: CheckOptions) -> int:
         words: Files, folders, patterns, and `-` for standard input.
 
     Raises:
+        UsageError: A rule is both ignored and expected.
         ComposerError: The report cannot be written.
     """
+    _refuse_contradictions(options)
     report = _inspect(words, options)
     _show(report, options)
     if options.expected:
         return _compare(report, options)
     return ExitCode.FAILED if report.has_failed else ExitCode.DONE
+
+
+def _refuse_contradictions(options: CheckOptions) -> None:
+    both = set(options.ignored) & set(options.expected)
+    if both:
+        message = f"'{min(both)}' cannot be ignored and expected"
+        raise UsageError(message, help='take --ignore or --expect for it')
 
 
 def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
@@ -112,7 +121,7 @@ def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) 
 def _show(report: Report, options: CheckOptions) -> None:
     """Write the report; the terminal gets the findings as text if it goes elsewhere."""
     if options.output is not None:
-        _write(options.output, render_report(report, options.format))
+        write_file(options.output, render_report(report, options.format), 'the report')
     if options.format == 'text' or options.output is not None:
         colour = wants_colour()
         text = render_files(report, colour=colour, is_quiet=options.is_quiet)
@@ -125,14 +134,6 @@ def _show(report: Report, options: CheckOptions) -> None:
         click.echo(line, err=True)
     if report.findings:
         click.echo(summarize(report.findings), err=True)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding='utf-8', errors='backslashreplace')
-    except OSError as error:
-        message = f'cannot write the report to {path}: {error.strerror}'
-        raise ComposerError(message) from error
 
 
 def _compare(report: Report, options: CheckOptions) -> int:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.commands.terminal import wants_colour
+from composer.commands.output import wants_colour
 from composer.errors import ExitCode
 from composer.rules import FAMILIES, FAMILY_OF, RULES
 from composer.rules.examples import read_example

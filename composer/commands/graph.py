@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks import check_system, create_context
-from composer.drawing import DEFAULT_FORMAT, format_of, render_picture
+from composer.commands.output import show_findings, write_file
+from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system
-from composer.reports.text import render_finding, summarize
+from composer.reports.text import summarize
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,31 +38,33 @@ def graph(
 
     Raises:
         DrawingError: The form needs Graphviz, and it is not there or fails.
-        UsageError: The arguments or settings do not fit the file.
+        UsageError: The arguments or settings do not fit the file, or no form is written to files
+            that end like `output`.
         ComposerError: The drawing cannot be written.
     """
+    format_name = format_name or _format_of(output)
     system = load_system(paths[0], words, layers=paths[1:], settings=settings)
     catalogue = InterfaceCatalogue()
     findings = check_system(system, catalogue)
     context, _ = create_context(system, catalogue)
     if context is None:
-        for finding in findings:
-            click.echo(render_finding(finding) + '\n', err=True)
+        show_findings(findings)
         return ExitCode.FAILED
-    usual = format_of(output.suffix) if output else DEFAULT_FORMAT
-    text = render_picture(build_picture(context, findings), format_name or usual)
-    _write(text, output)
+    text = render_picture(build_picture(context, findings), format_name)
+    if output is None:
+        click.echo(text, nl=False, color=False)
+    else:
+        write_file(output, text, 'the drawing')
     if findings:
         click.echo(f'{summarize(findings)}: they are in the drawing', err=True)
     return ExitCode.DONE
 
 
-def _write(text: str, output: Path | None) -> None:
+def _format_of(output: Path | None) -> str:
     if output is None:
-        click.echo(text, nl=False, color=False)
-        return
-    try:
-        output.write_text(text, encoding='utf-8', errors='backslashreplace')
-    except OSError as error:
-        message = f'cannot write the drawing to {output}: {error.strerror}'
-        raise ComposerError(message) from error
+        return DEFAULT_FORMAT
+    name = format_of(output.suffix)
+    if name is None:
+        message = f"no form of drawing ends in '{output.suffix}'"
+        raise UsageError(message, help=f'name one with --format: {", ".join(FORMATS)}')
+    return name

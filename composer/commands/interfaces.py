@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.commands.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
@@ -19,7 +20,6 @@ from composer.interfaces.descriptions import (
 from composer.interfaces.documentation import describe_interface
 from composer.language import load_system
 from composer.names import did_you_mean, suggest
-from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,8 +39,7 @@ def build(path: Path) -> int:
     system = load_system(path)
     _, _, findings = describe_declared(system, InterfaceCatalogue())
     findings = [*system.diagnostics, *findings]
-    for finding in findings:
-        click.echo(render_finding(finding) + '\n', err=True)
+    show_findings(findings)
     if has_errors(findings):
         return ExitCode.FAILED
     packages = provide_declared(system, lambda line: click.echo(line, err=True))
@@ -85,8 +84,8 @@ def _advise(name: str) -> str:
     if package not in catalogue.packages():
         names = [known for kind in _KINDS for known in catalogue.names(kind)]
         near = suggest(name, names)
-        return f"did you mean '{near}'?" if near else 'composer interfaces list shows all'
-    listing = f'composer interfaces list {package}'
+        return f"did you mean '{near}'?" if near else "'composer interfaces list' shows all"
+    listing = f"'composer interfaces list {package}'"
     if not rest:
         return f"'{package}' is a package: {listing} shows what it has"
     names = [known for kind in _KINDS for known in catalogue.names(kind, package)]

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from composer.commands.kept_comments import append_comments, find_kept_comments
+from composer.commands.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.language import LoadedSystem, load_system
 from composer.language.arguments import describe_arguments
-from composer.reports.text import render_finding
 from composer.reports.yaml import render_yaml
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ def show(
         UsageError: The arguments or settings do not fit the file.
     """
     system = load_system(paths[0], words, layers=paths[1:], settings=settings)
-    for finding in system.diagnostics:
-        click.echo(render_finding(finding) + '\n', err=True)
+    show_findings(system.diagnostics)
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
     data = final_data(system)
@@ -54,11 +53,14 @@ def show(
     return ExitCode.DONE
 
 
-def show_arguments(paths: Sequence[Path]) -> int:
-    """Print the arguments that a file declares; return the exit code."""
-    system = load_system(paths[0], layers=paths[1:])
-    for finding in system.diagnostics:
-        click.echo(render_finding(finding) + '\n', err=True)
+def show_arguments(paths: Sequence[Path], settings: Sequence[str]) -> int:
+    """Print the arguments that a file declares; return the exit code.
+
+    Raises:
+        UsageError: The settings do not fit the file.
+    """
+    system = load_system(paths[0], layers=paths[1:], settings=settings)
+    show_findings(system.diagnostics)
     click.echo(describe_arguments(system.arguments))
     return ExitCode.FAILED if has_errors(system.diagnostics) else ExitCode.DONE
 

@@ -9,6 +9,7 @@ import click
 
 from composer.checks import create_context
 from composer.checks.parameter_files import check_parameter_files
+from composer.commands.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -17,7 +18,6 @@ from composer.language.parameter_files import read_parameter_file
 from composer.language.parameter_overrides import find_overrides
 from composer.language.paths import resolve_path
 from composer.reports.parameter_file import render_parameter_file
-from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,8 +37,7 @@ def show_parameters(paths: Sequence[Path], words: Sequence[str], settings: Seque
     """
     system = load_system(paths[0], words, layers=paths[1:], settings=settings)
     findings = _find_faults(system)
-    for finding in findings:
-        click.echo(render_finding(finding) + '\n', err=True)
+    show_findings(findings)
     if has_errors(findings) or system.spec is None:
         return ExitCode.FAILED
     nodes = system.spec.nodes.values()

@@ -10,7 +10,7 @@ import click
 from composer.checks import check_system, create_context
 from composer.checks.ignoring import leave_out_silenced
 from composer.commands.importing import import_behaviours
-from composer.commands.terminal import wants_colour
+from composer.commands.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -18,7 +18,6 @@ from composer.interfaces.declared import provide_declared
 from composer.language import LoadedSystem, load_system
 from composer.language.arguments import describe_arguments
 from composer.module_finder import project_search_path
-from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -114,8 +113,6 @@ def _import(
 
 
 def _report(findings: list[Diagnostic]) -> bool:
-    """Show findings on standard error; return whether they forbid a start."""
-    colour = wants_colour(is_error=True)
-    for finding in findings:
-        click.echo(render_finding(finding, colour=colour) + '\n', err=True, color=colour)
+    """Show findings; return whether they forbid a start."""
+    show_findings(findings)
     return has_errors(findings)

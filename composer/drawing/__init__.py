@@ -20,6 +20,8 @@ FORMATS: dict[str, str] = {
     'html': 'composer.drawing.page',
 }
 _ENDINGS = {
+    '': 'mermaid',
+    '.txt': 'mermaid',
     '.mmd': 'mermaid',
     '.mermaid': 'mermaid',
     '.dot': 'dot',
@@ -42,6 +44,6 @@ def render_picture(picture: Picture, format_name: str) -> str:
     return text
 
 
-def format_of(ending: str) -> str:
-    """Return the form that files of an ending, as in `.svg`, are written in."""
-    return _ENDINGS.get(ending.lower(), DEFAULT_FORMAT)
+def format_of(ending: str) -> str | None:
+    """Return the form that files of an ending, as in `.svg`, are written in, if there is one."""
+    return _ENDINGS.get(ending.lower())

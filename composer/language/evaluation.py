@@ -9,12 +9,13 @@ from __future__ import annotations
 import operator
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import TemplateAssertionError, nodes
+from jinja2 import StrictUndefined, TemplateAssertionError, nodes
 
 from composer.language import bounds
+from composer.names import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from composer.language.sandbox import Sandbox
 
@@ -146,12 +147,15 @@ def _slice(walk: _Walk, node: nodes.Slice) -> slice:
 def _call(walk: _Walk, node: nodes.Call) -> Any:
     function = walk.value(node.node)
     positional, named = walk.arguments(node)
+    for argument in (*positional, *named.values()):
+        if isinstance(argument, StrictUndefined):
+            str(argument)  # raises what is undefined, where functions would raise anything
     return walk.counted(walk.sandbox.call_function(function, positional, named))
 
 
 def _filter(walk: _Walk, node: nodes.Filter) -> Any:
     if node.name not in walk.sandbox.filters:
-        message = f"there is no filter '{node.name}'"
+        message = _unknown('filter', node.name, walk.sandbox.filters)
         raise TemplateAssertionError(message, node.lineno)
     value = walk.value(_operand(node))
     positional, named = walk.arguments(node)
@@ -160,11 +164,17 @@ def _filter(walk: _Walk, node: nodes.Filter) -> Any:
 
 def _test(walk: _Walk, node: nodes.Test) -> Any:
     if node.name not in walk.sandbox.tests:
-        message = f"there is no test '{node.name}'"
+        message = _unknown('test', node.name, walk.sandbox.tests)
         raise TemplateAssertionError(message, node.lineno)
     value = walk.value(_operand(node))
     positional, named = walk.arguments(node)
     return walk.sandbox.call_test(node.name, value, positional, named)
+
+
+def _unknown(what: str, name: str, known: Iterable[str]) -> str:
+    near = suggest(name, known)
+    hint = f" (did you mean '{near}'?)" if near else ''
+    return f"there is no {what} '{name}'{hint}"
 
 
 def _operand(node: nodes.Filter | nodes.Test) -> nodes.Expr:

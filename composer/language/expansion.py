@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
+# What a variable without a list of values stands for.
+_SAMPLE = 1
 
 
 def has_conditions(data: Mapping[str, Any]) -> bool:
@@ -51,15 +53,21 @@ def expand_document(
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
     plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
     filled = filler.fill_mapping(plain, ()) | ignored
-    limit = filled.get('max_nodes', MAX_ENTRIES)
+    limit = _limit_of(filled)
     for section in SECTIONS:
         if isinstance(data.get(section), dict):
-            expansion = _Expansion(filler, section, limit if type(limit) is int else MAX_ENTRIES)
+            expansion = _Expansion(filler, section, limit)
             filled[section] = expansion.expand(data[section])
         elif section in data:
             filled[section] = filler.fill(data[section], (section,))
     filler.filled.data = filled
     return filler.filled
+
+
+def _limit_of(data: Mapping[str, Any]) -> int:
+    limit = data.get('max_nodes')
+    # The schema says what else is wrong.
+    return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
 
 
 class _Expansion:
@@ -83,13 +91,19 @@ class _Expansion:
             is_repeated = _FOREACH in entry
             if entry.get(_FOREACH) == {}:
                 self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
+                self._filled.failed.append(path)
                 continue
+            before = len(self._filled.faults)
             for filler in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
                 if len(self._entries) >= self._limit:
                     self._report_limit(path)
                     return self._entries
                 holds = self._holds(filler, entry.get(_WHEN, True), (*path, _WHEN))
                 self._add(filler, written, body, is_left_out=not holds, is_repeated=is_repeated)
+                before = -1
+            if len(self._filled.faults) > before >= 0:
+                # It is missing for a fault, not for having no values.
+                self._filled.failed.append(path)
         return self._entries
 
     def _add(
@@ -134,12 +148,12 @@ class _Expansion:
             self._report(at, f"'{name}' cannot stand in an expression as a name")
             return
         values = filler.fill(foreach[name], at)
-        if at in self._filled.failed:
-            return
-        if not isinstance(values, list):
-            self._report(at, f"'{name}' takes a list of values, not {values!r}")
-            return
         is_sample = filler.is_sampled(at)
+        if not isinstance(values, list):
+            if at not in self._filled.failed:
+                self._report(at, f"'{name}' takes a list of values, not {values!r}")
+            # So that the rest of the entry is read once, too.
+            values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:
             inner = filler.within(name, value, _FOREACH, is_sample=is_sample)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.instances import ArgumentValues, sample_values
 from composer.language.parameters import convert_parameter_value, find_type_fault
-from composer.names import did_you_mean
+from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -38,7 +38,8 @@ def give_arguments(
                 origins[name] = _origin(place.instance, path)
             elif not place.is_open(path):
                 span = place.instance.positions.value(path)
-                faults.append(diagnostic_at(span, 'argument-type', fault))
+                near = _nearest_choice(argument, value)
+                faults.append(diagnostic_at(span, 'argument-type', fault, help=near))
             if fault or place.is_open(path):
                 unknown.append(name)
         elif not place.instance.dropped.isdisjoint((path, section)):
@@ -70,6 +71,12 @@ def _missing_argument(argument: ArgumentSpec, place: IncludePlace) -> Diagnostic
     message = f"'{place.file}' wants the argument '{argument.name}'"
     help_text = f"give it under 'args': {argument}"
     return diagnostic_at(place.span, 'missing-argument', message, help=help_text)
+
+
+def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
+    choices = [choice for choice in argument.choices if isinstance(choice, str)]
+    near = suggest(value, choices) if isinstance(value, str) else None
+    return f"did you mean '{near}'?" if near else None
 
 
 def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:

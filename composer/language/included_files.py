@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.language.paths import PathError, resolve_path
+from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:
@@ -22,16 +22,8 @@ def locate_file(text: str, place: Span) -> Path:
     path = resolve_path(text, place.source.folder)
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{shown_path(path)}'"
-        raise PathError(message, help=_help_for(path))
+        raise PathError(message, help=did_you_mean(path.name, list_neighbours(path), 'there are'))
     return path
-
-
-def _help_for(path: Path) -> str | None:
-    try:
-        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
-    except OSError:
-        return None
-    return did_you_mean(path.name, names, 'there are')
 
 
 def shown_path(path: Path) -> str:

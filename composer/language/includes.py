@@ -16,6 +16,7 @@ from composer.language.flattening import Flattening, Inclusion
 from composer.language.given_arguments import give_arguments
 from composer.language.include_places import IncludePlace
 from composer.language.included_files import locate_file, shown_path
+from composer.language.included_namespaces import mend_namespace
 from composer.language.instances import Instance, read_instance
 from composer.language.paths import PathError
 from composer.language.profiles import drop_unknown_profiles
@@ -74,10 +75,12 @@ class Includer:
                 break
             part = self._read(place, path, chain, is_left_out=aside)
             if part is None:
+                instance.dropped.add(place.at)
                 continue
             if place.is_left_out:
                 part.leave_out_all()
-            flattening.add(Inclusion(part, place.at, place.entry))
+            entry = mend_namespace(instance, place.at, place.entry)
+            flattening.add(Inclusion(part, place.at, entry))
             if aside:
                 self._left_out += 1 + sum(len(part.data.get(each, ())) for each in SECTIONS)
             elif self._is_too_large(place, chain):

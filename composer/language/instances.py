@@ -9,7 +9,7 @@ from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.arguments import ArgumentSpec, find_argument_faults, read_arguments
 from composer.language.filling import FilledDocument
 from composer.language.paths import resolve_paths
-from composer.language.schema import check_structure, is_sound
+from composer.language.schema import check_structure, is_sound, mend_outer_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -108,19 +108,23 @@ def read_instance(
     if document.data is None:
         return None
     positions = document.positions.copy()
-    declared = read_arguments(document.data)
+    written, misspelt = mend_outer_keys(document.data, positions)
+    declared = read_arguments(written)
     faults = list(_check_arguments(declared, positions))
     sound = not faults and is_sound({'args': document.data.get('args', {})})
     # Values are not held against declarations that are wrong: those have to be mended first.
-    given = give_values(declared) if sound else sample_values(declared, all_of_them=True)
-    filled = _fill(document.data, given, positions)
+    given = give_values(declared) if sound else sample_values(declared)
+    filled = _fill(written, given, positions)
     data, dropped, structure_faults = check_structure(
         filled.data, positions, filled.failed, filled.sampled
     )
+    # Of arguments that are no mapping nothing is known, not even their names.
+    is_known = isinstance(written.get('args', {}), dict)
+    unfilled = [each for each in filled.faults if is_known or each.rule != 'undefined-name']
     return Instance(
         resolve_paths(data, positions),
         positions,
-        [*document.diagnostics, *faults, *filled.faults, *structure_faults],
+        [*document.diagnostics, *misspelt, *faults, *unfilled, *structure_faults],
         set(dropped),
         filled.left_out,
         declared,
@@ -130,18 +134,18 @@ def read_instance(
     )
 
 
-def sample_values(
-    declared: Mapping[str, ArgumentSpec], *, all_of_them: bool = False
-) -> ArgumentValues:
-    """Return values to check a file with.
-
-    Args:
-        all_of_them: Whether defaults are only samples, too.
-    """
+def sample_values(declared: Mapping[str, ArgumentSpec]) -> ArgumentValues:
+    """Return values to check a file with: defaults, and samples where none is known."""
     return ArgumentValues(
         {name: argument.sample for name, argument in declared.items()},
-        {name for name, argument in declared.items() if all_of_them or argument.is_open},
+        {name for name, argument in declared.items() if _is_unknown(argument)},
     )
+
+
+def _is_unknown(argument: ArgumentSpec) -> bool:
+    """Return whether the declaration says no value, or none that can be meant."""
+    is_wrong = isinstance(argument.default, list | dict) or any(find_argument_faults(argument))
+    return argument.is_open or is_wrong
 
 
 def _fill(data: dict[str, Any], given: ArgumentValues, positions: SourceMap) -> FilledDocument:

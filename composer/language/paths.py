@@ -42,6 +42,15 @@ def resolve_path(text: str, folder: Path) -> Path:
     return share / rest
 
 
+def list_neighbours(path: Path) -> list[str]:
+    """Return the names of the YAML files in the folder of a file that is not there."""
+    try:
+        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
+    except OSError:
+        return []
+    return [] if path.name in names else names
+
+
 def resolve_paths(data: dict[str, Any], positions: SourceMap) -> dict[str, Any]:
     """Return a file's data with paths that hold wherever the data go.
 

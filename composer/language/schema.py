@@ -6,6 +6,7 @@ The schema (JSON Schema 2020-12) is the one description of the structure, for ed
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice, takewhile
@@ -17,7 +18,7 @@ from composer.language.schema_explanations import explain
 from composer.language.schema_file import schema_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
     from composer.language.positions import DataPath, Key, SourceMap
@@ -28,6 +29,15 @@ _TEMPLATE = {'$ref': '#/$defs/template'}
 
 # What a file without these keys is read on with, once their absence has been reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
+
+# The sections whose entries have keys that count before the schema does; the definitions of these.
+_OUTER_SECTIONS = {
+    'args': 'argument',
+    'nodes': 'node',
+    'include': 'include',
+    'processes': 'process',
+}
+_DEPTH_OF_ENTRIES = 3
 
 
 def check_structure(
@@ -68,13 +78,62 @@ def check_structure(
     return data, frozenset([*failed, *_drop_faulty(data, faults)]), findings
 
 
-def _mend_keys(data: dict[str, Any], positions: SourceMap) -> list[Diagnostic]:
+def mend_outer_keys(
+    data: dict[str, Any], positions: SourceMap
+) -> tuple[dict[str, Any], list[Diagnostic]]:
+    """Give misspelt keys their right names where they count before the schema does.
+
+    These are the keys of the file, of the declarations of arguments, and `foreach` and `when`.
+
+    Returns:
+        The data, copied if anything is mended, and the findings.
+    """
+    if all(map(_is_known, _outer_keys(data))):
+        return data, []
+    mended = deepcopy(data)
+    return mended, _mend_keys(mended, positions, _is_outer)
+
+
+def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield the definitions in the schema, '' for the file itself, and keys that they may have."""
+    yield from (('', key) for key in data)
+    for section, definition in _OUTER_SECTIONS.items():
+        entries = data.get(section)
+        for entry in entries.values() if isinstance(entries, dict) else ():
+            yield from ((definition, key) for key in (entry if isinstance(entry, dict) else ()))
+
+
+def _is_known(place: tuple[str, str]) -> bool:
+    definition, key = place
+    return key in _known_keys(definition) or (not definition and key.startswith('x-'))
+
+
+@cache
+def _known_keys(definition: str) -> frozenset[str]:
+    document = _schema().document
+    schema = document['$defs'][definition] if definition else document
+    branches = (schema, *schema.get('oneOf', ()))
+    return frozenset(key for branch in branches for key in branch.get('properties', ()))
+
+
+def _is_outer(path: DataPath, meant: str) -> bool:
+    if len(path) == 1:
+        return True
+    is_entry = len(path) == _DEPTH_OF_ENTRIES and path[0] in _OUTER_SECTIONS
+    return is_entry and (path[0] == 'args' or meant in ('foreach', 'when'))
+
+
+def _mend_keys(
+    data: dict[str, Any],
+    positions: SourceMap,
+    is_wanted: Callable[[DataPath, str], bool] = lambda *_: True,
+) -> list[Diagnostic]:
     """Give misspelt keys their right names; return the findings for them."""
     findings: list[Diagnostic] = []
     while len(findings) < MAX_FINDINGS:
         names: dict[DataPath, dict[Key, str]] = {}
         for fault in _find_faults(data):
-            if fault.meant is None:
+            if fault.meant is None or not is_wanted(fault.path, fault.meant):
                 continue
             parent, key = fault.path[:-1], fault.path[-1]
             renamed = names.setdefault(parent, {})
@@ -152,13 +211,20 @@ def _entry_of(path: DataPath) -> DataPath:
 
 
 def _remove_entries(data: Any, paths: Iterable[DataPath]) -> None:
-    """Remove entries of nested mappings, if they are there."""
+    """Remove entries of nested mappings, also of those in lists, if they are there."""
     for path in paths:
         mapping = data
         for key in path[:-1]:
-            mapping = mapping.get(key) if isinstance(mapping, dict) else None
+            mapping = _child(mapping, key)
         if path and isinstance(mapping, dict):
             mapping.pop(path[-1], None)
+
+
+def _child(data: Any, key: Key) -> Any:
+    if isinstance(data, dict):
+        return data.get(key)
+    is_item = isinstance(data, list) and isinstance(key, int) and key < len(data)
+    return data[key] if is_item else None
 
 
 @dataclass(frozen=True, slots=True)

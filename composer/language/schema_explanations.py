@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from composer.language.forms import find_meant_form
 from composer.language.schema_faults import (
     StructureFault,
     conflicting_keys,
@@ -91,11 +92,13 @@ def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
 def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
     expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
     path = path_of(error)
+    meant = find_meant_form(error.instance, error.validator_value)
     yield StructureFault(
         'bad-value',
         f'expected {expected}; got {show_value(error.instance)}',
         path,
         droppable(path),
+        help=f"did you mean '{meant}'?" if meant else None,
     )
 
 

@@ -33,6 +33,7 @@ _STAND_INS: dict[str, dict[str, Any]] = {
     'service client': {'type': 'unknown/srv/Unknown'},
     'action': {'type': 'unknown/action/Unknown', 'behaviour': 'unknown:unknown'},
     'action client': {'type': 'unknown/action/Unknown'},
+    'condition': {'topic': 'unknown'},
 }
 
 

@@ -216,6 +216,17 @@ class ActionClientSpec:
     path: DataPath
 
 
+# What meets others of its kind under a name.
+EndSpec: TypeAlias = (
+    PublisherSpec
+    | SubscriptionSpec
+    | ServiceSpec
+    | ServiceClientSpec
+    | ActionSpec
+    | ActionClientSpec
+)
+
+
 @dataclass(frozen=True, slots=True)
 class ConditionSpec:
     """Something that must be there before a node or process starts.

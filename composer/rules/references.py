@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from composer.diagnostics import Severity
 from composer.rules.record import Family, Rule
 
 _QOS = 'https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Quality-of-Service-Settings.html'
@@ -41,6 +42,14 @@ REFERENCES = Family(
             'cyclic-qos-profile',
             'A QoS profile starts from itself, directly or through others.',
             'Its policies have no values.',
+        ),
+        Rule(
+            'likely-misspelling',
+            'What is waited for, remapped, or a callback group is all but called like something '
+            'of the system.',
+            'It may be elsewhere, so that ROS and Composer would take it as it is.',
+            severity=Severity.WARNING,
+            is_ignorable=True,
         ),
         Rule(
             'unknown-interfaces',

@@ -25,51 +25,18 @@ from composer.runtime.supervision import ErrorReporter
 from composer.runtime.waiting import CoroutineWaits, ThreadWaits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable
 
     from rclpy.callback_groups import CallbackGroup
-    from rclpy.context import Context
     from rclpy.timer import Timer
 
-    from composer.language.positions import DataPath, SourceMap
-    from composer.language.specs import BehaviourSpec, NodeSpec, OnError, QosSpec
+    from composer.language.positions import DataPath
+    from composer.language.specs import BehaviourSpec, NodeSpec, OnError
     from composer.runtime.action_clients import ActionClient
-    from composer.runtime.failures import ServiceFailures
-    from composer.runtime.health import EntityHealth, HealthBoard
+    from composer.runtime.health import EntityHealth
     from composer.runtime.matching import Endpoint
     from composer.runtime.service_clients import ServiceClient
-    from composer.runtime.system_executor import SystemExecutor
-    from composer.runtime.waiting import StopSignal
-
-
-@dataclass(frozen=True, slots=True)
-class SystemServices:
-    """What nodes need of the system that they are part of.
-
-    Attributes:
-        functions: The behaviours, by their names.
-        ros_arguments: The arguments after `--ros-args` of the command line.
-        act_on_error: Takes a node's full name and what to do after an error in it.
-        shutdown: Ends the system with an exit code.
-        executor: Runs the callbacks of all nodes.
-        stop: Whether the system is to stop.
-        failures: Which services failed lately.
-        without_parameter_services: The full names of the nodes that have none.
-        health: How the entities of the system fare; `None` measures nothing.
-    """
-
-    context: Context
-    positions: SourceMap
-    profiles: Mapping[str, QosSpec]
-    functions: Mapping[str, Callable[..., Any]]
-    ros_arguments: Sequence[str]
-    act_on_error: Callable[[str, OnError], None]
-    shutdown: Callable[[int], None]
-    executor: SystemExecutor
-    stop: StopSignal
-    failures: ServiceFailures
-    without_parameter_services: frozenset[str]
-    health: HealthBoard | None
+    from composer.runtime.system_services import SystemServices
 
 
 class AtStop(Protocol):
@@ -217,16 +184,19 @@ class LiveNode:
             failed: Takes what it raised, after that has been reported.
         """
         function = partial(self.function(behaviour), **behaviour.arguments)
-        return self.last_call(owner, behaviour.path, function, failed)
+        return self.reported_call(owner, behaviour.path, function, failed)
 
-    def last_call(
+    def reported_call(
         self,
         owner: str,
         path: DataPath,
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of what is not answered by `on_error` when it raises."""
+        """Return the wrapped call of a function whose errors are reported, and no more.
+
+        At the start and the end of a node `on_error` does not count.
+        """
         place = self.place(path)
         self._limit(owner, place, self.spec)
 

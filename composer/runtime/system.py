@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 import time
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rclpy.context import Context
-from rclpy.exceptions import InvalidHandle
-
-from composer.errors import ComposerError, ExitCode, StartError, UsageError
-from composer.runtime.entities import create_entities
-from composer.runtime.error_texts import represent
+from composer.errors import ExitCode
 from composer.runtime.failures import ServiceFailures
 from composer.runtime.hangs import HangWatch
 from composer.runtime.health import HealthBoard
 from composer.runtime.health_publisher import HealthPublisher
-from composer.runtime.live_node import LiveNode, SystemServices, create_live_node
 from composer.runtime.logs import system_logger
 from composer.runtime.matching import GraphWatch
 from composer.runtime.ownership import release, reserve
 from composer.runtime.processes import Processes
 from composer.runtime.readiness import Readiness, describe_parts, list_waiters
-from composer.runtime.stopping import stop_node, stop_nodes
+from composer.runtime.restarting import NodeRestarter
+from composer.runtime.ros_context import create_ros_context
+from composer.runtime.starting import NodeStarter
+from composer.runtime.stop_request import StopRequest
+from composer.runtime.stopping import stop_nodes
 from composer.runtime.supervision import Supervisor
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.waiting import StopSignal
+from composer.runtime.system_services import SystemServices
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.language.positions import SourceMap
-    from composer.language.specs import NodeSpec, SystemSpec
+    from composer.language.specs import SystemSpec
     from composer.runtime.calls import RunningCall
+    from composer.runtime.live_node import LiveNode
 
 _EXECUTOR_STOP_SEC = 1.0
-_GONE_SEC = 2.0
 
 
 class System:
@@ -65,36 +60,20 @@ class System:
         self._spec = spec
         self.has_ended = False
         self._begun = time.monotonic()
-        self._exit_code: int = ExitCode.DONE
-        self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
-        self._stop_signal = StopSignal()
-        self._rebuilding = threading.Lock()
+        self._stop_request = StopRequest()
         self._nodes: dict[str, LiveNode] = {}
-        self._context = Context()
-        _init_context(self._context, ros_arguments)
-        reserve(self._context, 'the context', 'shutdown', 'try_shutdown', 'destroy')
+        self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
             self._context, spec.threads, log=system_logger.error, lost=self._on_lost
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._watch = HangWatch(lambda: list(self._nodes.values()), _limits(spec))
         self._graph_watch = GraphWatch(lambda: list(self._nodes.values()))
-        self._supervisor = Supervisor(self._restart, self.request_stop)
-        self._services = SystemServices(
-            context=self._context,
-            positions=positions,
-            profiles=spec.qos,
-            functions=functions,
-            ros_arguments=ros_arguments,
-            act_on_error=self._supervisor.act,
-            shutdown=self.request_stop,
-            executor=self._executor,
-            stop=self._stop_signal,
-            failures=ServiceFailures(),
-            without_parameter_services=frozenset(
-                node.full_name for node in spec.nodes.values() if not node.parameter_services
-            ),
-            health=None if spec.diagnostics_period_sec is None else HealthBoard(),
+        self._supervisor = Supervisor(self._restart, self._stop_request.make)
+        self._services = self._share(positions, functions, ros_arguments)
+        self._starter = NodeStarter(self._nodes, self._services)
+        self._restarter = NodeRestarter(
+            self._nodes, self._starter, self._services, spec.shutdown_timeout_sec
         )
         self._health_publisher: HealthPublisher | None = None
         self._processes = Processes(
@@ -105,21 +84,41 @@ class System:
             log_levels,
         )
 
+    def _share(
+        self,
+        positions: SourceMap,
+        functions: Mapping[str, Callable[..., Any]],
+        ros_arguments: Sequence[str],
+    ) -> SystemServices:
+        spec = self._spec
+        return SystemServices(
+            context=self._context,
+            positions=positions,
+            profiles=spec.qos,
+            functions=functions,
+            ros_arguments=ros_arguments,
+            act_on_error=self._supervisor.act,
+            shutdown=self._stop_request.make,
+            executor=self._executor,
+            stop=self._stop_request.signal,
+            failures=ServiceFailures(),
+            without_parameter_services=frozenset(
+                node.full_name for node in spec.nodes.values() if not node.parameter_services
+            ),
+            health=None if spec.diagnostics_period_sec is None else HealthBoard(),
+        )
+
     @property
     def stop_requested(self) -> bool:
         """Whether somebody wants the system to end."""
-        return self._stop_signal.is_set
+        return self._stop_request.signal.is_set
 
     def request_stop(self, code: int = ExitCode.DONE) -> None:
         """Let `wait` return; the first request that is not 0 decides the exit code.
 
-        A signal handler may call it while the main thread is anywhere, so it takes no lock that
-        `wait` holds; a `threading.Event` would.
+        A signal handler may call it while the main thread is anywhere.
         """
-        if self._exit_code == ExitCode.DONE:
-            self._exit_code = code
-        self._stop_signal.set()
-        self._wake_ups.put(None)
+        self._stop_request.make(code)
 
     def abandon(self) -> None:
         """Kill all foreign processes; a signal handler may call it before it ends this one."""
@@ -137,7 +136,7 @@ class System:
         """
         try:
             for spec in self._spec.nodes.values():
-                self._create(spec)
+                self._starter.create(spec)
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_health()
@@ -156,14 +155,11 @@ class System:
         elapsed = time.monotonic() - self._begun
         parts = describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
-        self._open(prompt)
+        self._starter.open(prompt)
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
-        while not self.stop_requested:
-            # A signal that comes right before the wait begins does not interrupt it.
-            with suppress(queue.Empty):
-                self._wake_ups.get(timeout=_LONGEST_DEAF_SEC)
+        self._stop_request.wait()
 
     def stop(self) -> tuple[int, bool]:
         """End the system.
@@ -173,19 +169,17 @@ class System:
             still run, and only the end of the process ends them.
         """
         self._supervisor.stop()
-        with self._rebuilding:
+        with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
         # An `on_stop` may have needed them.
-        if not self._processes.stop() and self._exit_code == ExitCode.DONE:
-            self._exit_code = ExitCode.FAILED
-        if not ended and self._exit_code == ExitCode.DONE:
-            self._exit_code = ExitCode.FAILED
+        if not (self._processes.stop() and ended):
+            self._stop_request.note(ExitCode.FAILED)
         for node in self._nodes.values():
             node.errors.flush()
         if ended:
             self._tear_down()
         self.has_ended = ended
-        return self._exit_code, ended
+        return self._stop_request.code, ended
 
     def _start_all(self) -> list[LiveNode]:
         """Start all processes and nodes; return those nodes whose gates are yet to be opened."""
@@ -194,101 +188,29 @@ class System:
                 self._processes.start(process)
         prompt = [node for node in self._nodes.values() if not node.spec.wait_for]
         for node in prompt:
-            self._run_on_start(node)
+            self._starter.run_on_start(node)
         waiters = list_waiters(self._nodes, self._processes, self._start_late)
         if not waiters or self.stop_requested:
             return prompt
-        self._open(prompt)
+        self._starter.open(prompt)
         readiness = Readiness(
             self._context, self._nodes, self._processes.by_name, self._services.positions
         )
-        readiness.start_all(waiters, self._stop_signal)
+        readiness.start_all(waiters, self._stop_request.signal)
         return []
 
     def _start_late(self, node: LiveNode) -> None:
-        self._run_on_start(node)
+        self._starter.run_on_start(node)
         if not self.stop_requested:
-            self._open([node])
+            self._starter.open([node])
+
+    def _restart(self, full_name: str) -> None:
+        self._restarter.restart(full_name)
 
     def _end(self, code: int) -> None:
         """End the system because of a process, unless it ends already."""
         if not self.stop_requested:
             self.request_stop(code)
-
-    def _create(self, spec: NodeSpec) -> LiveNode:
-        try:
-            node = create_live_node(spec, self._services)
-        except Exception as error:
-            message = f"node '{spec.key}' cannot be created: {error}"
-            raise StartError(message) from error
-        self._nodes[spec.full_name] = node
-        create_entities(node)
-        return node
-
-    def _run_on_start(self, node: LiveNode) -> None:
-        hook = node.spec.on_start
-        if self.stop_requested:
-            return
-        node.has_begun = True
-        if hook is None:
-            return
-        failures: list[BaseException] = []
-        call = node.hook('on_start', hook, failures.append)
-        done = threading.Event()
-        task = self._executor.create_task(call.as_callback(), node.face)
-        task.add_done_callback(lambda _task: done.set())
-        while not done.wait(_POLL_SEC) and not self.stop_requested:
-            pass
-        if failures:
-            # What has not begun has nothing to stop.
-            node.has_begun = False
-            message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
-            raise StartError(message) from failures[0]
-        node.gate.serves = not self.stop_requested
-        self._executor.wake()
-
-    def _open(self, nodes: list[LiveNode]) -> None:
-        for node in nodes:
-            node.gate.open()
-            for timer in node.timers:
-                with suppress(InvalidHandle):
-                    # `on_start` may have destroyed it.
-                    timer.reset()
-        self._executor.wake()
-
-    def _restart(self, full_name: str) -> None:
-        """Rebuild a node: its entities, parameters and state are as at the start again."""
-        with self._rebuilding:
-            old = self._nodes[full_name]
-            name = old.spec.key
-            if self.stop_requested:
-                return
-            timeout_sec = self._spec.shutdown_timeout_sec
-            has_ended = stop_node(old, timeout_sec, lambda: self.stop_requested)
-            if self.stop_requested:
-                return
-            if not has_ended:
-                self._executor.wake()
-                hanging = ', '.join(call.owner for call in old.ledger.running())
-                system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
-                return
-            self._executor.remove_node(old.ros)
-            old.destroy()
-            if not old.ros.wait_until_gone(_GONE_SEC):
-                system_logger.warn(
-                    f"node '{name}': something still holds an entity of the node before its "
-                    'restart, so its log may be missing on /rosout'
-                )
-            try:
-                node = self._create(old.spec)
-                self._executor.add_node(node.ros)
-                self._run_on_start(node)
-            except ComposerError as error:
-                system_logger.error(f'restart: {error}')
-                self._supervisor.act(full_name, 'restart')
-                return
-            self._open([node])
-        system_logger.warn(f"node '{name}' was restarted")
 
     def _publish_health(self) -> None:
         board, period_sec = self._services.health, self._spec.diagnostics_period_sec
@@ -331,27 +253,8 @@ class System:
         self._context.destroy()
 
 
-_POLL_SEC = 0.05
-_LONGEST_DEAF_SEC = 0.5
-
-
 def _limits(spec: SystemSpec) -> Iterator[float | None]:
     for node in spec.nodes.values():
         yield node.warn_after_sec
         for entities in (node.subscriptions, node.timers, node.services, node.actions):
             yield from (entity.warn_after_sec for entity in entities.values())
-
-
-def _init_context(context: Context, ros_arguments: Sequence[str]) -> None:
-    for argument in ros_arguments:
-        if argument.startswith(('__node:=', '__name:=')):
-            message = f"'{argument}' would give all nodes of the system one name"
-            raise UsageError(message, help=f'name the node that is meant, as in talker:{argument}')
-    try:
-        context.init(['--ros-args', *ros_arguments] if ros_arguments else [])
-    except Exception as error:
-        unknown = 'args' in type(error).__name__.lower()
-        kind = UsageError if unknown or "Couldn't parse" in str(error) else StartError
-        reason = f'it does not know the arguments {error}' if unknown else error
-        message = f'ROS 2 cannot start: {reason}'
-        raise kind(message) from error

@@ -97,11 +97,11 @@ class _Ticker:
         owner, path = f"timer '{self._spec.name}'", self._spec.path
         generator, self._generator = self._generator, None
         if generator is not None:
-            self._node.last_call(owner, path, generator.close).run()
+            self._node.reported_call(owner, path, generator.close).run()
         async_generator, self._async_generator = self._async_generator, None
         if async_generator is not None:
             done = threading.Event()
-            call = self._node.last_call(owner, path, async_generator.aclose)
+            call = self._node.reported_call(owner, path, async_generator.aclose)
             task = self._node.services.executor.create_task(
                 call.as_callback(FunctionKind.COROUTINE)
             )

@@ -164,7 +164,7 @@ def test_on_start_may_ask_nodes_that_have_started(check):
 
 @pytest.mark.ros
 def test_what_is_refused_does_time_out_when_it_runs(compose):
-    # The rule reads literal names only.
+    # The rule reads names that stand in the text.
     run = compose(
         f'version: 1\nnodes:{ALONE}'
         '    timers: {tick: {period: 0.1, behaviour: parts:try_it}}\n',
@@ -175,7 +175,7 @@ def test_what_is_refused_does_time_out_when_it_runs(compose):
             return {'success': True}
 
         def try_it(node):
-            name = 'set_it'
+            name = '_'.join(['set', 'it'])
             yield
             try:
                 node.call(name, timeout=2.0)

@@ -222,10 +222,10 @@ def test_an_expectation_fails_if_other_rules_fire(run):
 def test_an_unknown_rule_is_wrong_usage(run, option):
     code, out, err = run('faulty.yaml', option, 'bad-nam')
     assert (code, out) == (2, '')
-    assert "no rule is called 'bad-nam'; did you mean 'bad-name'?" in err
+    assert "no rule is called 'bad-nam'\n  help: did you mean 'bad-name'?" in err
     code, out, err = run('faulty.yaml', option, 'qqqqqq')
     assert code == 2
-    assert "no rule is called 'qqqqqq'; 'composer explain' lists them" in err
+    assert "no rule is called 'qqqqqq'\n  help: 'composer explain' lists them" in err
 
 
 # --import

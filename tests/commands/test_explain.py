@@ -51,7 +51,7 @@ def test_without_a_rule_all_are_listed_by_family(run):
 def test_an_unknown_rule_is_wrong_usage(run):
     code, out, err = run('explain', 'bad-nam')
     assert (code, out) == (2, '')
-    assert "no rule is called 'bad-nam'; did you mean 'bad-name'?" in err
+    assert "no rule is called 'bad-nam'\n  help: did you mean 'bad-name'?" in err
 
 
 def test_the_schema_is_printed(run):

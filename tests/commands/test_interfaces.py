@@ -104,11 +104,11 @@ def test_show_prints_the_comment_on_a_service(run):
         ('std_mgs/msg/Header', "did you mean 'std_msgs/msg/Header'?"),
         (
             'std_msgs',
-            "'std_msgs' is a package: composer interfaces list std_msgs shows what it has",
+            "'std_msgs' is a package: 'composer interfaces list std_msgs' shows what it has",
         ),
-        ('std_msgs/msg/Qqqqqq', 'composer interfaces list std_msgs shows what it has'),
-        ('nope', 'composer interfaces list shows all'),
-        ('', 'composer interfaces list shows all'),
+        ('std_msgs/msg/Qqqqqq', "'composer interfaces list std_msgs' shows what it has"),
+        ('nope', "'composer interfaces list' shows all"),
+        ('', "'composer interfaces list' shows all"),
     ],
 )
 def test_show_says_what_an_unknown_name_may_have_been_meant_to_be(run, name, advice):

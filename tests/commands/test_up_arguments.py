@@ -65,7 +65,7 @@ def test_words_that_do_not_fit_are_an_error_of_usage_that_shows_the_declared_one
 def test_an_unknown_option_is_an_error_and_no_value(run, option):
     code, out, err = run('up', 'configs/calculator_client.yaml', '1', option)
     assert (code, out) == (2, '')
-    assert f'No such option {option!r}' in err or f'No such option: {option}' in err
+    assert f'no such option {option!r}' in err or f'no such option: {option}' in err
 
 
 def test_negative_numbers_are_values_and_no_options(run):

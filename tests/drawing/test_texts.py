@@ -129,7 +129,10 @@ def test_any_name_stays_text_in_mermaid(draw):
 LABEL = re.compile(r'label=<((?:[^<>]|<[^<>]*>)*)>')
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    max_examples=60,
+)
 @given(text=st.text(min_size=1, max_size=20))
 def test_any_name_stays_text_in_dot_and_mermaid(draw, text):
     picture = draw(with_name(text))

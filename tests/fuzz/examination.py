@@ -19,6 +19,8 @@ from tests.fuzz.mutations import mutate
 ROOT = Path(__file__).parents[2]
 MEMORY_BYTES = 1_000_000_000
 LIMIT_SEC = 5.0
+# Nothing of the process that asks goes on in them, such as its threads and its memory.
+_PROCESSES = multiprocessing.get_context('spawn')
 # After so much work without an answer a process is killed.
 _PATIENCE_SEC = 20.0
 
@@ -92,17 +94,18 @@ class _Worker:
         self._begin(indices)
 
     def _begin(self, indices):
-        self._step = multiprocessing.Value('l', indices[0])
+        self._step = _PROCESSES.Value('l', indices[0])
         self._seen = (indices[0], 0.0)
-        self._process = multiprocessing.Process(
+        self._process = _PROCESSES.Process(
             target=_work, args=(self._seed, indices, self._results, self._step), daemon=True
         )
         self._process.start()
 
     def is_done(self):
         """Return whether all is examined; replace the process if it hangs or has died."""
-        at = self._step.value
+        # In this order: one that has ended says no more where it is.
         alive = self._process.is_alive()
+        at = self._step.value
         if at == -1 and not alive:
             return True
         if at != self._seen[0]:
@@ -121,7 +124,7 @@ class _Worker:
 
 def examine_all(seed, count, first=0, jobs=2):
     """Return the failures among `count` mutated inputs."""
-    results = multiprocessing.Queue()
+    results = _PROCESSES.Queue()
     ranges = [range(first + job, first + count, jobs) for job in range(jobs)]
     workers = [_Worker(seed, indices, results) for indices in ranges if indices]
     failures = []

@@ -60,7 +60,7 @@ def run_python(shared_cache: Path) -> RunPython:
             env=process_environment(cache, **changes),
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=250,
             check=False,
         )
 

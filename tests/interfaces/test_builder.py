@@ -144,6 +144,7 @@ print('same')
     assert run.stdout.splitlines()[-1:] == ['same'], run.stderr
 
 
+@pytest.mark.usefixtures('domain_id')
 def test_a_service_of_every_kind_answers(
     run_python: RunPython,
     parts: tuple[Path, Path],
@@ -163,14 +164,14 @@ def answer(request, response):
 
 node.create_service(Everything, 'everything', answer)
 client = node.create_client(Everything, 'everything')
-assert client.wait_for_service(20)
+assert client.wait_for_service(60)
 many = [fill(load('all_parts/Everything'), random.Random(seed), load) for seed in range(3)]
 future = client.call_async(Everything.Request(many=many))
-rclpy.spin_until_future_complete(node, future, timeout_sec=20)
+rclpy.spin_until_future_complete(node, future, timeout_sec=60)
 print(future.result().one == many[-1])
 """
     )
-    run = run_python(code, 'all_parts,more_parts', *parts, ROS_DOMAIN_ID='81')
+    run = run_python(code, 'all_parts,more_parts', *parts)
     assert run.stdout.splitlines()[-1:] == ['True'], run.stderr
 
 
@@ -268,16 +269,16 @@ from action_tutorials_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
 
 def wait(future):
-    rclpy.spin_until_future_complete(node, future, timeout_sec=20)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=60)
     return future.result()
 
 rclpy.init()
 node = rclpy.create_node('client')
 adder = node.create_client(AddTwoInts, 'add')
-assert adder.wait_for_service(20)
+assert adder.wait_for_service(60)
 print(wait(adder.call_async(AddTwoInts.Request(a=2, b=3))).sum)
 fibonacci = ActionClient(node, Fibonacci, 'fibonacci')
-assert fibonacci.wait_for_server(20)
+assert fibonacci.wait_for_server(60)
 goal = wait(fibonacci.send_goal_async(Fibonacci.Goal(order=7)))
 print(list(wait(goal.get_result_async()).result.sequence))
 [feedback] = node.get_publishers_info_by_topic('/fibonacci/_action/feedback')
@@ -292,7 +293,6 @@ def shipped() -> list[str]:
     return [','.join(names), *(str(SHIPPED / name) for name in names)]
 
 
-@pytest.fixture
 def test_two_processes_talk_by_service_and_action(
     run_python: RunPython,
     start_program: StartProgram,

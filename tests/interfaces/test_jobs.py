@@ -49,7 +49,7 @@ def test_two_jobs_run_at_the_same_time(tmp_path: Path) -> None:
         'import os, sys, time\n'
         'mine, other = sys.argv[1:]\n'
         'open(mine, "w").close()\n'
-        'end = time.monotonic() + 20\n'
+        'end = time.monotonic() + 60\n'
         'while not os.path.exists(other):\n'
         '    assert time.monotonic() < end\n'
         '    time.sleep(0.01)\n'

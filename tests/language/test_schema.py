@@ -155,7 +155,10 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
             '{on_start: {with: {}}}',
             ('missing-key', "the key 'behaviour' is missing in behaviour 'on_start'", None),
         ),
-        ('{publishers: {a: std_msgs/String}}', ('bad-value', A_TYPE + "'std_msgs/String'", None)),
+        (
+            '{publishers: {a: std_msgs/String}}',
+            ('bad-value', A_TYPE + "'std_msgs/String'", "did you mean 'std_msgs/msg/String'?"),
+        ),
         (
             '{publishers: {a: {type: std_msgs/srv/Empty}}}',
             ('bad-value', A_TYPE + "'std_msgs/srv/Empty'", None),

@@ -230,7 +230,7 @@ args: {level: {}, count: {type: integer}, kind: {type: string}, mode: {choices: 
 nodes:
   n:
     log_level: "{{ level }}"
-    publishers: {p: "{{ kind }}", q: std_msgs/msg/Int32}
+    publishers: {p: "{{ kind }}", q: {type: std_msgs/msg/Int32, external: true}}
     timers:
       a: {period: "{{ 1 / (count - 1) }}", publish: q, message: 1}
       b: {period: 1, behaviour: "behaviours.{{ kind }}:run"}

@@ -177,6 +177,9 @@ class PlainServer:
         self.context.destroy()
 
     def _execute(self, goal):
+        # The client's ends are found one after the other, that for feedback before this one.
+        while not (self.node.count_subscribers('act/_action/status') or self._ended.is_set()):
+            time.sleep(0.01)
         order, step = goal.request.order, 0
         while not self._ended.is_set():
             if goal.is_cancel_requested:

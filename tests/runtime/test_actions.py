@@ -13,6 +13,8 @@ from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
 from test_msgs.action import Fibonacci
 
+from tests.running import DEADLINE_SEC
+
 pytestmark = pytest.mark.ros
 
 STATUS = {
@@ -141,7 +143,8 @@ class Client:
             cancel_service_qos_profile=deep,
             feedback_sub_qos_profile=deep,
         )
-        assert self._client.wait_for_server(30)
+        assert self._client.wait_for_server(DEADLINE_SEC)
+        peer.meet_action_server(name)
 
     def send(self, order, heard=None):
         """Return the future of a goal handle."""

@@ -59,7 +59,7 @@ def hold_interpreter(node):
 """
 
 
-def system(behaviour, *, fails=False, timeout=1.0):
+def system(behaviour, *, fails=False, timeout=30.0):
     failing = "fail: {period: 0.3, behaviour: 'parts:fail', on_error: restart}" if fails else ''
     return f"""
         version: 1
@@ -111,7 +111,7 @@ def test_a_generator_that_does_not_let_itself_be_closed_is_an_error(compose):
     [('slow_end', 'walking', 'time.sleep(1000)'), ('spin', 'spinning', 'in spin')],
 )
 def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose, behaviour, said, statement):
-    child = compose(system(behaviour), CODE)
+    child = compose(system(behaviour, timeout=2.0), CODE)
     child.wait_for_line(said)
 
     assert child.stop() == 1
@@ -122,7 +122,7 @@ def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose, behaviour
 def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_alive(compose):
     text = """
         version: 1
-        executor: {shutdown_timeout: 0.5}
+        executor: {shutdown_timeout: 2.0}
         nodes: {stuck: {on_stop: 'parts:hold_interpreter'}}
     """
     child = compose(text, CODE)

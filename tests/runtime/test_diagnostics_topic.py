@@ -1,5 +1,8 @@
 """`/diagnostics`, as a plain rclpy node hears it from a running system."""
 
+from itertools import pairwise
+from statistics import median
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -72,6 +75,7 @@ def listener(peer):
 def test_calls_and_errors_are_counted(compose, peer, listener, wait_for):
     compose(SYSTEM, BEHAVIOURS).wait_until_ready()
     publisher = peer.advertise(Int32, '/numbers')
+    wait_for(lambda: listener.messages, 'a message, after which none is missed')
     name = '/robot/ear: subscription numbers'
     for number in (1, 2, -3, 4, -5):
         publisher.publish(Int32(data=number))
@@ -108,6 +112,7 @@ def test_a_behaviour_that_hangs_is_told_of_with_all_that_it_holds_up(
     status = listener.statuses(slow)[-1]
     assert status.level == DiagnosticStatus.WARN
     assert listener.values(slow)['calls'] == '0'
+    wait_for(lambda: listener.values(slow)['queue overruns'] == '90', 'all that is dropped')
     peer.advertise(Empty, '/release').publish(Empty())
     wait_for(lambda: listener.values(slow)['calls'] == '11', 'those that were kept')
     assert listener.values(slow)['queue overruns'] == '90'
@@ -159,11 +164,15 @@ def seen(peer, name):
 def test_it_comes_as_often_as_declared(compose, peer, listener, wait_for, written, period_sec):
     child = compose(SYSTEM.replace('{period: 0.2}', written), BEHAVIOURS)
     child.wait_until_ready()
-    # Messages that the machine delayed do not shift those after them.
+
+    def median_sec():
+        headers = [message.header.stamp for message in list(listener.messages)]
+        stamps = [stamp.sec + stamp.nanosec / 1e9 for stamp in headers]
+        return median([later - earlier for earlier, later in pairwise(stamps)])
+
+    # The machine may delay messages: some come late, and the ones after them early.
     wait_for(lambda: len(listener.messages) > 5, 'six messages')
-    stamps = [m.header.stamp.sec + m.header.stamp.nanosec / 1e9 for m in listener.messages[:6]]
-    mean_sec = (stamps[-1] - stamps[0]) / 5
-    assert 0.5 * period_sec < mean_sec < 5 * period_sec
+    wait_for(lambda: 0.8 < median_sec() / period_sec < 1.25, 'as many as are declared')
     assert child.stop() == 0
 
 
@@ -172,7 +181,11 @@ def test_its_node_is_hidden_and_has_nothing_but_the_topic(compose, peer, listene
     child.wait_until_ready()
     wait_for(lambda: seen(peer, '_composer_system'), 'the node')
     wait_for(lambda: listener.messages, 'a message')
-    (end,) = peer.node.get_publishers_info_by_topic('/diagnostics')
-    assert end.node_name == '_composer_system'
+
+    def publishers():
+        return [e.node_name for e in peer.node.get_publishers_info_by_topic('/diagnostics')]
+
+    # An end may be found before the name of its node.
+    wait_for(lambda: publishers() == ['_composer_system'], 'its publisher')
     assert peer.node.get_service_names_and_types_by_node('_composer_system', '/') == []
     assert child.stop() == 0

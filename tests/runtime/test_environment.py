@@ -32,19 +32,18 @@ processes: {{driver: {{command: [sh, -c, 'echo "$ROS_DOMAIN_ID $MODE"']}}}}
 """
 
 
-def test_variables_hold_for_ros_behaviours_and_processes(compose, domain_id):
-    other = domain_id + 1
-    child = compose(SYSTEM.format(domain=other), CODE)
+def test_variables_hold_for_ros_behaviours_and_processes(compose, other_domain_id):
+    child = compose(SYSTEM.format(domain=other_domain_id), CODE)
 
     assert child.wait() == 0
-    assert f'imported in {other} fast' in child.lines
-    assert f'[driver] {other} fast' in child.lines
+    assert f'imported in {other_domain_id} fast' in child.lines
+    assert f'[driver] {other_domain_id} fast' in child.lines
     # The form of the log shows that it was set before ROS was loaded.
-    assert f'<domain {other}>' in child.lines
+    assert f'<domain {other_domain_id}>' in child.lines
 
 
-def test_variables_are_as_before_when_a_system_has_ended_in_process(compose, domain_id):
-    path = compose.write(SYSTEM.format(domain=domain_id + 1), CODE)
+def test_variables_are_as_before_when_a_system_has_ended_in_process(compose, other_domain_id):
+    path = compose.write(SYSTEM.format(domain=other_domain_id), CODE)
     program = """
 import os, sys
 import composer
@@ -61,7 +60,7 @@ print(code, before == dict(os.environ))
         env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
         stdout=subprocess.PIPE,
         text=True,
-        timeout=100,
+        timeout=200,
         check=True,
     )
 

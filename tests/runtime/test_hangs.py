@@ -53,10 +53,15 @@ def call(node):
     node.call('absent', timeout=1.0)
 
 def count(node, goal):
+    pauses = []
+    begun = time.monotonic()
     for number in range(goal.order):
         time.sleep(0.12)
+        before_yield = time.monotonic()
         yield [number]
-    node.logger.info('counted')
+        pauses.append(time.monotonic() - begun)
+        begun = before_yield
+    node.logger.info(f'counted, resting for {max(pauses):.3f} s at most')
     return [1]
 
 def count_slowly(node, goal):
@@ -156,12 +161,15 @@ def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
             timers: {{stuck: {{period: 0.02, behaviour: 'parts:hang'}}}}
     """
     child = compose(text, CODE)
+    report = "[bad]: timer 'stuck' (system.yaml:6) has been"
     child.wait_for_line('[witness]: timer')
+    if is_reported:
+        child.wait_for_line(report)
     (compose.folder / 'over').touch()
     child.wait_for_line('[witness]: timer', times=2)
     assert child.stop() == 0
 
-    assert bool(child.matching("[bad]: timer 'stuck' (system.yaml:6) has been")) is is_reported
+    assert bool(child.matching(report)) is is_reported
 
 
 def test_what_is_slow_again_and_again_is_not_told_each_time(compose):
@@ -269,10 +277,12 @@ def go(node):
 def test_an_action_that_yields_feedback_is_not_reported(compose):
     pytest.importorskip('test_msgs')
     child = compose(ACTION.format(behaviour='count'), ACTION_CODE)
-    child.wait_for_line('counted')
+    line = child.wait_for_line('counted')
     assert child.stop() == 0
 
-    assert not child.matching('has been running for')
+    # On a crowded machine it may have rested for too long indeed.
+    rest_sec = float(line.split()[-4])
+    assert rest_sec > 0.4 or not child.matching('has been running for')
 
 
 def test_an_action_that_yields_no_more_is_reported_until_it_does(compose):

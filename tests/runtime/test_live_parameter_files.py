@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 
 from composer.language.parameter_files import read_parameter_file
 from composer.language.parameter_overrides import find_overrides
+from tests.running import reserved_domain
 
 pytestmark = pytest.mark.ros
 
@@ -110,10 +111,11 @@ def test_a_value_that_the_declaration_refuses_stops_the_start(compose, tmp_path)
 @pytest.fixture(scope='module')
 def context():
     context = rclpy.Context()
-    rclpy.init(context=context)
-    yield context
-    context.try_shutdown()
-    context.destroy()
+    with reserved_domain() as domain:
+        rclpy.init(context=context, domain_id=domain)
+        yield context
+        context.try_shutdown()
+        context.destroy()
 
 
 def load_by_rcl(context, *paths, name='arm', namespace='/robot'):

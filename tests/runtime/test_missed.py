@@ -15,8 +15,9 @@ from rclpy.time import Time
 from std_msgs.msg import Int32
 
 from composer.runtime.executor import Missed
+from tests.running import DEADLINE_SEC
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
 
 SENDER = """
 import sys, time
@@ -30,6 +31,7 @@ qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy[sys.argv[1]])
 publisher = node.create_publisher(Int32, 'numbers', qos)
 while not publisher.get_subscription_count():
     time.sleep(0.01)
+sys.stdin.readline()
 for number in range(int(sys.argv[2])):
     publisher.publish(Int32(data=number))
 sys.stdin.read()
@@ -43,7 +45,7 @@ def spinning(executor):
     try:
         yield
     finally:
-        executor.shutdown(10.0)
+        executor.shutdown(DEADLINE_SEC)
         thread.join()
 
 
@@ -105,8 +107,11 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
     node, executor, wait_for, start_program, reliability
 ):
     slow = Slow(node, reliability)
-    start_program('-c', SENDER, reliability, '200', stdin=PIPE)
+    sender = start_program('-c', SENDER, reliability, '200', stdin=PIPE)
+    wait_for(slow.entity.get_publisher_count, 'the publisher')
     with spinning(executor):
+        wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
+        print('go', file=sender.stdin, flush=True)
         wait_for(lambda: executor.missed(node, slow.entity).overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1] == 199, 'the last message')

@@ -153,7 +153,9 @@ def test_subscriptions_services_and_parameters_may_raise_anything(compose, peer,
     assert child.stop() == 0
 
     assert not own_frames(child)
-    assert len(child.matching('[ERROR]')) == 3 * len(ERRORS)
+    # A change that is not answered in time is asked for again.
+    first = [line for line in child.matching('[ERROR]') if ', last: ' not in line]
+    assert len(first) == 3 * len(ERRORS)
 
 
 @pytest.mark.parametrize('error', ['exit', 'generator_exit', 'mute'])

@@ -11,9 +11,13 @@ pytest.importorskip('rclpy')
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from tests.running import DEADLINE_SEC
+
 pytestmark = pytest.mark.ros
 
 CODE = """
+import time
+
 def tell(node, text):
     node.logger.info(text)
 
@@ -25,6 +29,14 @@ def compute(node, goal):
 
 def fail(node):
     raise OSError('no such device')
+
+def meet_peer(node):
+    while 'peer' not in node.ros.get_node_names():
+        time.sleep(0.01)
+
+def find_scan(node):
+    while not node.ros.count_publishers('/scan'):
+        time.sleep(0.01)
 """
 WAITING = "on_start: {behaviour: 'parts:tell', with: {text: starts}}"
 
@@ -97,7 +109,7 @@ def test_a_node_answers_nobody_before_it_starts(compose, peer):
     code = CODE.replace("return {'success'", "node.logger.info('asked')\n    return {'success'")
     child = compose(text, code)
     client = peer.node.create_client(Trigger, 'ask')
-    assert client.wait_for_service(20)
+    assert client.wait_for_service(DEADLINE_SEC)
     client.call_async(Trigger.Request())
     child.wait_for_line('tick', times=len(child.matching('tick')) + 20)
     assert not child.matching('asked')
@@ -112,7 +124,7 @@ def test_an_action_is_waited_for(compose):
         version: 1
         nodes:
           user:
-            wait_for: [{{action: count, timeout: 20}}, {{node: server}}]
+            wait_for: [{{action: count, timeout: 40}}, {{node: server}}]
             {WAITING}
           server:
             actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}
@@ -206,6 +218,7 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
             wait_for: {{topic: scam, timeout: 1.0}}
             {WAITING}
           free:
+            on_start: parts:find_scan
             on_stop: {{behaviour: 'parts:tell', with: {{text: stops}}}}
         processes:
           driver: {{command: [sleep, '3600']}}
@@ -246,6 +259,7 @@ def test_each_kind_says_what_there_is_instead(compose, peer, condition, trouble,
             wait_for: {{topic: never, timeout: 3600}}
             publishers: {{held: {{type: std_msgs/msg/String, external: true}}}}
           free:
+            on_start: parts:meet_peer
             publishers: {{words: {{type: std_msgs/msg/String, external: true}}}}
             services: {{ask: {{type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}}}
             actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}

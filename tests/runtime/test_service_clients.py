@@ -294,7 +294,7 @@ ERRORS = {
     ),
     'failing': (
         SERVER.replace('parts:answer', 'parts:fail'),
-        '0.5',
+        '3.0',
         "ServiceFailedError: '/ask' did not answer: its behaviour raised an error"
         " (the server's log has the traceback), 0 pending",
     ),
@@ -314,8 +314,9 @@ def test_a_call_says_why_it_has_no_response_and_leaves_nothing_behind(compose, b
 
 def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
     server = plain_server('hang')
-    timer = "timers: {tick: {period: 0.02, behaviour: 'parts:ask_and_tell', with: {timeout: 2.0}}}"
-    child = compose(asking(timer, server=''), CODE)
+    client = """wait_for: {service: ask}
+            timers: {tick: {period: 0.02, behaviour: 'parts:ask_and_tell', with: {timeout: 2.0}}}"""
+    child = compose(asking(client, server=''), CODE)
     assert server.stdout.readline() == 'asked\n'
     server.kill()
 

@@ -130,6 +130,8 @@ def test_private_remapped_and_absolute_names_are_served(child, shared_peer, name
 def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
     client = shared_peer.node.create_client(BasicTypes, '/robot/echo')
     assert client.wait_for_service(30)
+    # Ends are found in the order in which they were made: who answers this knows the client.
+    shared_peer.call(Trigger, '/robot/message')
     futures = [
         client.call_async(BasicTypes.Request(int64_value=number, string_value=str(number)))
         for number in range(8)
@@ -166,15 +168,19 @@ def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
     shared_peer.node.destroy_client(client)
 
 
-def test_the_quality_of_service_is_the_declared_one(child, shared_peer):
+def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for):
     profile = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
     client = shared_peer.node.create_client(Trigger, '/robot/best_effort', qos_profile=profile)
     assert client.wait_for_service(30)
 
-    readers = shared_peer.node.get_subscriptions_info_by_topic(
-        'rq/robot/best_effortRequest', no_mangle=True
-    )
-    theirs = [info for info in readers if info.node_name == 'server']
+    def readers():
+        found = shared_peer.node.get_subscriptions_info_by_topic(
+            'rq/robot/best_effortRequest', no_mangle=True
+        )
+        return [info for info in found if info.node_name == 'server']
+
+    # An end may be found before the name of its node.
+    theirs = wait_for(readers, 'the end of the server')
     assert [info.qos_profile.reliability for info in theirs] == [ReliabilityPolicy.BEST_EFFORT]
     shared_peer.node.destroy_client(client)
 
@@ -202,10 +208,13 @@ def test_requests_of_a_reentrant_service_run_beside_each_other(compose, peer, wa
           server:
             services:
               meet: {type: std_srvs/srv/Trigger, behaviour: 'parts:meet', group: reentrant}
+              other: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
     """
     child = compose(text, CODE)
     client = peer.node.create_client(Trigger, 'meet')
     assert client.wait_for_service(30)
+    # Ends are found in the order in which they were made: who answers this knows the client.
+    peer.call(Trigger, 'other')
     futures = [client.call_async(Trigger.Request()) for _ in range(2)]
     wait_for(lambda: all(future.done() for future in futures), 'both responses')
 

@@ -203,7 +203,7 @@ def test_on_start_may_end_the_system(compose):
 
 HANGING = """
 version: 1
-executor: {{shutdown_timeout: 1.0}}
+executor: {{shutdown_timeout: 3.0}}
 nodes:
   stuck:
     timers: {{hang: {{period: 0.02, behaviour: 'parts:{behaviour}'}}}}
@@ -236,7 +236,7 @@ def test_a_behaviour_that_hangs_at_the_stop_is_shown_with_its_stack_and_exit_cod
 def test_on_stop_that_hangs_is_shown_with_its_stack_and_exit_code_1(compose):
     text = """
         version: 1
-        executor: {shutdown_timeout: 0.5}
+        executor: {shutdown_timeout: 3.0}
         nodes: {stuck: {on_stop: 'parts:hang'}}
     """
     child = compose(text, CODE)
@@ -304,7 +304,7 @@ def work(node):
 def test_a_signal_while_on_start_runs_ends_the_start(compose):
     text = """
         version: 1
-        executor: {shutdown_timeout: 0.5}
+        executor: {shutdown_timeout: 3.0}
         nodes:
           stuck: {on_start: 'parts:hang'}
           other:

@@ -1,6 +1,7 @@
 """What a system asks of its executor beyond rclpy's promises."""
 
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -13,8 +14,8 @@ from composer.runtime.executor import ComposerExecutor
 from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(60, method='thread')]
-DEADLINE_SEC = 20.0
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+DEADLINE_SEC = 40.0
 
 
 @pytest.fixture
@@ -58,14 +59,17 @@ def test_callbacks_of_a_gated_reentrant_group_run_beside_each_other(
     met = []
 
     def meet():
-        barrier.wait(DEADLINE_SEC)
-        met.append(1)
+        with suppress(threading.BrokenBarrierError):
+            barrier.wait(DEADLINE_SEC)
+            met.append(1)
 
     node.create_timer(0.01, meet, callback_group=GatedReentrantGroup(gate))
     executor.start()
 
     wait_for(lambda: len(met) >= 2, 'two ticks at the same time')
-    executor.stop(DEADLINE_SEC)
+    # Another tick may wait for its like.
+    barrier.abort()
+    assert executor.stop(DEADLINE_SEC)
 
 
 def test_a_callback_that_waits_does_not_count_against_the_threads(system_executor, node, wait_for):
@@ -138,7 +142,7 @@ def test_a_missing_response_is_no_fault(system_executor):
     assert system_executor.logged == []
 
 
-def test_threads_end_with_their_executor(context):
+def test_threads_end_with_their_executor(context, wait_for):
     before = set(threading.enumerate())
     executor = ComposerExecutor(context=context)
     future = Future()
@@ -147,4 +151,5 @@ def test_threads_end_with_their_executor(context):
 
     executor.shutdown()
 
-    assert set(threading.enumerate()) == before
+    # Threads of other executors may end meanwhile.
+    wait_for(lambda: set(threading.enumerate()) <= before, 'the end of its threads')

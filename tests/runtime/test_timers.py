@@ -17,7 +17,7 @@ nodes:
   kinds:
     state: {count: 0, nested: {deep: [1, 2]}}
     publishers:
-      counted: std_msgs/msg/Int32
+      counted: {type: std_msgs/msg/Int32, qos: 1000}
       generated: std_msgs/msg/Int32
       awaited: std_msgs/msg/String
       async_generated: std_msgs/msg/Int32
@@ -100,7 +100,7 @@ def wait_for_peer(node):
         time.sleep(0.01)
 """
     )
-    lists = {topic: shared_peer.listen(kind, topic) for topic, kind in classes.items()}
+    lists = {topic: shared_peer.listen(kind, topic, 1000) for topic, kind in classes.items()}
     child = shared_compose(f'{KINDS}    on_start: parts:wait_for_peer\n', code)
     child.wait_until_ready()
     return lists, child

@@ -72,14 +72,16 @@ for turn in range(int(sys.argv[2])):
         before = [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
 # A thread that has been joined may take a moment to leave the kernel's list.
 deadline = time.monotonic() + 20
-after = None
-while after != before and time.monotonic() < deadline:
+new = [1]
+while any(new) and time.monotonic() < deadline:
+    time.sleep(0.01)
     after = [len(os.listdir(f'/proc/self/{kind}')) for kind in ('task', 'fd')]
+    new = [max(0, now - then) for now, then in zip(after, before)]
 import parts
 print(json.dumps({
     'codes': codes,
     'threads': [thread.name for thread in threading.enumerate()],
-    'new tasks and descriptors': [max(0, now - then) for now, then in zip(after, before)],
+    'new tasks and descriptors': new,
     'seen': len(parts.files),
     'left': [name for name in parts.files if os.path.exists(name)],
     'handlers': handlers == [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)],
@@ -99,7 +101,7 @@ def run_program(compose):
             env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
             stdout=subprocess.PIPE,
             text=True,
-            timeout=100,
+            timeout=200,
             check=False,
         )
         assert result.returncode == 0, result.stdout

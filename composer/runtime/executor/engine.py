@@ -211,6 +211,7 @@ class Engine:
             self.registry.is_stale
             or self.polling.alarms.jumped
             or (len(schedule) and schedule.can_admit())
+            or not self.is_alive()
         )
 
     def leave_to_parent(self) -> None:

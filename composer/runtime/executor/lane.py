@@ -33,6 +33,10 @@ _HURRIED_SEC = 0.2
 _HURRIED_TIMES = 3
 _REST_SHARE = 10
 _ANSWER_SEC = 1.0
+# rclpy tells of a signal before it shuts the contexts down, in a thread that may be kept waiting
+# in between (rclpy's signal_handler.cpp): for so long after a signal, the context is looked at.
+_SIGNAL_SEC = 10.0
+_SIGNAL_POLL_SEC = 0.005
 
 
 class _EventWatch:
@@ -88,6 +92,7 @@ class Lane:
         self._waited_for: set[PolledSource] = set()
         self._given = _EventWatch(0.02, 1.0, 0.01)
         self._default = _EventWatch(0.1, 30.0, 0.002)
+        self._signalled_until = 0.0
         self._wait_set: tuple[tuple[int, ...], Any] | None = None
 
     def add(self, source: PolledSource) -> None:
@@ -207,7 +212,8 @@ class Lane:
                     self._thread = None
                     self._wait_set = None
                     return
-            self._wait(_UNUSED_SEC if unused else None)
+            # Whoever asked is waiting, and the poke may have been spent on the wait before.
+            self._wait(0 if asked > self._answer else _UNUSED_SEC if unused else None)
             self._sweep()
             if asked > self._answer:
                 with self._answered:
@@ -234,6 +240,7 @@ class Lane:
                 if _is_ready(source, wait_set, triggered):
                     source.announce()
             if self._sigint_guard.handle.pointer in triggered:
+                self._signalled_until = time.monotonic() + _SIGNAL_SEC
                 self._engine.wake()
 
     def _filled(self, sources: Iterable[PolledSource]) -> Any:
@@ -273,6 +280,8 @@ class Lane:
         dues = [watch.due for watch in (self._given, self._default) if watch.sources]
         if most_sec is not None:
             dues.append(now + most_sec)
+        if now < self._signalled_until:
+            dues.append(now + _SIGNAL_POLL_SEC)
         return max(0.0, min(dues) - now) if dues else None
 
     def _sweep(self) -> None:

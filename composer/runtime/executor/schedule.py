@@ -46,6 +46,9 @@ class Run(Protocol):
 
     node: Any
 
+    def is_orphan(self) -> bool:
+        """Tell whether its node has been destroyed."""
+
 
 class Schedule:
     """The queues. Every change is made with `lock` held, and nothing is called under it."""
@@ -123,8 +126,11 @@ class Schedule:
         """Tell which nodes' suspended callbacks may go on."""
         with self.lock:
             self._nodes = set(nodes)
-            self._new_runs += self._held
-            self._held = []
+            held, self._held = self._held, []
+        # Those that go on no more are let go of, which runs what they do in `finally:`.
+        kept = [run for run in held if not run.is_orphan()]
+        with self.lock:
+            self._new_runs += kept
 
     def claim(self, *, alone: bool = False) -> Any:
         """Return a source or a run to execute now, or None; `finish` must follow.

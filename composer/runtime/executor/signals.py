@@ -21,6 +21,7 @@ from composer.runtime.executor.rcl import (
 )
 
 _MOST_EVENTS = 512
+_LEFT_TO_OTHERS = 64
 
 
 class Listener(Protocol):
@@ -43,26 +44,39 @@ class _Descriptors:
         self._spare: list[int] = []
         os.register_at_fork(after_in_child=self._spare.clear)
 
-    def get(self) -> int:
-        """Return an eventfd; raises OSError when there are no more descriptors."""
+    def get(self, left_to_others: int) -> int:
+        """Return an eventfd.
+
+        Raises:
+            OSError: The process may have no more descriptors, or only so many that are left to
+                others.
+        """
         try:
             return self._spare.pop()
         except IndexError:
             pass
         try:
-            return os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+            fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         except OSError as error:
-            if error.errno != errno.EMFILE:
+            if error.errno != errno.EMFILE or not _raise_limit():
                 raise
-            soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-            if soft == hard:
-                raise
-            resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-        return os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+            return self.get(left_to_others)
+        soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if fd < soft - left_to_others or _raise_limit():
+            return fd
+        os.close(fd)
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
 
     def put(self, fd: int) -> None:
         """Keep `fd` for the next entity."""
         self._spare.append(fd)
+
+
+def _raise_limit() -> bool:
+    """Let the process have as many descriptors as it may; returns whether these are more."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return soft < hard
 
 
 _descriptors = _Descriptors()
@@ -106,12 +120,13 @@ class SignalBoard:
     def attach(self, listener: Listener, shared: Signal | None = None) -> Signal:
         """Give `listener` a signal of its own, or a place at `shared`.
 
-        When the process has no more descriptors, an existing signal is shared: slow but right.
+        When the process has few descriptors left, an existing signal is shared: slow but right.
         """
         with self._lock:
             if shared is None:
                 try:
-                    shared = Signal(_descriptors.get(), listener.rank)
+                    left_to_others = _LEFT_TO_OTHERS if self._signals else 0
+                    shared = Signal(_descriptors.get(left_to_others), listener.rank)
                 except OSError:
                     if not self._signals:
                         raise

@@ -8,6 +8,7 @@ reason is resumed at once, then at growing intervals.
 import types
 from typing import Any
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.task import Future, Task
 
 _FUTURE_AWAIT = Future.__await__.__code__
@@ -42,6 +43,16 @@ class TaskRun:
         self.node = None if source is None else source.node
         self.pause_sec = 0.0
         self.slow = False
+
+    def is_orphan(self) -> bool:
+        """See `schedule.Run`."""
+        if self.node is None:
+            return False
+        try:
+            with self.node.handle:
+                return False
+        except InvalidHandle:
+            return True
 
     def next_pause(self) -> float:
         """How long to wait before a coroutine that waits for nothing known is tried again."""

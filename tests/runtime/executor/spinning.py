@@ -2,11 +2,12 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sized
 from contextlib import contextmanager
 from typing import Any
 
-DEADLINE_SEC = 20.0
+DEADLINE_SEC = 40.0
+QUIET_SEC = 0.2
 
 
 def wait_for(condition: Callable[[], Any]) -> None:
@@ -15,6 +16,17 @@ def wait_for(condition: Callable[[], Any]) -> None:
     while not condition():
         assert time.monotonic() < end, 'the condition never held'
         time.sleep(0.002)
+
+
+def wait_until_quiet(calls: Sized) -> None:
+    """Wait until a list has stopped growing: a callback under way may still add to it."""
+
+    def is_quiet() -> bool:
+        seen = len(calls)
+        time.sleep(QUIET_SEC)
+        return len(calls) == seen
+
+    wait_for(is_quiet)
 
 
 @contextmanager
@@ -33,6 +45,6 @@ def spinning(executor: Any) -> Iterator[list[BaseException]]:
     try:
         yield errors
     finally:
-        executor.shutdown(5.0)
+        executor.shutdown(DEADLINE_SEC)
         thread.join(DEADLINE_SEC)
         assert not thread.is_alive()

@@ -61,7 +61,7 @@ node.create_timer(0.002, publish, callback_group=group())
 node.create_timer(0.02, WHO, callback_group=group())
 spinning = threading.Thread(target=executor.spin)
 spinning.start()
-deadline = time.monotonic() + 20
+deadline = time.monotonic() + 60
 while len(codes) < 5 and time.monotonic() < deadline:
     time.sleep(0.01)
     for child in children[len(codes):]:
@@ -88,7 +88,7 @@ def _run(domain_id, who, in_child):
         env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     return [*json.loads(ended.stdout.splitlines()[-1]), ended.stderr]

@@ -18,7 +18,7 @@ from spinning import DEADLINE_SEC, spinning, wait_for
 from composer.runtime.executor import ComposerExecutor
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
 
 
 def _overlap(node: Any, executor: Any, groups: list[Any]) -> int:

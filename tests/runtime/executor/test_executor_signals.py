@@ -1,9 +1,12 @@
 """Signals between the middleware and the executor."""
 
+import resource
+
 import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.runtime.executor import signals
 from composer.runtime.executor.rcl import write_eventfd
 from composer.runtime.executor.signals import SignalBoard
 
@@ -38,4 +41,17 @@ def test_of_several_signals_the_least_rank_is_heard_first():
         write_eventfd(board.attach(Listener(rank, heard)).fd)
     board.deliver(board.wait(5.0))
     assert heard == [0, 1, 2, 3]
+    board.close()
+
+
+def test_the_last_descriptors_of_the_process_are_left_to_others(monkeypatch):
+    board = SignalBoard()
+    monkeypatch.setattr(signals, '_descriptors', signals._Descriptors())
+    monkeypatch.setattr(resource, 'setrlimit', lambda _what, _limits: None)
+    first = board.attach(Listener(0, []))
+    soft = first.fd + 20
+    monkeypatch.setattr(resource, 'getrlimit', lambda _what: (soft, soft))
+    assert board.attach(Listener(0, [])) is first
+    monkeypatch.setattr(resource, 'getrlimit', lambda _what: (soft, 2 * soft))
+    assert board.attach(Listener(0, [])) is not first
     board.close()

@@ -18,6 +18,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.type_support import check_for_type_support
+from spinning import DEADLINE_SEC
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
@@ -25,7 +26,7 @@ from test_msgs.action import Fibonacci
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [
     pytest.mark.ros,
-    pytest.mark.timeout(120, method='thread'),
+    pytest.mark.timeout(300, method='thread'),
     # rclpy says so of clients that are gone before they are answered, as many are here.
     pytest.mark.filterwarnings('ignore:failed to send response:RuntimeWarning'),
 ]
@@ -139,7 +140,9 @@ def test_messages_flow_while_everything_comes_and_goes(
     errors: list[BaseException] = []
 
     def spin() -> None:
-        while time.monotonic() < end + 10 and executor.context.ok() and not over.is_set():
+        while (
+            time.monotonic() < end + DEADLINE_SEC and executor.context.ok() and not over.is_set()
+        ):
             try:
                 executor.spin()
             except (InvalidHandle, KeyError, RuntimeError) as error:
@@ -153,16 +156,16 @@ def test_messages_flow_while_everything_comes_and_goes(
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(STRESS_SEC + 30)
+        thread.join(STRESS_SEC + DEADLINE_SEC)
         assert not thread.is_alive()
     assert ''.join(churn.error for churn in churns) == ''
     assert all(churn.rounds for churn in churns)
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + DEADLINE_SEC
     while len(got) < sent and time.monotonic() < deadline:
         time.sleep(0.01)
     over.set()
-    assert executor.shutdown(5.0)
-    spinner.join(10)
+    assert executor.shutdown(DEADLINE_SEC)
+    spinner.join(DEADLINE_SEC)
     assert not spinner.is_alive()
     assert sent > 10
     assert got[:sent] == list(range(len(got[:sent])))

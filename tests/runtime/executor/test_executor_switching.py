@@ -11,7 +11,7 @@ from rclpy.context import Context
 from composer.runtime.executor import ComposerExecutor
 from composer.runtime.executor.switching import INTERVAL_SEC, PromptSwitching
 
-DEADLINE_SEC = 20.0
+DEADLINE_SEC = 40.0
 
 
 @pytest.fixture(autouse=True)

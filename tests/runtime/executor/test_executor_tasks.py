@@ -1,6 +1,7 @@
 """Tasks, coroutines and futures."""
 
 import asyncio
+import gc
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -12,10 +13,15 @@ pytest.importorskip('test_msgs')
 
 import rclpy
 from rclpy.context import Context
-from spinning import spinning, wait_for
+from rclpy.task import Future
+from spinning import DEADLINE_SEC, spinning, wait_for
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -> None:
@@ -32,7 +38,7 @@ def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -
     executor.spin_once(timeout_sec=0)
     assert one.done()
     assert not two.done()
-    executor.spin_once(timeout_sec=1)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
     assert two.result() == 'first second'
 
 
@@ -62,7 +68,7 @@ def test_a_coroutine_that_yields_is_resumed_by_the_next_spin_once(
         steps.append(2)
 
     timer = node.create_timer(0.01, tick)
-    executor.spin_once(timeout_sec=5)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
     assert steps == [1]
     timer.cancel()
     executor.spin_once(timeout_sec=0)
@@ -88,13 +94,39 @@ def test_a_suspended_callback_goes_on_when_its_node_is_back(
 
     node = rclpy.create_node('node', context=context)
     timer = node.create_timer(0.01, tick)
-    rclpy.spin_once(node, executor=executor, timeout_sec=5)
+    rclpy.spin_once(node, executor=executor, timeout_sec=DEADLINE_SEC)
     timer.cancel()
     waiting = False
     executor.spin_once(timeout_sec=0)
     assert steps == [1]
     rclpy.spin_once(node, executor=executor, timeout_sec=0)
     assert steps == [1, 2]
+
+
+def test_a_suspended_callback_of_a_destroyed_node_is_let_go_of(
+    node: Any,
+    context: Context,
+    executor: Any,
+) -> None:
+    awaited: Future = Future()
+    ended: list[int] = []
+
+    async def tick() -> None:
+        try:
+            await awaited
+        finally:
+            ended.append(1)
+
+    other = rclpy.create_node('other', context=context)
+    other.create_timer(0.01, tick)
+    rclpy.spin_once(other, executor=executor, timeout_sec=5)
+    awaited.set_result(None)
+    executor.spin_once(timeout_sec=0)
+    other.destroy_node()
+    assert not ended
+    executor.remove_node(node)
+    gc.collect()
+    assert ended == [1]
 
 
 def test_ten_thousand_tasks_from_many_threads_all_run(node: Any, executor: Any) -> None:

@@ -22,8 +22,15 @@ from spinning import DEADLINE_SEC, spinning, wait_for
 from std_msgs.msg import Empty
 from test_msgs.action import Fibonacci
 
+from composer.runtime.executor import lane
+from composer.runtime.executor.lane import Lane
+
 # A thread watches over the time: a deadlock outside of Python hears no signal.
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120, method='thread')]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
 
 
 def test_a_guard_condition_runs_its_callback(node: Any, executor: Any) -> None:
@@ -39,6 +46,27 @@ def test_a_guard_condition_runs_its_callback(node: Any, executor: Any) -> None:
         node.destroy_guard_condition(guard)
 
 
+def test_a_guard_condition_is_let_go_of_at_once(
+    node: Any,
+    executor: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Nothing else wakes the thread that waits for it.
+    monkeypatch.setattr(Lane, '_timeout', lambda _lane, most_sec: most_sec)
+    monkeypatch.setattr(lane, '_ANSWER_SEC', 10 * DEADLINE_SEC)
+    ticks: list[int] = []
+    node.create_timer(0.001, lambda: ticks.append(1))
+    with spinning(executor):
+        for _ in range(5):
+            called: list[int] = []
+            guard = node.create_guard_condition(lambda called=called: called.append(1))
+            guard.trigger()
+            wait_for(lambda called=called: called)
+            node.destroy_guard_condition(guard)
+            before = len(ticks)
+            wait_for(lambda before=before: len(ticks) > before + 1)
+
+
 def test_an_async_guard_condition(node: Any, executor: Any) -> None:
     steps: list[int] = []
 
@@ -51,7 +79,7 @@ def test_an_async_guard_condition(node: Any, executor: Any) -> None:
     guard.trigger()
     executor.spin_once(timeout_sec=0)
     assert steps == [1]
-    executor.spin_once(timeout_sec=1)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
     assert steps == [1, 2]
 
 
@@ -149,14 +177,16 @@ def test_actions(node: Any, executor: Any, asynchronous) -> None:
         await asyncio.sleep(0)
         return execute(goal)
 
+    deep = QoSProfile(depth=100)
     server = ActionServer(
         node,
         Fibonacci,
         'fibonacci',
         execute_async if asynchronous else execute,
         cancel_callback=lambda _: rclpy.action.CancelResponse.ACCEPT,
+        feedback_pub_qos_profile=deep,
     )
-    client = ActionClient(node, Fibonacci, 'fibonacci')
+    client = ActionClient(node, Fibonacci, 'fibonacci', feedback_sub_qos_profile=deep)
     with spinning(executor) as errors:
         assert client.wait_for_server(DEADLINE_SEC)
         sent = [
@@ -207,7 +237,10 @@ def test_a_goal_can_be_sent_and_awaited_in_a_callback(node: Any, executor: Any) 
 
 @pytest.mark.parametrize('how', ['spin', 'spin_once'])
 def test_finished_goals_expire(context: Context, executor: Any, how: str) -> None:
+    held: list[int] = []
+
     def execute(goal: Any) -> Any:
+        held.append(len(server._goal_handles))
         goal.succeed()
         return Fibonacci.Result()
 
@@ -230,9 +263,9 @@ def test_finished_goals_expire(context: Context, executor: Any, how: str) -> Non
     wait_spinning(sent.done)
     result = sent.result().get_result_async()
     wait_spinning(result.done)
-    assert server._goal_handles
     wait_spinning(lambda: not server._goal_handles)
-    executor.shutdown(5.0)
+    assert held == [1]
+    executor.shutdown(DEADLINE_SEC)
     node.destroy_node()
 
 

@@ -1,0 +1,72 @@
+"""The table of rules → a page that says what each means and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Severity
+from composer.rules import FAMILIES
+from composer.rules.examples import read_example
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.rules.record import Family, Rule
+
+
+def rules_page() -> Iterator[str]:
+    """Yield the lines of a page with every rule, what it means and why, and an example."""
+    yield '# The rules'
+    yield ''
+    yield 'Made from the table of rules by `make docs`. `composer explain RULE` shows the same.'
+    yield ''
+    for family in FAMILIES:
+        links = ', '.join(f'[{rule.name}](#{rule.name})' for rule in family.rules)
+        yield f'- **{family.name}**, {family.title}: {links}'
+    for family in FAMILIES:
+        yield from _family(family)
+
+
+def _family(family: Family) -> Iterator[str]:
+    yield ''
+    yield f'## {family.name.capitalize()}'
+    yield ''
+    yield f'{family.title[0].upper()}{family.title[1:]}.'
+    for rule in family.rules:
+        yield ''
+        yield f'### {rule.name}'
+        yield ''
+        weight = '' if rule.severity is Severity.ERROR else 'A warning. '
+        yield f'{weight}{rule.meaning} {rule.why}'
+        yield from _remarks(rule)
+        yield from _rule_example(rule)
+
+
+def _remarks(rule: Rule) -> Iterator[str]:
+    if rule.needs == 'interfaces':
+        yield 'It needs interface packages, which come with ROS 2.'
+    if rule.is_ignorable:
+        yield f'`# composer: ignore[{rule.name}]` in the line silences it.'
+    if rule.source:
+        yield ''
+        yield f'Source: {rule.source}'
+
+
+def _rule_example(rule: Rule) -> Iterator[str]:
+    example = read_example(rule.name)
+    if example is None:
+        return
+    yield from _block('Not so:', example.bad, 'yaml')
+    for path, text in example.others.items():
+        yield from _block(f'With `{path}`:', text, 'python' if path.endswith('.py') else '')
+    yield from _block('What is said of it:', example.said, 'text')
+    yield from _block('But so:', example.good, 'yaml')
+
+
+def _block(title: str, text: str, language: str) -> Iterator[str]:
+    yield ''
+    yield title
+    yield ''
+    yield f'```{language}'
+    yield from text.rstrip('\n').splitlines()
+    yield '```'
