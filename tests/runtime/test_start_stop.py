@@ -57,6 +57,15 @@ def wait_for_peer(node):
 """
 
 
+@pytest.fixture
+def hears_hang_ups():
+    """Let children hear SIGHUP, which the tests may have been told to ignore, as by `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures('hears_hang_ups')
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_all_nodes_after_their_on_stop_with_exit_code_0(compose, number):
     text = """
@@ -447,6 +456,7 @@ def test_the_end_of_the_terminal_stops_the_system(compose):
     assert (compose.folder / 'stopped').exists()
 
 
+@pytest.mark.usefixtures('hears_hang_ups')
 def test_more_than_one_hang_up_is_no_reason_to_hurry(compose, wait_for):
     child = compose(LEAVING_A_FILE, LEAVE_A_FILE)
     child.wait_until_ready()
