@@ -118,8 +118,7 @@ def insist(node):
             time.sleep(0.05)
 
 def undeclared(node):
-    name = 'asc'
-    node.call(name)
+    node.call(''.join(['a', 'sc']))
 
 def wrong_request(node):
     node.call('ask', {'dat': True})

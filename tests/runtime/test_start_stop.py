@@ -432,11 +432,14 @@ def environment_of(compose):
     }
 
 
-def test_the_end_of_the_terminal_stops_the_system(compose):
+@pytest.mark.usefixtures('hears_hang_ups')
+def test_the_end_of_the_terminal_stops_the_system(compose, start_program):
     path = compose.write(LEAVING_A_FILE, LEAVE_A_FILE)
     terminal, inner_end = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, '-c', IN_ITS_TERMINAL, path.name],
+    process = start_program(
+        '-c',
+        IN_ITS_TERMINAL,
+        path.name,
         cwd=compose.folder,
         env=environment_of(compose),
         stdin=inner_end,
@@ -445,14 +448,11 @@ def test_the_end_of_the_terminal_stops_the_system(compose):
         start_new_session=True,
     )
     os.close(inner_end)
-    try:
-        output = b''
-        while b' ready in ' not in output:
-            output += os.read(terminal, 4096)
-        os.close(terminal)
-        assert process.wait(DEADLINE_SEC) == 0
-    finally:
-        process.kill()
+    output = b''
+    while b' ready in ' not in output:
+        output += os.read(terminal, 4096)
+    os.close(terminal)
+    assert process.wait(DEADLINE_SEC) == 0
     assert (compose.folder / 'stopped').exists()
 
 

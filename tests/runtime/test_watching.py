@@ -22,4 +22,4 @@ def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
     watch.stop()
 
     assert len(logged) == 1
-    assert logged[0].endswith('ValueError\n')
+    assert logged[0].endswith('\nValueError')
