@@ -4,6 +4,8 @@ import textwrap
 
 import pytest
 
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language import load_system
 
 ARM = """
@@ -300,3 +302,22 @@ def test_what_is_ignored_may_hold_variables_of_foreach(write):
     system = load_system(write(robot=text))
     assert not system.diagnostics
     assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]
+
+
+@pytest.mark.parametrize('namespace', ['left arm', '9lives', '/a//b', 'a-b', '/left/'])
+def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespace):
+    path = write(
+        robot=robot(f'{{file: arm.yaml, namespace: "{namespace}", args: {{side: left}}}}'), arm=ARM
+    )
+    ((rule, place, message),) = findings(load_system(path))
+    assert (rule, place.rpartition(':')[0]) == ('bad-name', 'robot.yaml:3')
+    assert message.startswith(f"'{namespace}': ")
+    findings_of_nodes = check_system(load_system(path), InterfaceCatalogue([]))
+    assert [each.rule for each in findings_of_nodes if each.rule == 'bad-name'] == ['bad-name']
+
+
+def test_a_choice_that_is_misspelt_comes_with_the_nearest(write):
+    part = 'version: 1\nargs: {side: {choices: [left, right]}}\nnodes: {}\n'
+    path = write(robot=robot('{file: part.yaml, args: {side: lfet}}'), part=part)
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, finding.help) == ('argument-type', "did you mean 'left'?")
