@@ -5,6 +5,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from composer.names import (
+    count_slips,
     did_you_mean,
     expand_name,
     expand_namespace,
@@ -289,3 +290,33 @@ def test_the_help_is_a_spelling_or_the_options():
     assert did_you_mean('xyz', []) is None
     many = [f'n{number:02}' for number in range(20)]
     assert did_you_mean('xyz', many, 'they are') == f'they are: {", ".join(many[:12])}, …'
+
+
+@pytest.mark.parametrize(
+    ('word', 'options', 'meant'),
+    [
+        ('turn', ['turn3d', 'tunr'], 'tunr'),
+        ('form', ['former', 'from'], 'from'),
+    ],
+)
+def test_of_words_that_look_alike_the_fewest_slips_decide(word, options, meant):
+    assert suggest(word, options) == meant
+    assert suggest(word, reversed(options)) == meant
+
+
+@pytest.mark.parametrize(
+    ('word', 'other', 'slips'),
+    [
+        ('scan', 'scan', 0),
+        ('scan', 'sacn', 1),
+        ('scan', 'scann', 1),
+        ('scan', 'sca', 1),
+        ('scan', 'span', 1),
+        ('scan', 'nacs', 3),
+        ('', 'scan', 4),
+        ('a' * 900, 'b' * 900, 64),
+    ],
+)
+def test_slips_are_counted(word, other, slips):
+    assert count_slips(word, other) == slips
+    assert count_slips(other, word) == slips

@@ -188,3 +188,55 @@ def test_reading_parameters_of_other_nodes_is_noted():
 def test_a_parameter_is_found_by_how_it_is_given(position, name):
     (function,) = ast.parse('def f(a, /, b, *, c): ...').body
     assert find_parameter(function, position) == name
+
+
+@pytest.mark.parametrize(
+    ('body', 'name'),
+    [
+        ("topic = 'x'\nnode.publish(topic, 1)", 'x'),
+        ("topic: str = 'x'\nnode.publish(name=topic, payload=1)", 'x'),
+        ('node.publish(TOPIC, 1)', 'y'),
+        ("TOPIC = 'x'\nnode.publish(TOPIC, 1)", 'x'),
+    ],
+)
+def test_a_name_that_is_one_text_for_good_is_that_text(body, name):
+    lines = '\n'.join(f'    {line}' for line in body.splitlines())
+    (function,) = ast.parse(f'def f(node):\n{lines}').body
+    found = read_node_uses(function, 'node', ['node'], {'TOPIC': 'y'})
+    assert [use.name for use in found.uses] == [name]
+    assert found.open_kinds == set()
+
+
+@pytest.mark.parametrize(
+    'body',
+    [
+        "topic = 'x'\ntopic = 'y'\nnode.publish(topic, 1)",
+        "topic = 'x'\nfor topic in 'ab': pass\nnode.publish(topic, 1)",
+        "mode = 'x'\nnode.publish(mode, 1)",
+        "if mode:\n    topic = 'x'\nnode.publish(topic, 1)",
+        'node.publish(OTHER, 1)',
+    ],
+)
+def test_a_name_that_may_be_something_else_is_unknown(body):
+    found = read(body)
+    assert found.uses == ()
+    assert found.open_kinds == {'publisher'}
+
+
+def test_a_constant_has_its_place_where_it_is_used():
+    (use,) = read("topic = 'status'\nnode.publish(topic, 1)").uses
+    assert (use.line, use.column, use.length) == (3, 18, 5)
+
+
+@pytest.mark.parametrize(
+    ('body', 'waits'),
+    [
+        ("def ask():\n    return node.call('x')\nask()", True),
+        ("def ask():\n    return node.call('x')\nreturn ask", False),
+        ("async def ask():\n    await node.call_async('x')\nask()", False),
+        ("async def ask():\n    await node.call_async('x')\nawait ask()", True),
+    ],
+)
+def test_a_function_inside_waits_if_it_is_run_there(body, waits):
+    (use,) = read(body, head='async def f(node):', given=['node']).uses
+    assert use.waits is waits

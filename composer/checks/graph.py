@@ -142,7 +142,7 @@ def build_graph(context: CheckContext) -> Graph:
             continue
         name = full_name(node, kind, getattr(entity, kind))
         # Without a type, too, it would be a reason to say nothing of any other.
-        if _is_doubtful(context, node, getattr(entity, kind)) and context.has_real_type(entity):
+        if is_doubtful(context, node, getattr(entity, kind)) and context.has_real_type(entity):
             unsure.add((kind, provides, entity.type))
         channel = channels.setdefault((kind, name), Channel(kind, name))
         ends = channel.providers if provides else channel.users
@@ -165,7 +165,7 @@ def _is_bad_rule(rule: tuple[str, str]) -> bool:
     return _is_misnamed(source.rpartition('://')[2], target)
 
 
-def _is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
+def is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
     """Return whether a name, or the namespace that this node alone has, is none of ROS."""
     if _is_misnamed(name):
         return True

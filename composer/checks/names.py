@@ -82,14 +82,8 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _are_misplaced(context: CheckContext, *nodes: NodeSpec) -> bool:
     """Return whether the namespace of a node is not known, for its own fault."""
-    lost = [path for path in context.system.dropped if path[-1:] == ('namespace',)]
-    sections = {path[0] for path in lost}
-    included = any(context.system.chains.get(node.path[:2]) for node in nodes)
-    return (
-        'defaults' in sections
-        or ('include' in sections and included)
-        or any((*node.path, 'namespace') in lost for node in nodes)
-    )
+    owners = (('defaults',), *(node.path for node in nodes))
+    return any(context.was_dropped((*owner, 'namespace')) for owner in owners)
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.checks.graph import is_doubtful
 from composer.diagnostics import Severity
-from composer.names import find_topic_name_fault, suggest
+from composer.names import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,7 +49,7 @@ def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic
         return
     partners = _Partners(graph)
     for channel in graph.channels.values():
-        if not _is_alone(graph, channel):
+        if not _is_alone(context, graph, channel):
             continue
         for end in channel.ends:
             if end.noun in _MESSAGES and not getattr(end.entity, 'external', True):
@@ -56,7 +57,7 @@ def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic
                 yield _explain(context, channel, end, near)
 
 
-def _is_alone(graph: Graph, channel: Channel) -> bool:
+def _is_alone(context: CheckContext, graph: Graph, channel: Channel) -> bool:
     if channel.providers and channel.users:
         return False
     if (channel.kind, channel.name) in graph.left_out:
@@ -64,7 +65,7 @@ def _is_alone(graph: Graph, channel: Channel) -> bool:
     if channel.name in _OF_ROS or channel.name in graph.of_ros or _OF_ACTIONS in channel.name:
         return False
     # A name with a fault is a finding of its own.
-    is_misnamed = any(find_topic_name_fault(end.written) for end in channel.ends)
+    is_misnamed = any(is_doubtful(context, end.node, end.written) for end in channel.ends)
     return not is_misnamed and not graph.may_have_more(channel)
 
 

@@ -19,11 +19,14 @@ def mend_namespace(instance: Instance, at: DataPath, entry: dict[str, Any]) -> d
     Args:
         at: The path of the include.
     """
+    path = (*at, 'namespace')
+    if path in instance.dropped:
+        # Without one of their own, its nodes might be called like others.
+        return entry | {'namespace': _allowed(str(at[-1]))}
     namespace = entry.get('namespace', '')
     fault = find_namespace_fault(namespace) if namespace else None
     if fault is None:
         return entry
-    path = (*at, 'namespace')
     span = instance.positions.value(path)
     instance.diagnostics.append(diagnostic_at(span, 'bad-name', f"'{namespace}': {fault}"))
     instance.dropped.add(path)

@@ -1,6 +1,12 @@
 """Waits that never end, and waits that only look like it."""
 
+from textwrap import dedent
+
 import pytest
+
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
 
 CODE = """
     import threading
@@ -186,3 +192,35 @@ def test_what_is_refused_does_time_out_when_it_runs(compose):
     )
     run.wait_for_line('a: CallTimeoutError')
     assert run.stop() == 0
+
+
+@pytest.mark.parametrize(
+    'body',
+    [
+        "name = 'set_it'\n            node.call(name)",
+        'node.call(NAME)',
+        "def wait():\n                node.call('set_it')\n            wait()",
+    ],
+)
+def test_a_wait_by_a_constant_or_in_a_function_inside_is_one(check, body):
+    code = f"""
+        NAME = 'set_it'
+
+        def set_it(node, request): ...
+
+        def tick(node):
+            {body}
+    """
+    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n'
+    assert check(ALONE + timer, code, installed=False) == [(6, 'service-deadlock')]
+
+
+def test_a_deadlock_names_the_client_beside_the_server(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'parts.py').write_text(dedent(CODE))
+    path = tmp_path / 'system.yaml'
+    timer = '    timers: {tick: {period: 1, behaviour: parts:ask}}\n'
+    path.write_text(f'version: 1\nnodes:{ALONE}{timer}')
+    findings = check_system(load_system(path), InterfaceCatalogue([]))
+    (finding,) = [each for each in findings if each.rule == 'service-deadlock']
+    assert [each.span.line for each in finding.related] == [5, 4]

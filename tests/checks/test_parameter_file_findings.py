@@ -224,3 +224,8 @@ def test_a_comment_in_the_parameter_file_silences_a_warning(check):
 def test_a_file_named_by_an_argument_without_a_default_is_not_missed(check):
     nodes = ARM.replace('[p.yaml]', '["{{ site }}.yaml"]')
     assert check(nodes, before='args: {site: {type: string}}\n') == []
+
+
+def test_a_misspelt_file_comes_with_the_nearest(check):
+    (line,) = check(ARM, pp='/**: {ros__parameters: {speed: 1.0}}')
+    assert line.endswith("No such file or directory → did you mean 'pp.yaml'?")

@@ -2,6 +2,10 @@
 
 import pytest
 
+from composer.checks import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language import load_system
+
 NODE = """
   a:
     parameters: {speed: 1.0}
@@ -125,3 +129,45 @@ def test_what_nodes_share_is_used_if_one_of_them_uses_it(check):
     publishers: *shared
 """
     assert check(nodes, before=before) == []
+
+
+@pytest.mark.parametrize(
+    ('annotation', 'value', 'fits'),
+    [
+        ('int', '3', True),
+        ('int', '3.0', True),
+        ('int', '3.5', False),
+        ('int', 'three', False),
+        ('int', 'true', False),
+        ('float', '3', True),
+        ('float', '.inf', True),
+        ('float', '"3"', False),
+        ('str', '3', False),
+        ('str', 'null', True),
+        ('bool', '1', False),
+        ('bool', 'yes', False),
+        ('int | str', 'three', True),
+        ('int | None', 'three', False),
+        ('Path', '3', True),
+        ('list[int]', '3', True),
+    ],
+)
+def test_a_constant_argument_is_of_the_annotated_type(check, annotation, value, fits):
+    nodes = f"""
+  n:
+    on_start: {{behaviour: parts:begin, with: {{value: {value}}}}}
+"""
+    code = f"""
+        def begin(node, value: {annotation}): ...
+    """
+    assert check(nodes, code) == ([] if fits else [(4, 'bad-argument')])
+
+
+@pytest.mark.ros
+def test_a_choice_that_is_misspelt_comes_with_the_nearest(tmp_path):
+    path = tmp_path / 'system.yaml'
+    path.write_text(
+        'version: 1\nnodes: {n: {parameters: {unit: {default: celcius, choices: [celsius, kelvin]}}}}\n'
+    )
+    (finding,) = check_system(load_system(path), InterfaceCatalogue())
+    assert (finding.rule, finding.help) == ('bad-parameter', "did you mean 'celsius'?")

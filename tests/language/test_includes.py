@@ -478,3 +478,22 @@ def test_what_is_left_out_counts_for_no_limit(write):
     system = load_system(write(robot=robot, mid=mid, leaf=leaf))
     assert not system.diagnostics
     assert full_names(system) == ['//a', '//b', '//c']
+
+
+@pytest.mark.parametrize('namespace', ['left arm', '9lives', '/a//b', 'a-b', '/left/'])
+def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespace):
+    path = write(
+        robot=robot(f'{{file: arm.yaml, namespace: "{namespace}", args: {{side: left}}}}'), arm=ARM
+    )
+    ((rule, place, message),) = findings(load_system(path))
+    assert (rule, place.rpartition(':')[0]) == ('bad-name', 'robot.yaml:3')
+    assert message.startswith(f"'{namespace}': ")
+    findings_of_nodes = check_system(load_system(path), InterfaceCatalogue([]))
+    assert [each.rule for each in findings_of_nodes if each.rule == 'bad-name'] == ['bad-name']
+
+
+def test_a_choice_that_is_misspelt_comes_with_the_nearest(write):
+    part = 'version: 1\nargs: {side: {choices: [left, right]}}\nnodes: {}\n'
+    path = write(robot=robot('{file: part.yaml, args: {side: lfet}}'), part=part)
+    (finding,) = load_system(path).diagnostics
+    assert (finding.rule, finding.help) == ('argument-type', "did you mean 'left'?")

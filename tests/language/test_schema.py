@@ -375,3 +375,68 @@ def test_all_faults_are_found_in_one_run():
         + ''.join(f'  n{i}: {{log_level: {i}, tmers: {{}}}}\n' for i in range(50))
     )
     assert len(faults(text)) == 100
+
+
+@pytest.mark.parametrize(
+    ('text', 'meant'),
+    [
+        ('std_msgs/String', 'std_msgs/msg/String'),
+        ('std_msgs.msg.String', 'std_msgs/msg/String'),
+        ('std_msgs::msg::String', 'std_msgs/msg/String'),
+        ('std_msgs/msgs/String', 'std_msgs/msg/String'),
+        ('std_srvs/srv/Empty', None),
+        ('String', None),
+        ('a/b/c/String', None),
+    ],
+)
+def test_a_type_in_the_form_of_other_places_is_understood(text, meant):
+    ((_, _, help_text),) = node_faults(f'{{publishers: {{a: "{text}"}}}}')
+    assert help_text == (meant and f"did you mean '{meant}'?")
+
+
+@pytest.mark.parametrize(
+    ('text', 'meant'),
+    [
+        ('robot.arm.move', 'robot.arm:move'),
+        ('robot/arm.py:move', 'robot.arm:move'),
+        ('robot.arm:move-up', 'robot.arm:move_up'),
+        ('robot.arm::move', 'robot.arm:move'),
+        ('robot.arm:move()', 'robot.arm:move'),
+        ('move', None),
+        ('robot:', None),
+    ],
+)
+def test_a_behaviour_in_another_form_is_understood(text, meant):
+    ((_, _, help_text),) = node_faults(f'{{on_start: {{behaviour: "{text}"}}}}')
+    assert help_text == (meant and f"did you mean '{meant}'?")
+
+
+def test_a_fault_in_an_item_of_a_list_is_left_out_alone():
+    text = '{wait_for: [{topic: a, timeout: 0}, {node: [b]}, {service: c, tiemout: 1}]}'
+    assert [rule for rule, *_ in node_faults(text)] == [
+        'unknown-key',
+        'out-of-range',
+        'wrong-type',
+    ]
+    system = load_system_text(f'{HEAD}nodes: {{rover: {text}}}')
+    conditions = system.spec.nodes['rover'].wait_for
+    assert [each.kind for each in conditions] == ['topic', 'topic', 'service']
+
+
+def test_misspelt_keys_that_count_before_the_schema_are_one_fault_each():
+    text = """
+arg: {count: {defualt: 2}}
+nodes:
+  "wheel_{{ i }}":
+    foraech: {i: "{{ range(count) }}"}
+    whne: "{{ count > 1 }}"
+    log_level: "{{ 'debug' if i else 'info' }}"
+"""
+    system = load_system_text('version: 1' + text)
+    assert sorted((each.rule, each.help) for each in system.diagnostics) == [
+        ('unknown-key', "did you mean 'args'?"),
+        ('unknown-key', "did you mean 'default'?"),
+        ('unknown-key', "did you mean 'foreach'?"),
+        ('unknown-key', "did you mean 'when'?"),
+    ]
+    assert [node.log_level for node in system.spec.nodes.values()] == ['info', 'debug']

@@ -311,3 +311,23 @@ def test_editors_and_composer_agree_that_declarations_hold_no_expressions():
     assert not validator.is_valid(data)
     text = 'version: 1\nnodes: {}\nargs: {v: string, a: {type: "{{ v }}"}}\n'
     assert [each.rule for each in load_system_text(text).diagnostics] == ['bad-value']
+
+
+@pytest.mark.parametrize('expression', ['range(conut)', 'range(2, conut)', 'env(conut)'])
+def test_an_undefined_name_in_a_call_is_one(expression):
+    (fault,) = load(f'x: "{{{{ {expression} }}}}"').diagnostics
+    assert (fault.rule, fault.message) == ('undefined-name', "'conut' is not defined")
+    assert fault.help == "did you mean 'count'?"
+
+
+@pytest.mark.parametrize(
+    ('expression', 'message'),
+    [
+        ('name | uper', "there is no filter 'uper' (did you mean 'upper'?)"),
+        ('name is definde', "there is no test 'definde' (did you mean 'defined'?)"),
+        ('name | xyzzy', "there is no filter 'xyzzy'"),
+    ],
+)
+def test_a_filter_or_test_that_is_not_there_comes_with_the_nearest(expression, message):
+    ((rule, said, *_),) = faults(f'x: "{{{{ {expression} }}}}"')
+    assert (rule, said) == ('bad-expression', message)

@@ -1,0 +1,179 @@
+"""Of one fault one thing is said, and not what follows from it."""
+
+import pytest
+
+PUBLISHES = """
+  talker:
+    publishers: {chatter: std_msgs/msg/String}
+    timers: {talk: {period: 1, publish: chatter, message: hello}}
+"""
+HEARS = """
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, behaviour: parts:hear}}
+"""
+CODE = """
+    def hear(node, message):
+        node.logger.info(str(message))
+"""
+SYSTEM = PUBLISHES + HEARS
+
+
+def spoil(text, before, after):
+    assert before in text
+    return text.replace(before, after, 1)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('before', 'after', 'rule'),
+    [
+        ('publish: chatter', 'publish: chater', 'unknown-publisher'),
+        ('publish: chatter', 'publish: other', 'unknown-publisher'),
+        ('subscriptions: {chatter', 'subscriptions: {"a b"', 'bad-name'),
+        ('  talker:\n', '  talker:\n    remap: {chatter: a//b}\n', 'bad-name'),
+        ('  talker:\n', '  talker:\n    remap: {a b: c}\n', 'bad-name'),
+        ('  talker:\n', '  talker:\n    namespace: a b\n', 'bad-name'),
+        ('  talker:\n', '  talker:\n    namespace: 5\n', 'wrong-type'),
+        ('{chatter: std_msgs/msg/String}', '{chatter: std_msgs/msg/Strin}', 'unknown-type'),
+    ],
+)
+def test_a_fault_is_said_alone(check, before, after, rule):
+    found = check(spoil(SYSTEM, before, after), CODE)
+    assert [each for _, each in found] == [rule]
+
+
+@pytest.mark.ros
+def test_a_type_that_there_is_not_contradicts_no_annotation_and_no_relay(check):
+    nodes = """
+  listener:
+    publishers: {copy: {type: std_msgs/msg/String, external: true}}
+    subscriptions:
+      a: {type: std_msgs/msg/Strin, behaviour: parts:hear, external: true}
+      b: {type: std_msgs/msg/Strin, publish: copy, external: true}
+"""
+    code = """
+        from std_msgs.msg import String
+
+        def hear(node, message: String): ...
+    """
+    assert check(nodes, code) == [(6, 'unknown-type'), (7, 'unknown-type')]
+
+
+def test_what_is_meant_by_a_misspelt_name_is_used(check):
+    nodes = """
+  n:
+    parameters: {speed: 1, colour: red}
+    publishers: {status: {type: std_msgs/msg/String, external: true}}
+    service_clients: {reset: {type: std_srvs/srv/Empty, external: true}}
+    timers: {tick: {period: 1, behaviour: parts:tick}}
+"""
+    code = """
+        def tick(node):
+            node.publish('statsu', node.parameters.sped)
+            node.call('rest', None)
+    """
+    assert sorted(check(nodes, code, installed=False)) == [
+        (4, 'unused-parameter'),
+        (7, 'unknown-parameter'),
+        (7, 'unknown-publisher'),
+        (7, 'unknown-service-client'),
+    ]
+
+
+@pytest.mark.ros
+def test_a_bad_name_hides_only_ends_of_its_type(check):
+    other = """
+  other:
+    subscriptions: {numbers: {type: std_msgs/msg/Int32, behaviour: parts:hear}}
+"""
+    found = check(spoil(SYSTEM, 'publishers: {chatter', 'publishers: {"a b"') + other, CODE)
+    assert sorted(found) == [(4, 'bad-name'), (5, 'unknown-publisher'), (11, 'no-publisher')]
+
+
+def test_a_namespace_that_all_share_hides_nobody_who_is_alone(check):
+    found = check(PUBLISHES, CODE, before='defaults: {namespace: a-b}\n', installed=False)
+    assert found == [(2, 'bad-name'), (5, 'no-subscription')]
+
+
+@pytest.mark.parametrize('value', ['-1', 'soon', '[1]'])
+def test_a_qos_with_a_fault_in_its_profile_matches_everything(check, value):
+    before = f'qos: {{kept: {{deadline: {value}, depth: 3}}}}\n'
+    nodes = spoil(SYSTEM, '{chatter: std_msgs/msg/String}', '{chatter: {type: std_msgs/msg/String, qos: kept}}')  # fmt: skip
+    nodes = spoil(nodes, 'behaviour: parts', 'qos: {deadline: 1}, behaviour: parts')
+    assert [line for line, _ in check(nodes, CODE, before=before, installed=False)] == [2]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('interfaces', ['null', '[a]', '5'])
+def test_packages_of_interfaces_that_cannot_be_read_are_not_missed(check, interfaces):
+    nodes = spoil(SYSTEM, 'std_msgs/msg/String', 'my_msgs/msg/Text')
+    nodes = spoil(nodes, 'std_msgs/msg/String', 'my_msgs/msg/Text')
+    assert check(nodes, CODE, before=f'interfaces: {interfaces}\n') == [(2, 'wrong-type')]
+
+
+def test_a_process_with_a_fault_is_there(check):
+    nodes = """
+  n:
+    wait_for: {process: driver}
+processes:
+  driver: {command: []}
+"""
+    assert [rule for _, rule in check(nodes)] == ['out-of-range']
+
+
+def test_a_module_that_is_not_python_is_one_fault(check):
+    nodes = """
+  n:
+    timers:
+      a: {period: 1, behaviour: parts:one}
+      b: {period: 1, behaviour: parts:two}
+  m:
+    on_start: parts:one
+"""
+    assert check(nodes, 'def one(:\n    pass\n') == [(5, 'broken-module')]
+
+
+def test_a_behaviour_in_no_module_hides_no_unknown_parameter(check):
+    nodes = """
+  n:
+    parameters: {speed: 1}
+    timers:
+      a: {period: 1, behaviour: nowhere:tick}
+      b: {period: 1, behaviour: parts:tick}
+"""
+    code = """
+        def tick(node):
+            return node.parameters.spede
+    """
+    assert check(nodes, code) == [(6, 'unknown-behaviour'), (7, 'unknown-parameter')]
+
+
+@pytest.mark.parametrize('spoilt', ['"a b"', '1st'])
+def test_a_parameter_file_may_be_for_a_node_without_a_right_name(check, tmp_path, spoilt):
+    (tmp_path / 'site.yaml').write_text('/talker:\n  ros__parameters: {speed: 1}\n')
+    nodes = f"""
+  {spoilt}:
+    parameters: {{speed: 1}}
+    parameter_files: [site.yaml]
+"""
+    assert check(nodes) == [(3, 'bad-name')]
+
+
+def test_nodes_whose_includes_have_no_right_namespace_are_not_the_same(check, tmp_path):
+    (tmp_path / 'part.yaml').write_text('version: 1\nnodes: {camera: {}}\n')
+    before = """\
+include:
+  left: {file: part.yaml, namespace: 1}
+  right: {file: part.yaml, namespace: 2}
+"""
+    assert check('  n: {}\n', before=before) == [(3, 'wrong-type'), (4, 'wrong-type')]
+
+
+def test_a_file_that_cannot_be_included_may_have_any_other_end(check):
+    before = 'include: {part: {file: part.yaml}}\n'
+    assert check(SYSTEM, CODE, before=before, installed=False) == [(2, 'missing-include')]
+    lonely = before + 'x: 1\n'
+    assert check(PUBLISHES, CODE, before=lonely, installed=False) == [
+        (2, 'missing-include'),
+        (3, 'unknown-key'),
+    ]
