@@ -1,6 +1,7 @@
 """What tests of running systems share, as fixtures."""
 
 import os
+import signal
 import subprocess
 import sys
 from contextlib import ExitStack
@@ -19,6 +20,9 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('steady')
+
+# A shell lets its jobs in the background ignore SIGINT, and their children inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(name='wait_for')
