@@ -11,6 +11,7 @@ from benchmarks.executors import start_spinning
 _SETTLE_SEC = 0.7
 _SETTLE_PER_NODE_SEC = 0.005
 _WARM_UP_SEC = 0.2
+_FIRST_ANSWER_SEC = 10.0
 
 
 def measure(side: str, size: int, seconds: float) -> dict[str, float]:
@@ -32,6 +33,12 @@ def measure(side: str, size: int, seconds: float) -> dict[str, float]:
     start_spinning(side, [first, second, *_make_idle_nodes(size)])
     time.sleep(_SETTLE_SEC + size * _SETTLE_PER_NODE_SEC)
     ping.publish(message)
+    end = time.monotonic() + _FIRST_ANSWER_SEC
+    while not count:
+        if time.monotonic() > end:
+            failure = 'the first message was not answered'
+            raise TimeoutError(failure)
+        time.sleep(_WARM_UP_SEC / 10)
     time.sleep(_WARM_UP_SEC)
     begin, before = time.monotonic(), count
     time.sleep(seconds)
