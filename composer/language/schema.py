@@ -6,7 +6,6 @@ The schema (JSON Schema 2020-12) is the one description of the structure, for ed
 from __future__ import annotations
 
 import json
-from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice, takewhile
@@ -52,7 +51,7 @@ def check_structure(
     it is checked in the same run; `positions` follow it.
 
     Args:
-        data: They are changed.
+        data: They stay as they are.
         failed: The paths of expressions that could not be evaluated; they are left out.
         sampled: The paths of values that only stand for others; what is wrong with them is left
             out as well, and not reported.
@@ -62,6 +61,8 @@ def check_structure(
         data with more than a thousand faults nothing is left.
     """
     failed = [_entry_of(path) for path in failed]
+    if failed or not _schema().accepts(data):
+        data = _copied(data)
     _remove_entries(data, failed)
     findings = _mend_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
@@ -90,7 +91,7 @@ def mend_outer_keys(
     """
     if all(map(_is_known, _outer_keys(data))):
         return data, []
-    mended = deepcopy(data)
+    mended = _copied(data)
     return mended, _mend_keys(mended, positions, _is_outer)
 
 
@@ -191,6 +192,13 @@ def _find_faults(data: dict[str, Any]) -> list[StructureFault]:
         return []
     faults = (fault for error in _validator().iter_errors(data) for fault in explain(error))
     return list(islice(faults, MAX_FINDINGS))
+
+
+def _copied(data: Any) -> Any:
+    """Return a copy in which nothing is shared: aliases and a file included twice share data."""
+    if isinstance(data, dict):
+        return {key: _copied(value) for key, value in data.items()}
+    return [_copied(item) for item in data] if isinstance(data, list) else data
 
 
 def _value_at(data: Any, path: Sequence[Key]) -> Any:

@@ -497,3 +497,20 @@ def test_a_choice_that_is_misspelt_comes_with_the_nearest(write):
     path = write(robot=robot('{file: part.yaml, args: {side: lfet}}'), part=part)
     (finding,) = load_system(path).diagnostics
     assert (finding.rule, finding.help) == ('argument-type', "did you mean 'left'?")
+
+
+def test_what_is_wrong_with_a_file_included_twice_is_left_out_of_both(write):
+    part = 'version: 1\nnodes: {camera: {timers: [a], publishers: {image: {tpye: a/msg/B}}}}\n'
+    path = write(
+        part=part,
+        robot='version: 1\ninclude:\n  a: {file: part.yaml, namespace: a}\n'
+        '  b: {file: part.yaml, namespace: b}\n',
+    )
+    system = load_system(path)
+    assert {path for path in system.dropped if path[-1] == 'timers'} == {
+        ('nodes', 'camera', 'timers'),
+        ('nodes', '/b/camera', 'timers'),
+    }
+    for node in ('camera', '/b/camera'):
+        span = system.positions.key(('nodes', node, 'publishers', 'image', 'type'))
+        assert (span.line, span.text) == (2, 'tpye')
