@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import StrictUndefined
 
 from composer.errors import ComposerError
-from composer.language.bounds import Budget
-from composer.language.sandbox import Sandbox
+from composer.expressions.bounds import Budget
+from composer.expressions.sandbox import Sandbox
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

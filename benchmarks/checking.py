@@ -41,7 +41,7 @@ def write_system(path: Path, nodes: int) -> Path:
 
 def run_check(paths: list[Path]) -> tuple[float, float, float]:
     """Return what a whole `composer check` takes: seconds, processor seconds and megabytes."""
-    script = 'import sys; from composer.cli import main; sys.exit(main())'
+    script = 'import sys; from composer.cli.main import main; sys.exit(main())'
     # Started anew, so that no other process counts as its memory.
     watched = (
         'import resource, subprocess, sys, time\n'

@@ -8,7 +8,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
-from composer.runtime.executor import ComposerExecutor
+from composer.executor import ComposerExecutor
 
 _FINITE_WAIT_SEC = 0.05
 

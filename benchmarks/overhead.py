@@ -19,8 +19,8 @@ from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
 import composer
-from composer.runtime.calls import BehaviourCall, CallLedger
-from composer.runtime.health import CallTimes
+from composer.runtime.behaviours.calls import BehaviourCall, CallLedger
+from composer.runtime.health.statistics import CallTimes
 from composer.runtime.system import System
 
 _MESSAGES = 2000

@@ -21,7 +21,7 @@ from composer.errors import (
     ServiceNotAvailableError,
     SystemStoppingError,
 )
-from composer.runtime.node import Node
+from composer.runtime.nodes.node import Node
 
 __all__ = [
     'ActionNotAvailableError',

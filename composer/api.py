@@ -12,19 +12,19 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.language import LoadedSystem
+    from composer.language.pipeline import LoadedSystem
 
 
 def load(path: str | Path) -> LoadedSystem:
     """Read a file as far as it can be read; what is wrong with it is in its `diagnostics`."""
-    from composer.language import load_system
+    from composer.language.pipeline import load_system
 
     return load_system(Path(path))
 
 
 def check(path: str | Path) -> list[Diagnostic]:
     """Return all that is wrong with a file, from top to bottom."""
-    from composer.checks import check_system
+    from composer.checks.checker import check_system
     from composer.interfaces.catalogue import InterfaceCatalogue
 
     return check_system(load(path), InterfaceCatalogue())
@@ -53,7 +53,7 @@ def up(
         StartError: The system could not be brought up.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    from composer.commands.up import up as run
+    from composer.cli.up import up as run
 
     paths = [Path(each) for each in (path, *layers)]
     return run(paths, words, ros_arguments, log_levels, settings)

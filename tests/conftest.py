@@ -116,7 +116,7 @@ def context(domain_id):
 @pytest.fixture
 def executor(context):
     """Return an executor that does what rclpy's do."""
-    from composer.runtime.executor import ComposerExecutor
+    from composer.executor import ComposerExecutor
 
     executor = ComposerExecutor(context=context)
     yield executor

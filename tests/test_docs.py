@@ -12,8 +12,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import composer
-from composer import cli
-from composer.language.schema_file import schema_path
+from composer.cli import main as cli
+from composer.schema.schema_file import schema_path
 
 ROOT = Path(composer.__file__).parents[1]
 SCHEMA = json.loads(schema_path().read_text())

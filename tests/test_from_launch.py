@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import composer
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
 
 ROOT = Path(composer.__file__).parents[1]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli import run
+from composer.cli.main import run
 from tests.graphs import Graph
 
 ARGUMENTS = ('robot.yaml', 'site.yaml', 'rate:=7.5', '--set', 'nodes.robot_0.log_level=fatal')

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath
     from composer.language.specs import ProcessSpec
+    from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-name'
 

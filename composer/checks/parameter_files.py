@@ -13,9 +13,6 @@ from typing import TYPE_CHECKING
 from composer.ament import list_packages
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, Severity, diagnostic_at
-from composer.language.parameter_files import read_parameter_file
-from composer.language.parameter_overrides import find_overrides
-from composer.language.parameter_patterns import matches_pattern
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import (
@@ -26,14 +23,17 @@ from composer.names import (
     suggest,
     with_article,
 )
+from composer.ros_parameters.node_patterns import matches_pattern
+from composer.ros_parameters.overrides import find_overrides
+from composer.ros_parameters.parameter_files import read_parameter_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.parameter_files import ParameterEntry, ParameterFile
     from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
+    from composer.ros_parameters.parameter_files import ParameterEntry, ParameterFile
 
 
 @dataclass(frozen=True, slots=True)

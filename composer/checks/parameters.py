@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Severity
-from composer.language.parameters import find_type_fault, find_type_faults
 from composer.names import suggest
+from composer.ros_parameters.parameter_types import find_type_fault, find_type_faults
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath
     from composer.language.specs import ParameterSpec
+    from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
 _NUMERIC = ('integer', 'double')

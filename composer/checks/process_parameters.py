@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.language.parameters import (
+from composer.names import find_parameter_name_fault, with_article
+from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_fault,
     infer_parameter_type,
 )
-from composer.names import find_parameter_name_fault, with_article
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath
+    from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
 _NO_NULL = 'there is no value, and ROS has no null'

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.interfaces.catalogue import InterfaceKind
-    from composer.language.positions import DataPath
     from composer.language.specs import NodeSpec, QosSpec
+    from composer.yaml_text.positions import DataPath
 
 
 _KIND_NOUNS = {'msg': 'message', 'srv': 'service', 'action': 'action'}

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from composer.diagnostics import SourceFile, Span
-    from composer.language.positions import DataPath, SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 # Of `nodes: {<name>: …}`; all that is asked for lies below such an entry.
 _BOX = 2

@@ -39,7 +39,7 @@ from composer.reports.report import relative_path
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.drawing.picture import Box, Edge, Hub, Picture
-    from composer.language.positions import DataPath
+    from composer.yaml_text.positions import DataPath
 
 _VERSION = 1
 

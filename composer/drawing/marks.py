@@ -11,9 +11,9 @@ from composer.rules.wiring import WIRING
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from composer.checks.graph import Channel, ChannelKind, Graph
+    from composer.checks.connections.topology import Channel, ChannelKind, Graph
     from composer.diagnostics import Diagnostic, SourceFile, Span
-    from composer.language.positions import DataPath, SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
     HubKey: TypeAlias = tuple[ChannelKind, str]
 

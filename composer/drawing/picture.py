@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.checks.graph import ChannelKind, Endpoint, Graph, build_graph
+from composer.checks.connections.topology import ChannelKind, Endpoint, Graph, build_graph
 from composer.drawing.marks import Marks
 from composer.drawing.policies import differing_policies
 from composer.names import expand_name, expand_namespace, join_names
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath, SourceMap
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 BoxKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']

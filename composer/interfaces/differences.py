@@ -10,7 +10,8 @@ from difflib import unified_diff
 from pathlib import Path
 
 from composer.errors import ComposerError
-from composer.interfaces.definitions import PackageDefinitions
+from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.statements import SEPARATOR
 from composer.interfaces.descriptions import (
     ActionDescription,
     InterfaceDescription,
@@ -18,7 +19,6 @@ from composer.interfaces.descriptions import (
     ServiceDescription,
 )
 from composer.interfaces.documentation import describe_package
-from composer.interfaces.statements import SEPARATOR
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions import load_definitions
+from composer.interfaces.definitions.package_folder import load_definitions
 from composer.interfaces.descriptions import InterfaceDescription
 from composer.interfaces.prefixes import find_package_prefix
 

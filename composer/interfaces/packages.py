@@ -8,12 +8,16 @@ from typing import Literal, TypeAlias
 
 from composer.diagnostics import Diagnostic
 from composer.errors import ComposerError
-from composer.interfaces.cache import BuildFolder, compute_key, provide_cached
+from composer.interfaces.build.cache import BuildFolder, compute_key, provide_cached
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.definitions import PackageDefinitions, load_definitions
+from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
+from composer.interfaces.definitions.references import (
+    check_definitions,
+    order_packages,
+    used_packages,
+)
 from composer.interfaces.importing import make_importable
 from composer.interfaces.prefixes import find_package_prefix
-from composer.interfaces.references import check_definitions, order_packages, used_packages
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
@@ -139,7 +143,7 @@ class _Provider:
         return ProvidedPackage(package, place, origin, definitions)
 
     def _build(self, definitions: PackageDefinitions, folder: BuildFolder) -> None:
-        from composer.interfaces.builder import Dependencies, build_package
+        from composer.interfaces.build.builder import Dependencies, build_package
 
         count = len(definitions.interfaces)
         interfaces = '1 interface' if count == 1 else f'{count} interfaces'

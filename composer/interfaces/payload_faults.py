@@ -1,7 +1,8 @@
 """Check plain data against the description of a message, and find all that is wrong with it.
 
-The verdict is that of the conversion at run time (`composer.runtime.payloads`): both apply the
-rules of `composer.interfaces.values`. This one needs no message class, so it works without ROS.
+The verdict is that of the conversion at run time (`composer.runtime.messages.payloads`): both
+apply the rules of `composer.interfaces.values`. This one needs no message class, so it works
+without ROS.
 """
 
 from collections.abc import Iterator, Mapping

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import UsageError
-from composer.language.parameters import (
+from composer.names import did_you_mean
+from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_fault,
     infer_parameter_type,
 )
-from composer.language.scalars import ScalarError, parse_plain_scalar
-from composer.names import did_you_mean
+from composer.yaml_text.scalars import ScalarError, parse_plain_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

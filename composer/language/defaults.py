@@ -6,11 +6,11 @@ from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 from composer.language.namespaces import join_namespaces, note_namespace
-from composer.language.processes import takes_ros_arguments, with_defaults, with_waits
+from composer.language.parsing.process_parser import takes_ros_arguments, with_defaults, with_waits
 
 if TYPE_CHECKING:
     from composer.language.instances import Instance
-    from composer.language.positions import DataPath
+    from composer.yaml_text.positions import DataPath
 
 # What defaults hold that is not simply a key of each node.
 _SPECIAL_DEFAULTS = ('namespace', 'qos')

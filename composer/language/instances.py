@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.expressions.filling import FilledDocument
 from composer.language.arguments import ArgumentSpec, find_argument_faults, read_arguments
-from composer.language.filling import FilledDocument
 from composer.language.paths import resolve_paths
-from composer.language.schema import check_structure, is_sound, mend_outer_keys
+from composer.schema.structure import check_structure, is_sound, mend_outer_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
 
     from composer.diagnostics import Related, SourceFile, Span
-    from composer.language.positions import Branch, DataPath, Key, SourceMap
-    from composer.language.source import Document
+    from composer.yaml_text.positions import Branch, DataPath, Key, SourceMap
+    from composer.yaml_text.reader import Document
 
 # The sections whose entries become part of a file that includes theirs.
 PARTS = ('nodes', 'processes', 'qos', 'interfaces')
@@ -152,7 +152,7 @@ def _fill(data: dict[str, Any], given: ArgumentValues, positions: SourceMap) -> 
     if not (_has_expressions(positions) or _has_conditions(data)):
         return FilledDocument(data)
     # jinja2 takes a tenth of a check's time to import, and most files have no templates.
-    from composer.language.expansion import expand_document
+    from composer.expressions.foreach import expand_document
 
     declarations = {key: data[key] for key in ('args',) if key in data}
     system = {key: value for key, value in data.items() if key not in declarations}

@@ -9,14 +9,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Severity, diagnostic_at
-from composer.language.source import Document
 from composer.names import did_you_mean
+from composer.yaml_text.reader import Document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.language.positions import DataPath, SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 # What is in these is the user's own.
 _FREE = ('message', 'state', 'with')

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from composer.language.instances import Instance
-    from composer.language.positions import DataPath
+    from composer.yaml_text.positions import DataPath
 
 
 def note_namespace(instance: Instance, path: DataPath, outer: DataPath, inner: str) -> None:

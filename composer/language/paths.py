@@ -11,7 +11,7 @@ from composer.names import suggest
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from composer.language.positions import DataPath, SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 _PACKAGE = 'package://'
 

@@ -14,7 +14,7 @@ from composer.names import join_names
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from composer.language.positions import DataPath
+    from composer.yaml_text.positions import DataPath
 
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
 OnError: TypeAlias = Literal['log', 'restart', 'shutdown']

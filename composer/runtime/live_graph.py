@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.language.specs import ConditionKind
-    from composer.runtime.live_node import LiveNode
+    from composer.runtime.nodes.live_node import LiveNode
 
 _NODE_NAME = '_composer_waiting'
 # An action is there when the service is that takes its goals

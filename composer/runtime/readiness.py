@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node as RosNode
 
-    from composer.language.positions import SourceMap
     from composer.language.specs import ConditionSpec, ProcessSpec
-    from composer.runtime.live_node import LiveNode
-    from composer.runtime.live_process import LiveProcess
-    from composer.runtime.processes import Processes
-    from composer.runtime.waiting import StopSignal
+    from composer.processes.live_process import LiveProcess
+    from composer.processes.supervisor import Processes
+    from composer.runtime.behaviours.waiting import StopSignal
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.yaml_text.positions import SourceMap
 
 _POLL_SEC = 0.05
 _TROUBLES = {

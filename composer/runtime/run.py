@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from types import FrameType
 
-    from composer.language.positions import SourceMap
     from composer.language.specs import SystemSpec
+    from composer.yaml_text.positions import SourceMap
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Comes when the terminal is closed, often twice: from the shell, and from the kernel.

@@ -6,31 +6,31 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode
-from composer.runtime.failures import ServiceFailures
-from composer.runtime.hangs import HangWatch
-from composer.runtime.health import HealthBoard
-from composer.runtime.health_publisher import HealthPublisher
+from composer.processes.supervisor import Processes
+from composer.runtime.behaviours.error_handling import Supervisor
+from composer.runtime.behaviours.failures import ServiceFailures
+from composer.runtime.health.diagnostics_publisher import HealthPublisher
+from composer.runtime.health.hangs import HangWatch
+from composer.runtime.health.statistics import HealthBoard
+from composer.runtime.health.unmatched import GraphWatch
 from composer.runtime.logs import system_logger
-from composer.runtime.matching import GraphWatch
+from composer.runtime.nodes.restart import NodeRestarter
+from composer.runtime.nodes.start import NodeStarter
+from composer.runtime.nodes.stop import stop_nodes
 from composer.runtime.ownership import release, reserve
-from composer.runtime.processes import Processes
 from composer.runtime.readiness import Readiness, describe_parts, list_waiters
-from composer.runtime.restarting import NodeRestarter
 from composer.runtime.ros_context import create_ros_context
-from composer.runtime.starting import NodeStarter
 from composer.runtime.stop_request import StopRequest
-from composer.runtime.stopping import stop_nodes
-from composer.runtime.supervision import Supervisor
 from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.system_services import SystemServices
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from composer.language.positions import SourceMap
     from composer.language.specs import SystemSpec
-    from composer.runtime.calls import RunningCall
-    from composer.runtime.live_node import LiveNode
+    from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.yaml_text.positions import SourceMap
 
 _EXECUTOR_STOP_SEC = 1.0
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
-from composer.runtime.error_texts import format_fault
-from composer.runtime.executor import ComposerExecutor
+from composer.executor import ComposerExecutor
+from composer.runtime.behaviours.error_texts import format_fault
 from composer.runtime.ownership import release
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ if TYPE_CHECKING:
 
     from rclpy.context import Context
 
-    from composer.language.positions import SourceMap
     from composer.language.specs import OnError, QosSpec
-    from composer.runtime.failures import ServiceFailures
-    from composer.runtime.health import HealthBoard
+    from composer.runtime.behaviours.failures import ServiceFailures
+    from composer.runtime.behaviours.waiting import StopSignal
+    from composer.runtime.health.statistics import HealthBoard
     from composer.runtime.system_executor import SystemExecutor
-    from composer.runtime.waiting import StopSignal
+    from composer.yaml_text.positions import SourceMap
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from textwrap import indent
 
 import pytest
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system_text
+from composer.language.pipeline import load_system_text
 
 MODULES = ('behaviours.monitor', 'behaviours.topics')
 # What stands around an example is left out of it.

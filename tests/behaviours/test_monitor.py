@@ -7,7 +7,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray
 
 from behaviours.monitor import count, diagnose, watch
-from composer.runtime.payloads import converter_for
+from composer.runtime.messages.payloads import converter_for
 
 pytestmark = pytest.mark.ros
 

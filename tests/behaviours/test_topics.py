@@ -12,7 +12,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64, Int32, String
 
 from behaviours.topics import TransformError, drop, mux, relay, throttle, transform
-from composer.runtime.payloads import converter_for
+from composer.runtime.messages.payloads import converter_for
 
 pytestmark = pytest.mark.ros
 

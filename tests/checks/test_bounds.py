@@ -2,10 +2,10 @@
 
 import pytest
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system_text
+from composer.language.pipeline import load_system_text
 
 HEAD = 'version: 1\nnodes:\n  n:\n'
 COUNT = 3000

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import composer
-from composer.checks import check_files, check_system
-from composer.commands.selection import select_files
+from composer.checks.checker import check_files, check_system
+from composer.cli.file_selection import select_files
 from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
 
 DATA = Path(__file__).parents[1] / 'data'

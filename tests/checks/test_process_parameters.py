@@ -2,10 +2,10 @@
 
 import pytest
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system_text
-from composer.runtime.process_commands import render_parameters
+from composer.language.pipeline import load_system_text
+from composer.processes.process_commands import render_parameters
 
 SYSTEM = """
 version: 1

@@ -4,10 +4,10 @@ import textwrap
 
 import pytest
 
-from composer.checks import check_system, create_context
+from composer.checks.checker import check_system, create_context
 from composer.drawing.picture import build_picture
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 
 
 @pytest.fixture

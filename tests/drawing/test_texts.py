@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from composer.drawing import render_picture
-from composer.reports.yaml import render_yaml
+from composer.yaml_text.writer import render_yaml
 
 SYSTEM = """
     version: 1

@@ -10,9 +10,9 @@ import traceback
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
 from tests.fuzz.mutations import mutate
 

@@ -11,7 +11,7 @@ SCALARS = [
     '"\\ud800"', '"\\U0010FFFF"', '"\\0"', '"\\x1b[2J"', '"\\u2028"', '"\\uFEFF"', '"\\u202Egpj"', "'it''s'", '"a\\\n b"', '"a', "'a", '"\\q"', '*unknown', '&a', '&a *a', '&a [*a]',
     'Ünïcödé', '日本語', '👩‍👩‍👧', 'é' * 200, 'ﬀ', 'İ', 'ß', 'a\u0301', '\u200b', '\u00a0', '\ufeff', '\u2028', '\x85', '\x0b', '\x0c', '\x00', '\x07', '\x1b', '\x7f', '\ud800'.encode('utf-8', 'replace').decode(),
     'std_msgs/msg/String', 'std_msgs/msg/Strin', 'std_msgs/String', '/msg/', 'a/msg/b', 'std_msgs/msg/String\\n', 'std_msgs/msg/' + 'S' * 300, '../../msg/X', 'builtin_interfaces/msg/Time', 'test_msgs/msg/Nested',
-    'behaviours.greeter:reply', 'behaviours.greeter', ':', 'a:b:c', 'os:system', 'behaviours.greeter:nothing', '..:x', 'a' * 300 + ':b', '__main__:x', 'sys:path', 'ctypes:c_int', 'encodings:x', 'composer.cli:main',
+    'behaviours.greeter:reply', 'behaviours.greeter', ':', 'a:b:c', 'os:system', 'behaviours.greeter:nothing', '..:x', 'a' * 300 + ':b', '__main__:x', 'sys:path', 'ctypes:c_int', 'encodings:x', 'composer.cli.main:main',
     'sensor_data', 'services_default', 'infinite', 'best_available', 'reentrant', 'keep_all',
 ]  # fmt: skip
 

@@ -5,7 +5,7 @@ import pytest
 from building import WriteDefinitions
 
 from composer.interfaces.catalogue import default_prefixes
-from composer.interfaces.definitions import load_definitions
+from composer.interfaces.definitions.package_folder import load_definitions
 from composer.interfaces.differences import (
     DefinitionsDifferError,
     compare_definitions,

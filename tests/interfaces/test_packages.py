@@ -73,7 +73,7 @@ def test_a_cached_start_imports_neither_builder_nor_generators(
     assert run_python(PROVIDE, *EXAMPLE).returncode == 0
     code = PROVIDE + (
         'print([name for name in sys.modules if name in {"em", "lark", "subprocess", "numpy",'
-        ' "rosidl_parser", "rosidl_pycommon", "composer.interfaces.builder"}])'
+        ' "rosidl_parser", "rosidl_pycommon", "composer.interfaces.build.builder"}])'
     )
     lines = run_python(code, *EXAMPLE, cache=shared_cache).stdout.splitlines()
     assert lines == ['example_interfaces cached', '[]']
@@ -200,7 +200,7 @@ def test_without_a_compiler_the_error_says_what_to_install(
 ) -> None:
     run = run_python(PROVIDE, 'robots', write_definitions(ROBOTS), cache=tmp_path, PATH='/none')
     assert run.stderr.splitlines()[-1] == (
-        'composer.interfaces.toolchain.BuildToolsMissingError: interface packages cannot be '
+        'composer.interfaces.build.toolchain.BuildToolsMissingError: interface packages cannot be '
         'built: there is no C compiler, no C++ compiler'
     )
 

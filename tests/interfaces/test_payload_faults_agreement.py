@@ -15,7 +15,7 @@ from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.payload_faults import find_payload_faults
 from composer.interfaces.values import INTEGER_RANGES
-from composer.runtime.payloads import PayloadError, converter_for
+from composer.runtime.messages.payloads import PayloadError, converter_for
 
 pytestmark = pytest.mark.ros
 

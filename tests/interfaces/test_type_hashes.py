@@ -4,7 +4,7 @@ import pytest
 from building import SHIPPED
 
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.definitions import load_definitions
+from composer.interfaces.definitions.package_folder import load_definitions
 from composer.interfaces.prefixes import find_package_prefix
 from composer.interfaces.type_hashes import Fields, hash_type, spread_interface
 

@@ -3,8 +3,8 @@
 import pytest
 
 from composer.errors import UsageError
-from composer.language import load_system_text
 from composer.language.arguments import describe_arguments
+from composer.language.pipeline import load_system_text
 
 ARGUMENTS = """
 version: 1

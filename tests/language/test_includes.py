@@ -4,10 +4,10 @@ import textwrap
 
 import pytest
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 
 ARM = """
 version: 1

@@ -6,7 +6,7 @@ import pytest
 
 from composer.diagnostics import Severity
 from composer.errors import UsageError
-from composer.language import load_system
+from composer.language.pipeline import load_system
 
 BASE = """
     version: 1

@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.language import load_system, load_system_text
+from composer.language.pipeline import load_system, load_system_text
 from composer.language.specs import BehaviourSpec, ParameterSpec, QosSpec
 
 

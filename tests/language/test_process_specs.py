@@ -4,9 +4,9 @@ from textwrap import dedent
 
 import pytest
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 
 
 @pytest.fixture

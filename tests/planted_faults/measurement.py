@@ -5,9 +5,9 @@ import random
 from collections import Counter
 from dataclasses import dataclass, field
 
-from composer.checks import check_system
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 from tests.planted_faults.faults import plant
 from tests.planted_faults.systems import Function, Generator
 from tests.planted_faults.writing import write_yaml

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks import check_system
-from composer.commands.importing import ImportCheck
+from composer.checks.checker import check_system
+from composer.cli.import_check import ImportCheck
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language import load_system
+from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
 from composer.rules import RULES
 from composer.rules.examples import examples_folder, read_example

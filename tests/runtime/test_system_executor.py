@@ -10,8 +10,12 @@ pytest.importorskip('rclpy')
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.task import Future
 
-from composer.runtime.executor import ComposerExecutor
-from composer.runtime.groups import Gate, GatedMutuallyExclusiveGroup, GatedReentrantGroup
+from composer.executor import ComposerExecutor
+from composer.runtime.nodes.callback_groups import (
+    Gate,
+    GatedMutuallyExclusiveGroup,
+    GatedReentrantGroup,
+)
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]

@@ -1,0 +1,1 @@
+"""Checks of behaviours against the nodes that they are bound to."""

@@ -1,0 +1,224 @@
+"""Behaviours: that they exist, can be called, and take what they will be given."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Related
+from composer.language.bindings import Binding, node_bindings
+from composer.names import did_you_mean, suggest
+from composer.python_source.module_finder import MissingModule
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.python_source.modules import FunctionKind, ModuleSource
+
+
+def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check all behaviours by the text of their modules; none is imported."""
+    broken: set[str] = set()
+    for node in context.spec.nodes.values():
+        for binding in node_bindings(node):
+            if context.was_dropped(binding.behaviour.path):
+                continue
+            module = context.modules.find(binding.behaviour.module)
+            if isinstance(module, MissingModule) or not module.syntax_error:
+                yield from _check_source(context, binding, module)
+            elif binding.behaviour.module not in broken:
+                broken.add(binding.behaviour.module)
+                yield _explain_broken_module(context, binding, module)
+
+
+def check_behaviour_call(
+    context: CheckContext,
+    binding: Binding,
+    kind: FunctionKind | None,
+    signature: inspect.Signature | None,
+) -> Iterator[Diagnostic]:
+    """Check that a function can be bound where it is; what is `None` cannot be told."""
+    behaviour = binding.behaviour
+    if kind is not None and kind.is_generator and not binding.may_yield:
+        yield context.at_value(
+            behaviour.path,
+            'generator-not-allowed',
+            f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
+            part=behaviour.function,
+            help='timers and actions take generators; return the value instead',
+        )
+    if signature is not None:
+        yield from _check_signature(context, binding, signature)
+
+
+def _explain_broken_module(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    """Say it where the module is named first: it is one fault, however many behaviours it has."""
+    behaviour = binding.behaviour
+    place = module.place_of(module.error_line) if module.error_line else None
+    return context.at_value(
+        behaviour.path,
+        'broken-module',
+        f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
+        part=behaviour.module,
+        first=True,
+        related=[Related('this is what Python does not take', place)] if place else [],
+    )
+
+
+def _check_source(
+    context: CheckContext, binding: Binding, module: ModuleSource | MissingModule
+) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
+    if isinstance(module, MissingModule):
+        yield _explain_missing_module(context, binding, module)
+    elif function := module.functions.get(behaviour.function):
+        yield from check_behaviour_call(context, binding, function.kind, function.signature)
+    elif not module.is_open:
+        yield _explain_missing_function(context, binding, module)
+
+
+def _explain_missing_module(
+    context: CheckContext, binding: Binding, module: MissingModule
+) -> Diagnostic:
+    behaviour = binding.behaviour
+    if module.nearest:
+        help_text = f"did you mean '{module.nearest}'?"
+    else:
+        path = behaviour.module.replace('.', '/')
+        help_text = f'write {path}.py beside the project, or install the package it is in'
+    return context.at_value(
+        behaviour.path,
+        'unknown-behaviour',
+        f"there is no module '{module.missing}'",
+        part=behaviour.module,
+        first=True,
+        help=help_text,
+    )
+
+
+def _explain_missing_function(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    behaviour = binding.behaviour
+    what = module.constants.get(behaviour.function)
+    if what:
+        return context.at_value(
+            behaviour.path,
+            'uncallable-behaviour',
+            f"'{behaviour.name}' is {what}, and cannot be called",
+            part=behaviour.function,
+        )
+    return context.at_value(
+        behaviour.path,
+        'unknown-behaviour',
+        f"{behaviour.module} has no function '{behaviour.function}'",
+        part=behaviour.function,
+        help=did_you_mean(behaviour.function, _public(module.functions), 'it has'),
+    )
+
+
+def _public(names: Mapping[str, object]) -> list[str]:
+    return [name for name in names if not name.startswith('_')]
+
+
+def _check_signature(
+    context: CheckContext, binding: Binding, signature: inspect.Signature
+) -> Iterator[Diagnostic]:
+    behaviour = binding.behaviour
+    by_keyword = _keyword_parameters(signature)
+    taken = _positional_parameters(signature)[: len(binding.parameters)]
+    free = [name for name in by_keyword or () if name not in taken]
+    # What is given, with misspelt names as they were meant: their finding is enough.
+    was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
+    given = set(free if was_dropped else behaviour.arguments)
+    # An argument whose expression failed is given all the same.
+    given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
+    for keyword in behaviour.arguments:
+        if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
+            given.remove(keyword)
+            given.add(suggest(keyword, free) or '')
+            yield context.at_key(
+                (*behaviour.path[:-1], 'with', keyword),
+                'bad-argument',
+                f"{behaviour.name} takes no argument '{keyword}'",
+                help=did_you_mean(keyword, free, 'it takes') or 'it takes no more arguments',
+            )
+    yield from _check_values(context, binding, signature)
+    try:
+        keywords = dict.fromkeys(given - {'', *taken})
+        signature.bind(*binding.parameters, **keywords)
+    except TypeError as error:
+        shown = str(signature).replace('=Ellipsis', '=…')
+        yield context.at_value(
+            behaviour.path,
+            'bad-signature',
+            f'{behaviour.function}{shown} is called as {binding.call}: {error}',
+            part=behaviour.function,
+        )
+
+
+def _check_values(
+    context: CheckContext, binding: Binding, signature: inspect.Signature
+) -> Iterator[Diagnostic]:
+    """Check constant arguments against the annotations with built-in types."""
+    behaviour = binding.behaviour
+    for keyword, value in behaviour.arguments.items():
+        parameter = signature.parameters.get(keyword)
+        wanted = _annotated_types(parameter) if parameter else set()
+        if wanted and not any(_fits(value, each) for each in wanted):
+            yield context.at_value(
+                (*behaviour.path[:-1], 'with', keyword),
+                'bad-argument',
+                f"{behaviour.name} takes {' or '.join(sorted(wanted))} as '{keyword}', "
+                f'and is given {_shown(value)}',
+            )
+
+
+def _annotated_types(parameter: inspect.Parameter) -> set[str]:
+    """Return the built-in types that an annotation names; none if it names anything else."""
+    annotation = parameter.annotation
+    text = annotation if isinstance(annotation, str) else getattr(annotation, '__name__', '')
+    names = {name.strip() for name in text.strip('\'"').split('|')} - {'None'}
+    return names if names <= _SCALARS.keys() else set()
+
+
+def _fits(value: Any, wanted: str) -> bool:
+    if value is None or (wanted == 'int' and isinstance(value, float) and value.is_integer()):
+        return True
+    types = _SCALARS[wanted]
+    return isinstance(value, types) and (bool in types or not isinstance(value, bool))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, dict | list):
+        return 'a mapping' if isinstance(value, dict) else 'a list'
+    return repr(value)
+
+
+# What a value of YAML may be for a parameter with such an annotation.
+_SCALARS: dict[str, tuple[type, ...]] = {
+    'bool': (bool,),
+    'float': (float, int),
+    'int': (int,),
+    'str': (str,),
+}
+
+
+def _positional_parameters(signature: inspect.Signature) -> list[str]:
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return [each.name for each in signature.parameters.values() if each.kind in kinds]
+
+
+def _keyword_parameters(signature: inspect.Signature) -> list[str] | None:
+    """Return the names that can be given by keyword, `None` if any can."""
+    parameters = signature.parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return None
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return [parameter.name for parameter in parameters if parameter.kind in kinds]

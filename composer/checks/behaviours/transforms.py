@@ -1,0 +1,93 @@
+"""What `behaviours.topics:transform`, which comes with Composer, is given as `fields`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import composer
+from composer.interfaces.descriptions import MessageDescription
+from composer.interfaces.values import unknown_field
+from composer.python_source.module_finder import MissingModule
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.specs import NodeSpec, SubscriptionSpec
+    from composer.yaml_text.positions import DataPath
+
+_MODULE, _FUNCTION = 'behaviours.topics', 'transform'
+
+
+def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
+    """Fields that are made are those of the published type, and expressions speak of the heard."""
+    for node in context.spec.nodes.values():
+        for subscription in node.subscriptions.values():
+            behaviour = subscription.behaviour
+            if behaviour and (behaviour.module, behaviour.function) == (_MODULE, _FUNCTION):
+                fields = behaviour.arguments.get('fields')
+                if isinstance(fields, dict) and _is_ours(context):
+                    yield from _check_fields(context, node, subscription, fields)
+
+
+def _is_ours(context: CheckContext) -> bool:
+    """Return whether the module is the one that comes with Composer, and no other of the name."""
+    module = context.modules.find(_MODULE)
+    own = Path(composer.__file__).parent.parent.joinpath(*_MODULE.split('.')).with_suffix('.py')
+    path = None if isinstance(module, MissingModule) else module.path
+    return path is not None and path.resolve() == own.resolve()
+
+
+def _check_fields(
+    context: CheckContext,
+    node: NodeSpec,
+    subscription: SubscriptionSpec,
+    fields: dict[str, object],
+) -> Iterator[Diagnostic]:
+    publisher = node.publishers.get(subscription.publish or '')
+    heard = _describe(context, subscription.type)
+    made = _describe(context, publisher.type) if publisher else None
+    for name, expression in fields.items():
+        path = (*subscription.path, 'with', 'fields', name)
+        if made:
+            yield from _check_name(context, made, name, path)
+        if heard:
+            yield from _check_expression(context, heard, str(expression), path)
+
+
+def _describe(context: CheckContext, type_name: str) -> MessageDescription | None:
+    description = context.catalogue.describe(type_name)
+    return description if isinstance(description, MessageDescription) else None
+
+
+def _check_name(
+    context: CheckContext, made: MessageDescription, name: str, path: DataPath
+) -> Iterator[Diagnostic]:
+    owner: MessageDescription | None = made
+    *outer, last = name.split('.')
+    for part in outer:
+        field = owner.field(part) if owner else None
+        if owner is None or field is None:
+            break
+        if field.type.array or field.type.nested is None:
+            message = f"'{part}' of {owner.name} is {field.type}, and has no fields"
+            yield context.at_key(path, 'unknown-field', message)
+            return
+        owner = _describe(context, field.type.nested)
+    else:
+        part = last
+    if owner and owner.field(part) is None:
+        error = unknown_field(owner.name, part, [each.name for each in owner.fields])
+        yield context.at_key(path, 'unknown-field', str(error), help=error.help)
+
+
+def _check_expression(
+    context: CheckContext, heard: MessageDescription, expression: str, path: DataPath
+) -> Iterator[Diagnostic]:
+    # jinja2 takes a tenth of a check's time to import, and most files need it for nothing else.
+    from composer.checks.behaviours.message_expressions import find_expression_faults
+
+    for fault in find_expression_faults(expression, heard, context.catalogue):
+        yield context.at_value(path, fault.rule, fault.message, part=fault.part, help=fault.help)

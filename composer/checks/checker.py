@@ -1,0 +1,159 @@
+"""`LoadedSystem` → findings. The rules, a function each, in two tables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import islice
+from typing import TYPE_CHECKING, TypeAlias
+
+from composer.checks.behaviours.annotations import check_annotations
+from composer.checks.behaviours.functions import check_behaviour_sources
+from composer.checks.behaviours.node_uses import UseReader
+from composer.checks.behaviours.transforms import check_transforms
+from composer.checks.behaviours.uses import check_uses
+from composer.checks.connections.typos import check_slips
+from composer.checks.connections.waits import check_waits
+from composer.checks.connections.wiring import check_wiring
+from composer.checks.context import CheckContext
+from composer.checks.ignore_comments import apply_ignore_comments
+from composer.checks.messages import check_messages
+from composer.checks.names import check_full_names, check_names
+from composer.checks.parameter_files import check_parameter_files
+from composer.checks.parameters import check_parameters
+from composer.checks.process_parameters import check_process_parameters
+from composer.checks.processes import (
+    check_environment,
+    check_executables,
+    check_processes,
+)
+from composer.checks.references import check_publish, check_qos, check_types
+from composer.diagnostics import MAX_FINDINGS
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared import describe_declared
+from composer.language.pipeline import LoadedSystem, load_system
+from composer.python_source.module_finder import ModuleFinder, project_search_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
+
+    from composer.diagnostics import Diagnostic, SourceFile, Span
+    from composer.rules.record import Need
+
+CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
+SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
+
+NODE_RULES: tuple[CheckRule, ...] = (
+    check_names,
+    check_qos,
+    check_publish,
+    check_types,
+    check_messages,
+    check_parameters,
+    check_behaviour_sources,
+    check_transforms,
+    check_processes,
+    check_process_parameters,
+    check_annotations,
+    check_uses,
+)
+SYSTEM_RULES: tuple[CheckRule, ...] = (
+    check_full_names,
+    check_parameter_files,
+    check_executables,
+    check_waits,
+    check_environment,
+    check_wiring,
+    check_slips,
+)
+_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
+
+
+def create_context(
+    system: LoadedSystem, installed: InterfaceCatalogue
+) -> tuple[CheckContext | None, list[Diagnostic]]:
+    """Return what the rules look at, and what is wrong with the interfaces that a file declares.
+
+    The context is `None` if the file could not be read at all.
+    """
+    if system.spec is None:
+        return None, []
+    catalogue, unreadable, findings = describe_declared(system, installed)
+    modules = ModuleFinder(project_search_path(system.files))
+    uses = UseReader(modules)
+    return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
+
+
+def check_system(
+    system: LoadedSystem,
+    catalogue: InterfaceCatalogue,
+    further: Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]] | None = None,
+) -> list[Diagnostic]:
+    """Return all that is wrong with a system, by its place in the file.
+
+    Args:
+        further: What else is to be checked; it is given what was found so far.
+    """
+    context, declared = create_context(system, catalogue)
+    found = list(_apply_rules(context)) if context else []
+    samples = _by_line(system.sampled)
+    if context and further:
+        more = further(context, found)
+        found += [each for each in more if not _hangs_on_samples(each, samples)]
+    # What several entries share through an alias, or a file included twice, is wrong once.
+    every = [*system.diagnostics, *declared, *found]
+    once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
+    unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
+    unchecked |= set() if further else {'import'}
+    heard = apply_ignore_comments(
+        once.values(), system.positions.source, None if system.diagnostics else unchecked
+    )
+    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
+
+
+def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
+    if len(findings) <= MAX_FINDINGS:
+        return findings
+    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
+    return [*findings[: MAX_FINDINGS - 1], last]
+
+
+def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
+    samples = _by_line(context.system.sampled)
+    for rule in (*NODE_RULES, *SYSTEM_RULES):
+        yield from _apply(rule, context, samples)
+    if context.system.unused is not None:
+        # What is left out this time may be there the next.
+        other = replace(context, spec=context.system.unused)
+        samples = _by_line((*context.system.sampled, *context.system.sampled_unused))
+        for rule in NODE_RULES:
+            yield from _apply(rule, other, samples)
+
+
+def _apply(rule: CheckRule, context: CheckContext, samples: SpansByLine) -> Iterator[Diagnostic]:
+    findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
+    # One more, as a sign that there are more.
+    yield from islice(findings, MAX_FINDINGS + 1)
+
+
+def _by_line(spans: Iterable[Span]) -> SpansByLine:
+    lines: dict[tuple[SourceFile, int], list[Span]] = {}
+    for span in spans:
+        lines.setdefault((span.source, span.line), []).append(span)
+    return lines
+
+
+def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
+    """Return whether a finding is about a value that is not the real one."""
+    place = finding.span
+    return place is not None and any(
+        span.column <= place.column < span.column + span.length
+        for span in samples.get((place.source, place.line), ())
+    )
+
+
+def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:
+    """Yield each file with all that is wrong with it."""
+    catalogue = InterfaceCatalogue()
+    for path in paths:
+        yield path, check_system(load_system(path), catalogue)

@@ -1,0 +1,1 @@
+"""Checks of what connects nodes: topics, services, actions and waits."""

@@ -1,0 +1,166 @@
+"""Names of what may be elsewhere, a slip of the pen away from what is here.
+
+What is waited for may come from programs that no file declares, a remapping rule may be for what a
+behaviour makes with rclpy itself, and a callback group may have any name: only a name that is all
+but that of something in the system is likely to mean it.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from composer.checks.connections.topology import build_graph, full_name
+from composer.checks.connections.waits import waiters
+from composer.diagnostics import Severity
+from composer.language.specs import REENTRANT
+from composer.names import count_slips, expand_name, with_article
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic, Span
+    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
+
+_RULE = 'likely-misspelling'
+_SEPARATORS = re.compile(r'[/_]')
+# In shorter words another letter makes another word: `arm_l` and `arm_r`, `map` and `mop`.
+_SHORTEST = 4
+_LONG = 8
+# More names than these are not compared one by one.
+_MOST_COMPARED = 2_000
+
+
+def check_slips(context: CheckContext) -> Iterator[Diagnostic]:
+    """What is nowhere in the system is not a misspelt name of something that is."""
+    yield from _check_conditions(context)
+    yield from _check_rules(context)
+    yield from _check_groups(context)
+
+
+def find_slip(word: str, options: Iterable[str]) -> str | None:
+    """Return the option that a word is a misspelling of, and not a name in its own right.
+
+    One part of it, between slashes and underscores, has a slip; a long one may have two. Numbers
+    are no slips.
+    """
+    parts = _SEPARATORS.split(word)
+    for option in options:
+        others = _SEPARATORS.split(option)
+        pairs = [pair for pair in zip(parts, others, strict=False) if pair[0] != pair[1]]
+        if len(parts) == len(others) and len(pairs) == 1 and _is_slip(*pairs[0]):
+            return option
+    return None
+
+
+def _is_slip(word: str, other: str) -> bool:
+    if min(len(word), len(other)) < _SHORTEST or _digits(word) != _digits(other):
+        return False
+    return count_slips(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
+
+
+def _digits(word: str) -> str:
+    return ''.join(filter(str.isdigit, word))
+
+
+def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
+    conditions = [
+        (waiter, condition) for waiter in waiters(context.spec) for condition in waiter.wait_for
+    ]
+    if not conditions:
+        return
+    present = _present(context)
+    for waiter, condition in conditions:
+        if condition.kind == 'process':
+            continue
+        name = _full_name(waiter, condition)
+        names = present[condition.kind]
+        if name in names or len(names) > _MOST_COMPARED:
+            continue
+        near = find_slip(name, names)
+        if near:
+            meant = _as_written(condition.name, near, waiter.namespace or '/')
+            yield context.at_value(
+                condition.path,
+                _RULE,
+                f"{with_article(condition.kind)} '{name}' is nowhere in this system",
+                help=f"did you mean '{meant}'?",
+                severity=Severity.WARNING,
+            )
+
+
+def _present(context: CheckContext) -> dict[str, set[str]]:
+    """Return the full names of what there is to wait for, left out or not, by its kind."""
+    system = context.system
+    specs = [context.spec, *([system.unused] if system.unused else [])]
+    graph = build_graph(context)
+    present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
+    for channel in graph.channels.values():
+        if channel.providers:
+            present[channel.kind].add(channel.name)
+    for kind, name in graph.left_out:
+        present[kind].add(name)
+    present['node'] = {node.full_name for spec in specs for node in spec.nodes.values()}
+    return present
+
+
+def _full_name(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
+    kind = condition.kind
+    if kind == 'node' or kind == 'process':  # noqa: PLR1714 - the type checker follows this
+        return expand_name(condition.name, waiter.name, waiter.namespace or '/')
+    return full_name(waiter, kind, condition.name)
+
+
+def _as_written(name: str, full: str, namespace: str) -> str:
+    """Return a full name as it would be written in the place of a name."""
+    inside = namespace.rstrip('/') + '/'
+    is_relative = name[:1] not in ('/', '~') and full.startswith(inside)
+    return full.removeprefix(inside) if is_relative else full
+
+
+def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check remapping rules; one of an include is for all that is in it."""
+    matching: set[Span] = set()
+    slips: dict[Span, Diagnostic] = {}
+    for node in context.spec.nodes.values():
+        if not node.remap:
+            continue
+        names = _names_of(node)
+        for source, _ in node.remap:
+            path = (*node.path, 'remap', source)
+            span = context.system.positions.key(path)
+            bare = source.rpartition('://')[2]
+            name = expand_name(bare, node.name, node.namespace)
+            if name in names:
+                matching.add(span)
+            elif near := find_slip(name, names):
+                slips[span] = context.at_key(
+                    path,
+                    _RULE,
+                    f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
+                    help=f"did you mean '{_as_written(bare, near, node.namespace)}'?",
+                    severity=Severity.WARNING,
+                )
+    yield from (finding for span, finding in slips.items() if span not in matching)
+
+
+def _names_of(node: NodeSpec) -> set[str]:
+    topics = [end.topic for end in node.endpoints]
+    services = [end.service for end in node.service_endpoints]
+    names = [*topics, *services, *(end.action for end in node.action_endpoints)]
+    return {expand_name(name, node.name, node.namespace) for name in names}
+
+
+def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:
+    for node in context.spec.nodes.values():
+        for entity in (*node.triggers, *node.services.values()):
+            group = entity.group
+            if group and group != REENTRANT and _is_slip(group, REENTRANT):
+                yield context.at_value(
+                    (*entity.path, 'group'),
+                    _RULE,
+                    f"'{group}' is a group of its own, whose members never run at the same time",
+                    help=f"did you mean '{REENTRANT}'?",
+                    severity=Severity.WARNING,
+                )

@@ -1,0 +1,110 @@
+"""Publishers, subscriptions and clients without another end.
+
+A warning: the other end may be elsewhere, which `external: true` says.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.checks.connections.topology import is_doubtful
+from composer.diagnostics import Severity
+from composer.names import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.connections.topology import Channel, Endpoint, Graph
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+
+# What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
+_OF_ROS = {
+    '/clock',
+    '/diagnostics',
+    '/diagnostics_agg',
+    '/diagnostics_toplevel_state',
+    '/parameter_events',
+    '/rosout',
+    '/tf',
+    '/tf_static',
+}
+# Topics and services that actions consist of.
+_OF_ACTIONS = '/_action/'
+# Names are compared one by one; a file that wants more suggestions is checked without the rest.
+_MOST_COMPARED = 5_000
+
+_MESSAGES = {
+    'publisher': ('no-subscription', "nothing in this system hears '{}'"),
+    'subscription': ('no-publisher', "nothing in this system publishes '{}'"),
+    'service client': ('no-server', "nothing in this system serves '{}'"),
+    'action client': ('no-server', "nothing in this system serves '{}'"),
+}
+
+
+def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+    """Everyone who needs another end has one, or says that it is elsewhere."""
+    if context.system.data.get('processes'):
+        # Nobody knows what programs publish, hear and serve.
+        return
+    partners = _Partners(graph)
+    for channel in graph.channels.values():
+        if not _is_alone(context, graph, channel):
+            continue
+        for end in channel.ends:
+            if end.noun in _MESSAGES and not getattr(end.entity, 'external', True):
+                near = partners.nearest(channel, end)
+                yield _explain(context, channel, end, near)
+
+
+def _is_alone(context: CheckContext, graph: Graph, channel: Channel) -> bool:
+    if channel.providers and channel.users:
+        return False
+    if (channel.kind, channel.name) in graph.left_out:
+        return False
+    if channel.name in _OF_ROS or channel.name in graph.of_ros or _OF_ACTIONS in channel.name:
+        return False
+    # A name with a fault is a finding of its own.
+    is_misnamed = any(is_doubtful(context, end.node, end.written) for end in channel.ends)
+    return not is_misnamed and not graph.may_have_more(channel)
+
+
+def _explain(
+    context: CheckContext, channel: Channel, end: Endpoint, near: str | None
+) -> Diagnostic:
+    rule, message = _MESSAGES[end.noun]
+    inner = (*end.path, channel.kind)
+    at = context.at_value if inner in context.system.positions.values else context.at_key
+    help_text = "say 'external: true' if the other end is elsewhere"
+    return at(
+        inner,
+        rule,
+        message.format(channel.name),
+        help=f"did you mean '{near}'? Otherwise {help_text}" if near else help_text,
+        severity=Severity.WARNING,
+    )
+
+
+class _Partners:
+    """Whom those without another end may have meant: names with an end of the right type."""
+
+    def __init__(self, graph: Graph) -> None:
+        # Names are compared without their namespaces, in which all names look alike.
+        self._names: dict[tuple[str, str, bool], dict[str, str]] = {}
+        for channel in graph.channels.values():
+            last = channel.name.rpartition('/')[2]
+            for ends, provides in ((channel.providers, True), (channel.users, False)):
+                for end in ends:
+                    key = (channel.kind, end.entity.type, provides)
+                    self._names.setdefault(key, {})[last] = channel.name
+        self._comparisons = 0
+
+    def nearest(self, channel: Channel, end: Endpoint) -> str | None:
+        """Return the full name that was most likely meant."""
+        wants_provider = bool(channel.users)
+        names = self._names.get((channel.kind, end.entity.type, wants_provider), {})
+        self._comparisons += len(names)
+        if self._comparisons > _MOST_COMPARED:
+            return None
+        near = suggest(channel.name.rpartition('/')[2], names)
+        return names[near] if near else None

@@ -1,0 +1,133 @@
+"""What is waited for: it can come, and nobody waits for itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.checks.connections.topology import full_name
+from composer.names import (
+    did_you_mean,
+    expand_name,
+    find_namespace_fault,
+    find_node_name_fault,
+    find_topic_name_fault,
+    with_article,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from composer.checks.connections.topology import ChannelKind
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, SystemSpec
+
+
+def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
+    """What is waited for can come: processes are declared, and nobody waits for itself."""
+    processes = context.spec.processes
+    for waiter in waiters(context.spec):
+        for condition in waiter.wait_for:
+            yield from _check_name(context, waiter, condition)
+            lost = context.was_dropped(('processes',)) or context.was_dropped(
+                ('processes', condition.name)
+            )
+            if condition.kind == 'process' and condition.name not in processes and not lost:
+                yield context.at_value(
+                    condition.path,
+                    'unknown-process',
+                    f"there is no process '{condition.name}' in this system",
+                    help=did_you_mean(condition.name, processes),
+                )
+    yield from _find_cycles(context)
+
+
+def waiters(spec: SystemSpec) -> Iterable[NodeSpec | ProcessSpec]:
+    """Return all who may wait for something."""
+    return (*spec.nodes.values(), *spec.processes.values())
+
+
+def _check_name(
+    context: CheckContext, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
+) -> Iterator[Diagnostic]:
+    """Check that there may be something of the name that is waited for."""
+    kind, name = condition.kind, condition.name
+    fault: str | None = None
+    if kind == 'node':
+        namespace, _, last = expand_name(name, waiter.name, waiter.namespace or '/').rpartition(
+            '/'
+        )
+        fault = find_node_name_fault(last) or (namespace and find_namespace_fault(namespace))
+    elif kind != 'process':
+        fault = find_topic_name_fault(name, kind)
+    if fault:
+        message = f"'{name}' cannot be the name of {with_article(kind)}: {fault}"
+        yield context.at_value(condition.path, 'bad-name', message)
+
+
+def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
+    """Yield one finding for each round of nodes and processes that wait for each other."""
+    providers = _Providers(context)
+    edges = {
+        waiter.path: [
+            (condition, path)
+            for condition in waiter.wait_for
+            for path in providers.of(waiter, condition)
+        ]
+        for waiter in waiters(context.spec)
+    }
+    done: set[tuple[str | int, ...]] = set()
+    for start, first in edges.items():
+        trail: list[tuple[str | int, ...]] = []
+        pending = [(start, iter(first))] if start not in done else []
+        while pending:
+            path, others = pending[-1]
+            if path not in trail:
+                trail.append(path)
+            condition, target = next(others, (None, None))
+            if condition is None or target is None:
+                done.add(path)
+                trail.remove(path)
+                pending.pop()
+            elif target in trail:
+                names = [str(each[-1]) for each in trail[trail.index(target) :]]
+                way = ' → '.join([*names, names[0]])
+                message = f'{way}: these wait for each other, and none of them ever starts'
+                yield context.at_value(condition.path, 'wait-cycle', message)
+            elif target not in done:
+                pending.append((target, iter(edges.get(target, ()))))
+
+
+class _Providers:
+    """Which nodes and processes of a system bring what is waited for."""
+
+    def __init__(self, context: CheckContext) -> None:
+        self._spec = context.spec
+        self._nodes = {node.full_name: node.path for node in context.spec.nodes.values()}
+        self._channels: dict[tuple[str, str], list[tuple[str | int, ...]]] = {}
+        for node in context.spec.nodes.values():
+            for publisher in node.publishers.values():
+                self._add(node, 'topic', publisher.topic)
+            for service in node.services.values():
+                self._add(node, 'service', service.service)
+            for action in node.actions.values():
+                self._add(node, 'action', action.action)
+
+    def of(
+        self, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
+    ) -> list[tuple[str | int, ...]]:
+        """Return the paths of all who bring what a condition asks for, if it is only one."""
+        kind = condition.kind
+        if kind == 'process':
+            process = self._spec.processes.get(condition.name)
+            return [process.path] if process else []
+        if kind == 'node':
+            name = expand_name(condition.name, waiter.name, waiter.namespace or '/')
+            path = self._nodes.get(name)
+            return [path] if path else []
+        found = self._channels.get((kind, full_name(waiter, kind, condition.name)), [])
+        # Of several, any one will do.
+        return found if len(found) == 1 else []
+
+    def _add(self, node: NodeSpec, kind: ChannelKind, name: str) -> None:
+        self._channels.setdefault((kind, full_name(node, kind, name)), []).append(node.path)

@@ -1,0 +1,81 @@
+"""Wiring: what meets under one name fits together, and nobody is alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from composer.checks.connections.deadlocks import check_deadlocks
+from composer.checks.connections.loops import check_loops
+from composer.checks.connections.qos import check_qos_pairs
+from composer.checks.connections.topology import build_graph
+from composer.checks.connections.unconnected import check_other_ends
+from composer.names import with_article
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from composer.checks.connections.topology import Channel, Endpoint, Graph
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+
+
+def check_wiring(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check who meets whom, over all nodes."""
+    graph = build_graph(context)
+    for rule in _RULES:
+        yield from rule(context, graph)
+
+
+def _check_types(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+    """All ends of a channel have one type; Fast DDS refuses a second one in the same process."""
+    for channel in graph.channels.values():
+        # Of a type that there is not, that has been said.
+        ends = [end for end in channel.ends if context.has_real_type(end.entity)]
+        if len({end.entity.type for end in ends}) > 1:
+            yield from _explain_types(context, channel, ends)
+
+
+def _explain_types(
+    context: CheckContext, channel: Channel, ends: list[Endpoint]
+) -> Iterator[Diagnostic]:
+    # Among equals the type of the publisher or server counts, which comes first.
+    (usual, _), *_ = Counter(end.entity.type for end in ends).most_common()
+    example = next(end for end in ends if end.entity.type == usual)
+    for end in ends:
+        if end.entity.type != usual:
+            yield context.at_value(
+                context.inner(end.path, 'type'),
+                'conflicting-types',
+                f"{channel.kind} '{channel.name}' has two types: here {end.entity.type}, "
+                f'elsewhere {usual}',
+                help=f'give both ends one type, or name {with_article(channel.kind)} of its own',
+                related=[context.related(example.path, f'{example} has {usual}')],
+            )
+
+
+def _check_servers(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+    """A service or action has one server; it is undefined which one answers otherwise."""
+    for channel in graph.channels.values():
+        if channel.kind == 'topic':
+            continue
+        for server in channel.providers[1:]:
+            first = channel.providers[0]
+            yield context.at_key(
+                server.path,
+                'second-server',
+                f"{channel.kind} '{channel.name}' has a server already, "
+                f"in node '{first.node.name}', and which of them answers is undefined",
+                help=f'serve it once, or give this one another name with {channel.kind}:',
+                related=[context.related(first.path, f'{first} serves it too')],
+            )
+
+
+_RULES: tuple[Callable[[CheckContext, Graph], Iterable[Diagnostic]], ...] = (
+    _check_types,
+    _check_servers,
+    check_qos_pairs,
+    check_other_ends,
+    check_loops,
+    check_deadlocks,
+)

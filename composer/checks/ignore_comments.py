@@ -1,0 +1,105 @@
+"""Findings that a comment in their line silences, and comments that silence nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Severity, diagnostic_at
+from composer.names import did_you_mean
+from composer.yaml_text.comments import read_ignore_comments
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator
+
+    from composer.diagnostics import Diagnostic, SourceFile, Span
+    from composer.rules.record import Need
+    from composer.yaml_text.comments import IgnoreComment
+
+_YAML = ('.yaml', '.yml')
+
+
+def apply_ignore_comments(
+    findings: Iterable[Diagnostic], source: SourceFile, unchecked: Collection[Need] | None
+) -> list[Diagnostic]:
+    """Return what is left of the findings, and what is wrong with the comments themselves.
+
+    Args:
+        source: The file that was checked; findings in files that it includes count too.
+        unchecked: What could not be looked at, so that nobody knows whether a comment about it
+            is needed; `None` if not all findings are known.
+    """
+    found = list(findings)
+    comments = _read_comments(found, source)
+    return [
+        *(finding for finding in found if not _is_silenced(finding, comments)),
+        *(fault for comment in comments for fault in _check(comment, found, unchecked)),
+    ]
+
+
+def leave_out_silenced(findings: list[Diagnostic], source: SourceFile) -> list[Diagnostic]:
+    """Return the findings that no comment silences."""
+    comments = _read_comments(findings, source)
+    return [finding for finding in findings if not _is_silenced(finding, comments)]
+
+
+def _read_comments(findings: list[Diagnostic], source: SourceFile) -> list[IgnoreComment]:
+    spans = [finding.span for finding in findings if finding.span]
+    sources = {source: None} | {
+        span.source: None for span in spans if span.source.name.endswith(_YAML)
+    }
+    return [comment for each in sources for comment in read_ignore_comments(each)]
+
+
+def _is_silenced(finding: Diagnostic, comments: list[IgnoreComment]) -> bool:
+    if not comments:
+        return False
+    # The rules' texts are needed by few files.
+    from composer.rules import RULES
+
+    rule = RULES.get(finding.rule)
+    return (
+        rule is not None
+        and rule.is_ignorable
+        and any(
+            named.text == finding.rule and _is_beside(finding, named)
+            for comment in comments
+            for named in comment.rules
+        )
+    )
+
+
+def _is_beside(finding: Diagnostic, comment: Span) -> bool:
+    span = finding.span
+    return span is not None and span.source is comment.source and span.line == comment.line
+
+
+def _check(
+    comment: IgnoreComment, findings: list[Diagnostic], unchecked: Collection[Need] | None
+) -> Iterator[Diagnostic]:
+    from composer.rules import RULES
+
+    if not comment.rules:
+        yield _warn(
+            comment.span,
+            'unused-ignore',
+            'the comment names no rule',
+            'write ignore[rule], with the rule that the finding shows',
+        )
+    for named in comment.rules:
+        rule = RULES.get(named.text)
+        here = [f for f in findings if f.rule == named.text and _is_beside(f, named)]
+        if rule is None:
+            help_text = did_you_mean(named.text, RULES, '')
+            near = help_text if help_text and help_text.startswith('did') else None
+            message = f"no rule is called '{named.text}'"
+            yield _warn(named, 'unknown-rule', message, near or "'composer explain' lists them")
+        elif here and not rule.is_ignorable:
+            message = f"no comment silences '{named.text}': nothing can run before it is mended"
+            yield _warn(named, 'unused-ignore', message, 'mend it and remove the comment')
+        elif not here and unchecked is not None and rule.needs not in unchecked:
+            message = f"there is no '{named.text}' in this line to ignore"
+            yield _warn(named, 'unused-ignore', message, 'remove it')
+
+
+def _warn(span: Span, rule: str, message: str, help_text: str) -> Diagnostic:
+    return diagnostic_at(span, rule, message, help=help_text, severity=Severity.WARNING)

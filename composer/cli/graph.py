@@ -1,0 +1,70 @@
+"""`composer graph`: the system as people draw it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from composer.checks.checker import check_system, create_context
+from composer.cli.output import show_findings, write_file
+from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
+from composer.drawing.picture import build_picture
+from composer.errors import ExitCode, UsageError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+from composer.reports.text import summarize
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+def graph(
+    paths: Sequence[Path],
+    words: Sequence[str],
+    settings: Sequence[str],
+    *,
+    format_name: str | None,
+    output: Path | None,
+) -> int:
+    """Draw a system, with all that is wrong with it; return the exit code.
+
+    Faults do not keep it from being drawn, unless nothing could be read.
+
+    Args:
+        format_name: One of `composer.drawing.FORMATS`; `None` to go by the ending of `output`.
+        output: Where the drawing goes; `None` for standard output.
+
+    Raises:
+        DrawingError: The form needs Graphviz, and it is not there or fails.
+        UsageError: The arguments or settings do not fit the file, or no form is written to files
+            that end like `output`.
+        ComposerError: The drawing cannot be written.
+    """
+    format_name = format_name or _format_of(output)
+    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
+    catalogue = InterfaceCatalogue()
+    findings = check_system(system, catalogue)
+    context, _ = create_context(system, catalogue)
+    if context is None:
+        show_findings(findings)
+        return ExitCode.FAILED
+    text = render_picture(build_picture(context, findings), format_name)
+    if output is None:
+        click.echo(text, nl=False, color=False)
+    else:
+        write_file(output, text, 'the drawing')
+    if findings:
+        click.echo(f'{summarize(findings)}: they are in the drawing', err=True)
+    return ExitCode.DONE
+
+
+def _format_of(output: Path | None) -> str:
+    if output is None:
+        return DEFAULT_FORMAT
+    name = format_of(output.suffix)
+    if name is None:
+        message = f"no form of drawing ends in '{output.suffix}'"
+        raise UsageError(message, help=f'name one with --format: {", ".join(FORMATS)}')
+    return name

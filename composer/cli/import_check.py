@@ -1,0 +1,136 @@
+"""Behaviours as their modules give them: what only importing them shows."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from contextlib import contextmanager, redirect_stdout
+from typing import TYPE_CHECKING, Any
+
+from composer.checks.behaviours.functions import check_behaviour_call
+from composer.language.bindings import Binding, node_bindings
+from composer.runtime.behaviours import functions as behaviours
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.specs import SystemSpec
+
+_OF_ROS = ('rclpy', 'rcl_interfaces', 'builtin_interfaces', 'rosidl_runtime_py')
+_OF_ROS_ENDINGS = ('_msgs', '_srvs', '_interfaces')
+
+
+def import_behaviours(
+    context: CheckContext,
+) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
+    """Import every behaviour, and hold the functions themselves against their calls."""
+    functions: dict[str, Callable[..., Any]] = {}
+    findings: list[Diagnostic] = []
+    for binding in _bindings(context.spec):
+        spec = binding.behaviour
+        try:
+            function = functions.get(spec.name) or behaviours.import_behaviour(spec)
+        except behaviours.BehaviourImportError as error:
+            findings.append(_explain(context, binding, error))
+            continue
+        functions[spec.name] = function
+        findings += _check_function(context, binding, function)
+    return functions, findings
+
+
+class ImportCheck:
+    """Imports the behaviours whose source is right, and checks the functions themselves.
+
+    Attributes:
+        missing_ros: The modules that could not be imported only because this Python has no ROS.
+    """
+
+    def __init__(self) -> None:
+        self.missing_ros: set[str] = set()
+
+    def __call__(self, context: CheckContext, found: list[Diagnostic]) -> Iterator[Diagnostic]:
+        """Yield what is wrong with the functions, beside what was found in their source."""
+        with _own_modules(context):
+            for binding in _bindings(context.spec):
+                if context.was_dropped(binding.behaviour.path):
+                    continue
+                if not _is_faulty(context, binding, found):
+                    yield from self._check(context, binding)
+
+    def _check(self, context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
+        try:
+            # What a module prints would stand in the report otherwise.
+            with redirect_stdout(sys.stderr):
+                function = behaviours.import_behaviour(binding.behaviour)
+        except behaviours.BehaviourImportError as error:
+            if _lacks_ros(error):
+                self.missing_ros.add(binding.behaviour.module)
+            else:
+                yield _explain(context, binding, error)
+            return
+        yield from _check_function(context, binding, function)
+
+
+def _bindings(spec: SystemSpec) -> Iterator[Binding]:
+    for node in spec.nodes.values():
+        yield from node_bindings(node)
+
+
+def _check_function(
+    context: CheckContext, binding: Binding, function: Callable[..., Any]
+) -> Iterator[Diagnostic]:
+    kind, signature = behaviours.kind_of(function), behaviours.signature_of(function)
+    yield from check_behaviour_call(context, binding, kind, signature)
+
+
+def _explain(
+    context: CheckContext, binding: Binding, error: behaviours.BehaviourImportError
+) -> Diagnostic:
+    spec = binding.behaviour
+    return context.at_value(
+        spec.path, 'broken-behaviour', str(error), part=spec.name, help=error.help
+    )
+
+
+def _is_faulty(context: CheckContext, binding: Binding, found: list[Diagnostic]) -> bool:
+    """Return whether something was found in a behaviour or its arguments already."""
+    path = binding.behaviour.path
+    place = context.system.positions.value(path)
+    arguments = (*path[:-1], 'with')
+    given = {
+        context.system.positions.key((*arguments, name)) for name in binding.behaviour.arguments
+    }
+    return any(
+        finding.span in given
+        or (
+            finding.span is not None
+            and finding.span.source is place.source
+            and finding.span.line == place.line
+            and place.column <= finding.span.column < place.column + max(place.length, 1)
+        )
+        for finding in found
+    )
+
+
+def _lacks_ros(error: behaviours.BehaviourImportError) -> bool:
+    cause = error.__cause__
+    if not isinstance(cause, ModuleNotFoundError) or importlib.util.find_spec('rclpy'):
+        return False
+    top = (cause.name or '').partition('.')[0]
+    return top in _OF_ROS or top.endswith(_OF_ROS_ENDINGS)
+
+
+@contextmanager
+def _own_modules(context: CheckContext) -> Iterator[None]:
+    """Let a file's modules be imported, and be forgotten: the next file may have others."""
+    from composer.python_source.module_finder import project_search_path
+
+    before = set(sys.modules)
+    names = {binding.behaviour.module.partition('.')[0] for binding in _bindings(context.spec)}
+    with behaviours.project_on_path(project_search_path(context.system.files)):
+        yield
+    for name in set(sys.modules) - before:
+        if name.partition('.')[0] in names:
+            del sys.modules[name]

@@ -1,0 +1,137 @@
+"""`composer interfaces`: build, list and show interface packages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from composer.cli.output import show_findings
+from composer.diagnostics import has_errors
+from composer.errors import ComposerError, ExitCode
+from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.declared import describe_declared, provide_declared
+from composer.interfaces.descriptions import (
+    ActionDescription,
+    InterfaceDescription,
+    MessageDescription,
+    ServiceDescription,
+)
+from composer.interfaces.documentation import describe_interface
+from composer.language.pipeline import load_system
+from composer.names import did_you_mean, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from composer.interfaces.catalogue import InterfaceKind
+
+_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+
+
+class UnknownInterfaceError(ComposerError):
+    """No installed package has an interface of that name."""
+
+
+def build(path: Path) -> int:
+    """Build the packages that a file declares, if they are not installed or built already."""
+    system = load_system(path)
+    _, _, findings = describe_declared(system, InterfaceCatalogue())
+    findings = [*system.diagnostics, *findings]
+    show_findings(findings)
+    if has_errors(findings):
+        return ExitCode.FAILED
+    packages = provide_declared(system, lambda line: click.echo(line, err=True))
+    for package in packages:
+        click.echo(f'{package}: ready')
+    if not packages:
+        click.echo(f'{path} declares no interfaces')
+    return ExitCode.DONE
+
+
+def list_all(package: str | None) -> int:
+    """Print the full names of all interfaces that are installed, or of one package."""
+    catalogue = InterfaceCatalogue()
+    if package is not None and package not in catalogue.packages():
+        message = f"no interface package '{package}' is installed"
+        raise UnknownInterfaceError(message, help=did_you_mean(package, catalogue.packages()))
+    for kind in _KINDS:
+        for name in catalogue.names(kind, package):
+            click.echo(name)
+    return ExitCode.DONE
+
+
+def show(name: str) -> int:
+    """Print the fields, types, constants and comments of an interface.
+
+    Raises:
+        UnknownInterfaceError: There is no such interface.
+    """
+    description = describe_interface(name, default_prefixes())
+    if description is None:
+        message = f"no installed package has an interface '{name}'"
+        raise UnknownInterfaceError(message, help=_advise(name))
+    for line in _render(description):
+        click.echo(line)
+    return ExitCode.DONE
+
+
+def _advise(name: str) -> str:
+    """Return where to look for an interface that is not there."""
+    catalogue = InterfaceCatalogue()
+    package, _, rest = name.partition('/')
+    if package not in catalogue.packages():
+        names = [known for kind in _KINDS for known in catalogue.names(kind)]
+        near = suggest(name, names)
+        return f"did you mean '{near}'?" if near else "'composer interfaces list' shows all"
+    listing = f"'composer interfaces list {package}'"
+    if not rest:
+        return f"'{package}' is a package: {listing} shows what it has"
+    names = [known for kind in _KINDS for known in catalogue.names(kind, package)]
+    by_last_part = {known.rpartition('/')[2]: known for known in names}
+    last_part = suggest(rest.rpartition('/')[2], by_last_part)
+    if last_part is None:
+        return f'{listing} shows what it has'
+    return f"did you mean '{by_last_part[last_part]}'?"
+
+
+def _render(description: InterfaceDescription) -> Iterator[str]:
+    yield f'# {description.name}'
+    for index, part in enumerate(_parts(description)):
+        if index:
+            yield '---'
+        yield from _render_message(part)
+
+
+def _parts(description: InterfaceDescription) -> tuple[MessageDescription, ...]:
+    if isinstance(description, ServiceDescription):
+        return description.request, description.response
+    if isinstance(description, ActionDescription):
+        return description.goal, description.result, description.feedback
+    return (description,)
+
+
+def _render_message(message: MessageDescription) -> Iterator[str]:
+    yield from _render_comment(message.comment)
+    for constant in message.constants:
+        yield from _render_comment(constant.comment)
+        yield f'{constant.type} {constant.name}={_written(constant.value)}'
+    for field in message.fields:
+        yield from _render_comment(field.comment)
+        default = '' if field.default is None else f' {_written(field.default)}'
+        yield f'{field.type} {field.name}{default}'
+
+
+def _render_comment(comment: str) -> Iterator[str]:
+    for line in comment.splitlines():
+        yield f'# {line}'.rstrip()
+
+
+def _written(value: object) -> str:
+    """Write a value as a definition does."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f'[{", ".join(map(_written, value))}]'
+    return repr(value) if isinstance(value, str) else str(value)

@@ -1,0 +1,90 @@
+"""`composer new`: a project that works at once, made of the files in `composer/templates/new`.
+
+The template is a project itself, of the name `my_system`; what is `dot_` there begins with a dot.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from composer.errors import ComposerError, ExitCode, UsageError
+from composer.schema.schema_file import SCHEMA_NAME, schema_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_TEMPLATE_NAME = 'my_system'
+_NAME = re.compile('[a-z][a-z0-9_]*')
+
+
+def create_project(name: str) -> int:
+    """Create the folder `name` with a project in it; return the exit code.
+
+    Raises:
+        UsageError: The name cannot be that of a project.
+        ComposerError: There is something of that name already, or it cannot be written.
+    """
+    _check_name(name)
+    folder = Path(name)
+    try:
+        _check_free(folder)
+        written = [_write(folder / path, text) for path, text in _project_files(name)]
+    except OSError as error:
+        message = f'cannot write {error.filename or folder}: {error.strerror}'
+        raise ComposerError(message) from error
+    click.echo(f'created {folder}, with')
+    for path in sorted(written):
+        click.echo(f'  {path.relative_to(folder)}')
+    click.echo(f'run it:\n  cd {name}\n  composer up configs/{name}.yaml\n  python -m pytest')
+    return ExitCode.DONE
+
+
+def template_folder() -> Path:
+    """Return the folder with the files that a new project begins with."""
+    return Path(str(resources.files('composer'))) / 'templates' / 'new'
+
+
+def _check_name(name: str) -> None:
+    if not _NAME.fullmatch(name):
+        message = (
+            f"'{name}' cannot name a project: a name has lower-case letters, digits and "
+            'underscores, and begins with a letter'
+        )
+        near = _NAME.search(re.sub('[^a-z0-9_]+', '_', name.lower()).strip('_'))
+        raise UsageError(message, help=f"'{near[0]}', perhaps" if near else None)
+    if keyword.iskeyword(name):
+        message = f"'{name}' cannot name a project: it is a word of Python, and names a module"
+        raise UsageError(message)
+
+
+def _check_free(folder: Path) -> None:
+    if folder.is_dir() and not any(folder.iterdir()):
+        return
+    if folder.exists() or folder.is_symlink():
+        what = 'a folder with something in it' if folder.is_dir() else 'not a folder'
+        message = f'{folder} is there already, and is {what}'
+        raise ComposerError(message, help='take another name, or move it out of the way')
+
+
+def _project_files(name: str) -> Iterator[tuple[Path, str]]:
+    """Yield each file of a project, by its path there, with its text."""
+    template = template_folder()
+    for path in sorted(template.rglob('*')):
+        if path.is_dir() or '__pycache__' in path.parts:
+            continue
+        parts = path.relative_to(template).parts
+        named = [re.sub('^dot_', '.', part).replace(_TEMPLATE_NAME, name) for part in parts]
+        yield Path(*named), path.read_text(encoding='utf-8').replace(_TEMPLATE_NAME, name)
+    yield Path('schemas', SCHEMA_NAME), schema_path().read_text(encoding='utf-8')
+
+
+def _write(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding='utf-8')
+    return path

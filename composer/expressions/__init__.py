@@ -1,0 +1,1 @@
+"""Expressions in YAML: `{{ … }}`, `foreach` and `when`."""

@@ -1,0 +1,201 @@
+"""`foreach` and `when`: entries repeated for the values of variables, entries that are left out.
+
+Both stand in the entries of some sections. What an entry is repeated for is in scope in its key
+and in all below it; an entry that is left out is still held against the schema.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import diagnostic_at
+from composer.expressions.filling import MAX_ENTRIES, SECTIONS
+from composer.expressions.templates import Filler
+from composer.language.arguments import is_usable_name
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from composer.expressions.filling import FilledDocument
+    from composer.yaml_text.positions import Branch, DataPath, Key, SourceMap
+
+_FOREACH = 'foreach'
+_WHEN = 'when'
+# What a variable without a list of values stands for.
+_SAMPLE = 1
+
+
+def has_conditions(data: Mapping[str, Any]) -> bool:
+    """Return whether any entry of a document is to be repeated or may be left out."""
+    return any(
+        _is_conditional(entry)
+        for section in SECTIONS
+        if isinstance(data.get(section), dict)
+        for entry in data[section].values()
+    )
+
+
+def expand_document(
+    data: dict[str, Any],
+    values: Mapping[str, Any],
+    positions: SourceMap,
+    samples: Collection[str] = (),
+    origins: Mapping[str, str] | None = None,
+) -> FilledDocument:
+    """Evaluate all expressions of a document, and repeat or leave out its entries.
+
+    Args:
+        values: What is in scope, by name.
+        samples: The names whose values only stand for others of their type.
+        origins: Where the values come from, in words.
+    """
+    filler = Filler(values, positions, samples, origins)
+    ignored = {key: value for key, value in data.items() if key.startswith('x-')}
+    plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
+    filled = filler.fill_mapping(plain, ()) | ignored
+    limit = _limit_of(filled)
+    for section in SECTIONS:
+        if isinstance(data.get(section), dict):
+            expansion = _Expansion(filler, section, limit)
+            filled[section] = expansion.expand(data[section])
+        elif section in data:
+            filled[section] = filler.fill(data[section], (section,))
+    filler.filled.data = filled
+    return filler.filled
+
+
+def _limit_of(data: Mapping[str, Any]) -> int:
+    limit = data.get('max_nodes')
+    # The schema says what else is wrong.
+    return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
+
+
+class _Expansion:
+    """Expands the entries of one section."""
+
+    def __init__(self, filler: Filler, section: str, limit: int) -> None:
+        self._filler = filler
+        self._filled = filler.filled
+        self._section = section
+        self._limit = limit
+        self._entries: dict[str, Any] = {}
+        self._branches: dict[Key, Branch] | None = None
+
+    def expand(self, data: dict[str, Any]) -> dict[str, Any]:
+        for written, entry in data.items():
+            if not _is_conditional(entry):
+                self._add(self._filler, written, entry, is_left_out=False, is_repeated=False)
+                continue
+            path = (self._section, written)
+            body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
+            is_repeated = _FOREACH in entry
+            if entry.get(_FOREACH) == {}:
+                self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
+                self._filled.failed.append(path)
+                continue
+            before = len(self._filled.faults)
+            for filler in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
+                if len(self._entries) >= self._limit:
+                    self._report_limit(path)
+                    return self._entries
+                holds = self._holds(filler, entry.get(_WHEN, True), (*path, _WHEN))
+                self._add(filler, written, body, is_left_out=not holds, is_repeated=is_repeated)
+                before = -1
+            if len(self._filled.faults) > before >= 0:
+                # It is missing for a fault, not for having no values.
+                self._filled.failed.append(path)
+        return self._entries
+
+    def _add(
+        self, filler: Filler, written: str, body: Any, *, is_left_out: bool, is_repeated: bool
+    ) -> None:
+        written_path = (self._section, written)
+        key = filler.fill_key(written_path)
+        path = (self._section, key)
+        if key in self._entries:
+            if path in self._filled.left_out:
+                self._filled.left_out.discard(path)
+            elif is_left_out:
+                return
+            else:
+                self._report_duplicate(key, written_path, is_repeated=is_repeated)
+                return
+        if key != written:
+            self._graft(path, written)
+        self._entries[key] = filler.fill(body, path)
+        if is_left_out:
+            self._filled.left_out.add(path)
+
+    def _graft(self, path: DataPath, written: str) -> None:
+        if self._branches is None:
+            self._branches = self._filler.positions.branches((self._section,))
+        self._filler.positions.graft(path, self._branches[written])
+
+    def _scopes(
+        self, foreach: Any, path: DataPath, filler: Filler | None = None
+    ) -> Iterator[Filler]:
+        """Yield a filler for each combination of the variables' values, the last one fastest."""
+        filler = filler or self._filler
+        if not isinstance(foreach, dict):
+            self._report(path, f"{_FOREACH} is a mapping, as in 'foreach: {{i: [1, 2]}}'")
+            return
+        if not foreach:
+            yield filler
+            return
+        name, *others = foreach
+        at = (*path, name)
+        if not is_usable_name(name):
+            self._report(at, f"'{name}' cannot stand in an expression as a name")
+            return
+        values = filler.fill(foreach[name], at)
+        is_sample = filler.is_sampled(at)
+        if not isinstance(values, list):
+            if at not in self._filled.failed:
+                self._report(at, f"'{name}' takes a list of values, not {values!r}")
+            # So that the rest of the entry is read once, too.
+            values, is_sample = [_SAMPLE], True
+        rest = {other: foreach[other] for other in others}
+        for value in values:
+            inner = filler.within(name, value, _FOREACH, is_sample=is_sample)
+            yield from self._scopes(rest, path, inner)
+
+    def _holds(self, filler: Filler, condition: Any, path: DataPath) -> bool:
+        holds = filler.fill(condition, path)
+        if path in self._filled.failed:
+            return False
+        if not isinstance(holds, bool):
+            self._report(path, f'{_WHEN} is true or false, not {holds!r}')
+            return False
+        return holds
+
+    def _report(self, path: DataPath, message: str) -> None:
+        rule = 'bad-when' if path[2] == _WHEN else 'bad-foreach'
+        span = self._filler.positions.value(path)
+        self._filled.faults.append(diagnostic_at(span, rule, message))
+
+    def _report_duplicate(self, key: str, path: DataPath, *, is_repeated: bool) -> None:
+        if not is_repeated:
+            self._filler.report_duplicate(key, path, (self._section, key))
+            return
+        self._filled.faults.append(
+            diagnostic_at(
+                self._filler.positions.key(path),
+                'duplicate-key',
+                f"foreach makes more than one '{key}'",
+                help=f'use its variables in the name, as in "{key}_{{{{ i }}}}"',
+            )
+        )
+
+    def _report_limit(self, path: DataPath) -> None:
+        self._filled.faults.append(
+            diagnostic_at(
+                self._filler.positions.key((*path, _FOREACH)),
+                'too-many-entries',
+                f'there are more than {self._limit:,} entries in {self._section}',
+                help="if that is meant, raise 'max_nodes' at the top of the file",
+            )
+        )
+
+
+def _is_conditional(entry: Any) -> bool:
+    return isinstance(entry, dict) and (_FOREACH in entry or _WHEN in entry)

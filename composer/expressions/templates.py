@@ -1,0 +1,252 @@
+"""Expressions inside scalars: `{{ name }}`, evaluated by sandboxed jinja2.
+
+A scalar that is one whole expression keeps the type of its value; in any other the values become
+text. Names that are not in scope are errors. Source: https://jinja.palletsprojects.com/en/3.1.x/.
+`here`, in scope everywhere, is the folder of the file that the expression stands in.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import (
+    StrictUndefined,
+    TemplateError,
+    TemplateRuntimeError,
+    TemplateSyntaxError,
+    UndefinedError,
+)
+from jinja2.exceptions import SecurityError
+
+from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
+from composer.expressions.filling import FilledDocument
+from composer.expressions.sandbox import Sandbox
+from composer.names import did_you_mean, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from composer.yaml_text.positions import DataPath, SourceMap
+
+_OPEN = '{{'
+_CLOSE = '}}'
+_UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
+# Farther on, an undefined name is not sought: its finding shows the whole scalar.
+_LONGEST_SEARCHED = 1000
+_MOST_LINES_SEARCHED = 100
+# Beyond this no number is even a double; much longer ones Python will not print.
+_MAX_BITS = 1024
+
+
+class Filler:
+    """Evaluates the expressions of one document.
+
+    Args:
+        values: What is in scope, by name.
+        samples: The names whose values only stand for others of their type.
+        origins: Where the values come from, in words.
+    """
+
+    def __init__(
+        self,
+        values: Mapping[str, Any],
+        positions: SourceMap,
+        samples: Collection[str] = (),
+        origins: Mapping[str, str] | None = None,
+        filled: FilledDocument | None = None,
+    ) -> None:
+        self.filled = filled or FilledDocument({})
+        self.positions = positions
+        self._origins = origins or {}
+        self._values = values
+        self._samples = frozenset(samples)
+        self._sandbox = Sandbox(undefined=StrictUndefined)
+
+    def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Filler:
+        """Return a filler with one more name in scope, for the same document."""
+        samples = self._samples | {name} if is_sample else self._samples - {name}
+        inner = Filler(
+            {**self._values, name: value},
+            self.positions,
+            samples,
+            {**self._origins, name: origin},
+            self.filled,
+        )
+        inner._sandbox = self._sandbox
+        return inner
+
+    def fill(self, data: Any, path: DataPath) -> Any:
+        """Return data with the values of all expressions in place."""
+        if isinstance(data, dict):
+            return self.fill_mapping(data, path)
+        if isinstance(data, list):
+            return [self.fill(item, (*path, index)) for index, item in enumerate(data)]
+        if isinstance(data, str) and _OPEN in data:
+            return self._evaluate(data, path)
+        return data
+
+    def fill_mapping(self, data: dict[str, Any], path: DataPath) -> dict[str, Any]:
+        """Return a mapping with the values of the expressions in its keys and values in place."""
+        filled: dict[str, Any] = {}
+        for written, value in data.items():
+            key = self.fill_key((*path, written))
+            if key != written and (key in data or key in filled):
+                self.report_duplicate(key, (*path, written), (*path, key))
+                continue
+            if key != written:
+                self.positions.move((*path, written), (*path, key))
+            filled[key] = self.fill(value, (*path, key))
+        return filled
+
+    def fill_key(self, path: DataPath) -> str:
+        """Return the key at the end of a path with the values of its expressions in place."""
+        written = str(path[-1])
+        if _OPEN not in written:
+            return written
+        return str(_as_text(self._evaluate(written, path, is_key=True)))
+
+    def is_sampled(self, path: DataPath) -> bool:
+        """Return whether the value at a path hangs on samples."""
+        return path in self.filled.sampled
+
+    def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
+        span = self.positions.key(path) if is_key else self.positions.value(path)
+        sampled = False
+        try:
+            expressions = list(_find_expressions(text, self._sandbox))
+            names = self._names_in(text, expressions)
+            self.filled.notes[path] = self._note(names)
+            sampled = not self._samples.isdisjoint(names)
+            if sampled:
+                self.filled.sampled_spans.append(span)
+                self.filled.sampled += [] if is_key else [path]
+            return self._compute(text, expressions, span)
+        except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
+            self.filled.failed.append(path)
+            # With the real value it may succeed.
+            if not sampled or isinstance(error, UndefinedError):
+                self.filled.faults.append(self._explain(error, span))
+            return text
+
+    def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
+        first, last = expressions[0], expressions[-1]
+        outside = text[: first.start], text[last.stop :]
+        if first is last and not ''.join(outside).strip():
+            return self._value_of(text, first, span)
+        parts = []
+        start = 0
+        for expression in expressions:
+            parts.append(text[start : expression.start])
+            parts.append(str(_as_text(self._value_of(text, expression, span))))
+            start = expression.stop
+        return ''.join([*parts, text[start:]])
+
+    def _value_of(self, text: str, expression: slice, span: Span) -> Any:
+        scope = {'here': str(span.source.folder.resolve()), **self._values}
+        return _as_data(self._sandbox.evaluate(_code(text, expression), scope))
+
+    def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
+        names: set[str] = set()
+        for expression in expressions:
+            # What is wrong with it is said when it is evaluated.
+            with suppress(TemplateError):
+                names |= self._sandbox.names_in(_code(text, expression))
+        return frozenset(names)
+
+    def _note(self, names: frozenset[str]) -> str:
+        used = sorted(names & self._origins.keys())
+        return ', '.join(f'{name} = {self._values[name]} ({self._origins[name]})' for name in used)
+
+    def _explain(self, error: Exception, span: Span) -> Diagnostic:
+        if isinstance(error, UndefinedError) and (
+            found := _UNDEFINED_NAME.fullmatch(str(error.message))
+        ):
+            name = found.group(1)
+            scope = {*self._values, 'here', *self._sandbox.globals}
+            declared = self._values or suggest(name, scope)
+            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
+            return diagnostic_at(
+                _locate(name, span),
+                'undefined-name',
+                f"'{name}' is not defined",
+                help=help_text or "declare it as an argument, under 'args'",
+            )
+        return diagnostic_at(span, 'bad-expression', _describe(error))
+
+    def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
+        """Say that two keys of one mapping come out the same."""
+        self.filled.faults.append(
+            diagnostic_at(
+                self.positions.key(path),
+                'duplicate-key',
+                f"the key '{key}' stands twice in one mapping",
+                related=[Related('it stands here too', self.positions.key(other))],
+            )
+        )
+
+
+def _find_expressions(text: str, sandbox: Sandbox) -> Iterator[slice]:
+    """Yield where each `{{ … }}` is, braces included; the first that has no end raises."""
+    start = text.find(_OPEN)
+    while start >= 0:
+        stop = start + len(_OPEN) + sandbox.measure(text[start + len(_OPEN) :]) + len(_CLOSE)
+        yield slice(start, stop)
+        start = text.find(_OPEN, stop)
+
+
+def _code(text: str, expression: slice) -> str:
+    return text[expression.start + len(_OPEN) : expression.stop - len(_CLOSE)]
+
+
+def _locate(name: str, span: Span) -> Span:
+    """Return where a name stands in an expression of a scalar, which may go over several lines."""
+    pattern = re.compile(rf'\{{\{{(?:(?!\}}\}}).)*?(?<![\w.])({re.escape(name)})(?!\w)')
+    if _OPEN in span.text:
+        found = pattern.search(span.text[:_LONGEST_SEARCHED])
+        start = span.column + found.start(1) if found else 0
+        return Span(span.source, span.line, start, len(name)) if found else span
+    lines = span.source.lines[span.line - 1 : span.line - 1 + _MOST_LINES_SEARCHED]
+    for number, line in enumerate(lines, start=span.line):
+        if found := pattern.search(line[:_LONGEST_SEARCHED]):
+            return Span(span.source, number, found.start(1) + 1, len(name))
+    return span
+
+
+def _describe(error: Exception) -> str:
+    """Return what went wrong in one line."""
+    if isinstance(error, SecurityError):
+        return f'the sandbox refuses the expression: {error.message}'
+    if isinstance(error, TemplateSyntaxError):
+        return str(error.message).replace("'end of template'", 'end of the expression')
+    message = str(error) or type(error).__name__
+    if isinstance(error, TemplateError):
+        return message
+    return f'the expression raised {type(error).__name__}: {message}'
+
+
+def _as_data(value: Any) -> Any:
+    """Return a value as YAML could hold it; what it cannot hold raises."""
+    if isinstance(value, StrictUndefined):
+        str(value)  # raises what is undefined
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, int) and value.bit_length() > _MAX_BITS:
+        message = f'a number of {value.bit_length()} bits fits no type of ROS'
+        raise TemplateRuntimeError(message)
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    if isinstance(value, list | tuple | range):
+        return [_as_data(item) for item in value]
+    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
+        return {str(key): _as_data(item) for key, item in value.items()}
+    message = f'the expression gives a {type(value).__name__}, which YAML has no place for'
+    raise TemplateRuntimeError(message)
+
+
+def _as_text(value: Any) -> Any:
+    """Write a value inside a text as YAML does."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    return '' if value is None else value

@@ -1,0 +1,1 @@
+"""Interface packages that are not installed, built and cached."""

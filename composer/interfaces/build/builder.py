@@ -1,0 +1,163 @@
+"""Build an interface package with ROS's generators and the system's compilers, without CMake.
+
+The result is like an installed package: its libraries have sonames and find each other by
+`$ORIGIN`, so it can be imported by a running process, without `LD_LIBRARY_PATH` and without a
+restart.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from composer.errors import ComposerError
+from composer.interfaces.build.compilation import BuildPlan, plan_jobs, write_generation_arguments
+from composer.interfaces.build.jobs import JobError, run_jobs
+from composer.interfaces.build.toolchain import find_toolchain
+from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.references import used_packages
+from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
+
+_SHOWN_LINES = 20
+
+
+class BuildError(ComposerError):
+    """A generator or a compiler failed on definitions that look right.
+
+    Attributes:
+        output: all that it wrote.
+    """
+
+    def __init__(self, package: str, error: JobError) -> None:
+        """Show the errors in the output, or else its end."""
+        lines = error.output.strip().splitlines()
+        shown = [line for line in lines if 'error' in line.lower()] or lines
+        text = '\n'.join(f'  {line}' for line in shown[-_SHOWN_LINES:])
+        super().__init__(
+            f'{package} could not be built: {error}\n{text}',
+            help='the definitions were read without faults, so this may be a fault of the '
+            'installed generators or compilers, or of Composer',
+        )
+        self.output = error.output
+
+
+class DependencyMissingError(ComposerError):
+    """An interface package that every service or action needs is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dependencies:
+    """What a package is built on.
+
+    Attributes:
+        prefixes: where ROS is installed.
+        built: the prefixes of packages built before, by name.
+    """
+
+    prefixes: Sequence[Path]
+    built: Mapping[str, Path]
+
+    def locate(self, package: str) -> Path:
+        """Find the prefix of a package that definitions use.
+
+        Raises:
+            DependencyMissingError: it is not there.
+        """
+        place = self.built.get(package) or find_package_prefix(package, self.prefixes)
+        if place is None:
+            message = f'the interface package {package!r} is not installed'
+            release = f'ros-$ROS_DISTRO-{package.replace("_", "-")}'
+            advice = f'install it with ROS: {release} from apt, or its wheel'
+            raise DependencyMissingError(message, help=advice)
+        return place
+
+
+def build_package(
+    definitions: PackageDefinitions,
+    prefix: Path,
+    dependencies: Dependencies,
+    *,
+    descriptors: Sequence[int] = (),
+) -> None:
+    """Build a package into an empty folder.
+
+    Args:
+        definitions: without faults.
+        prefix: becomes the package's prefix; it may be moved afterwards, together with those of
+            `dependencies.built`, which have to lie beside it.
+        dependencies: where the packages are that it uses.
+        descriptors: open files that the programs inherit: a lock that must not end before them.
+
+    Raises:
+        BuildToolsMissingError: the system lacks something.
+        DependencyMissingError: a used package is not installed.
+        BuildError: a program failed.
+    """
+    toolchain = find_toolchain(dependencies.prefixes)
+    names = sorted(_all_used(definitions, dependencies))
+    used = {name: dependencies.locate(name) for name in names}
+    plan = BuildPlan(
+        package=definitions.package,
+        prefix=prefix,
+        interfaces=tuple(source.rpartition('.')[0] for source in definitions.sources),
+        used=used,
+        siblings={name: path for name, path in dependencies.built.items() if name in used},
+        toolchain=toolchain,
+        workers=max(2, len(os.sched_getaffinity(0))),
+    )
+    _write_definitions(definitions, plan)
+    write_generation_arguments(plan)
+    try:
+        run_jobs(
+            plan_jobs(plan),
+            workers=plan.workers,
+            environment={**os.environ, 'LC_ALL': 'C.UTF-8', 'PYTHONHASHSEED': '0'},
+            descriptors=descriptors,
+        )
+    except JobError as error:
+        raise BuildError(definitions.package, error) from error
+    _write_index(plan)
+    shutil.rmtree(plan.build)
+
+
+def _all_used(definitions: PackageDefinitions, dependencies: Dependencies) -> set[str]:
+    """List the packages whose headers are needed: those used, and those that these use."""
+    found = set(used_packages(definitions))
+    for message in {reference.message for reference in definitions.references}:
+        package, _, name = message.partition('/')
+        if package != definitions.package:
+            share = dependencies.locate(package) / 'share' / package
+            document = json.loads((share / 'msg' / f'{name}.json').read_bytes())
+            described = document['type_description_msg']['referenced_type_descriptions']
+            found |= {each['type_name'].partition('/')[0] for each in described}
+    return found
+
+
+def _write_definitions(definitions: PackageDefinitions, plan: BuildPlan) -> None:
+    """Write the definitions as they were read, for people, and without comments, for rosidl.
+
+    `rosidl_adapter` cannot translate every comment: one with a backslash makes it fail.
+    """
+    for source, text in definitions.sources.items():
+        bare = '\n'.join(line.partition('#')[0].rstrip() for line in text.splitlines())
+        for folder, content in (
+            (plan.prefix / 'share' / plan.package, text),
+            (plan.build / 'definitions', f'{bare}\n'),
+        ):
+            path = folder / source
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(content, encoding='utf-8')
+
+
+def _write_index(plan: BuildPlan) -> None:
+    """Enter the package into its prefix's resource index, by which it is found."""
+    index = plan.prefix / INTERFACE_INDEX
+    index.mkdir(parents=True)
+    entries = [
+        f'{name}.{suffix}'
+        for name in plan.interfaces
+        for suffix in ('idl', name.partition('/')[0])
+    ]
+    (index / plan.package).write_text('\n'.join(entries), encoding='utf-8')

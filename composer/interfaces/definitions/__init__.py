@@ -1,0 +1,1 @@
+"""Interface definitions: `.msg`, `.srv` and `.action` files, read and checked."""

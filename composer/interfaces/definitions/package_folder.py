@@ -1,0 +1,272 @@
+"""Interface definitions of one package: a folder with `msg/`, `srv/` and `action/`.
+
+Reading never stops at a fault: everything that is wrong is a `Diagnostic` with its position, and
+all that is right is described.
+See https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
+from composer.interfaces.definitions.statement_rules import check_statement, find_message
+from composer.interfaces.definitions.statements import (
+    SEPARATOR,
+    Section,
+    Statement,
+    is_near_separator,
+    split_sections,
+)
+from composer.interfaces.definitions.syntax import SyntaxFault, load_parser, parse_message
+from composer.interfaces.descriptions import (
+    ActionDescription,
+    InterfaceDescription,
+    MessageDescription,
+    ServiceDescription,
+)
+
+PARTS: Final = {
+    'msg': ('',),
+    'srv': ('_Request', '_Response'),
+    'action': ('_Goal', '_Result', '_Feedback'),
+}
+_WHAT_IS_SEPARATED: Final = {
+    'srv': 'request and response',
+    'action': 'goal, result and feedback',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class TypeReference:
+    """A place where a definition uses a message.
+
+    Attributes:
+        span: where.
+        user: full name of the message that has the field.
+        message: the message meant, such as `std_msgs/Header`.
+    """
+
+    span: Span
+    user: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class PackageDefinitions:
+    """What a folder defines.
+
+    Attributes:
+        package: name of the interface package.
+        folder: where its definitions are.
+        sources: text of every definition file, by its path in the folder (`msg/Name.msg`).
+        interfaces: what is defined, by full name (`example_interfaces/srv/AddTwoInts`); without
+            those that have faults.
+        references: uses of messages, for `check_definitions`.
+        diagnostics: what is wrong.
+    """
+
+    package: str
+    folder: Path
+    sources: Mapping[str, str]
+    interfaces: Mapping[str, InterfaceDescription]
+    references: tuple[TypeReference, ...]
+    diagnostics: tuple[Diagnostic, ...]
+
+    def messages(self) -> frozenset[str]:
+        """List the messages that are defined, faulty ones included, without the package."""
+        return frozenset(Path(name).stem for name in self.sources if name.startswith('msg/'))
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What is collected while a package is read."""
+
+    package: str
+    sources: dict[str, str] = field(default_factory=dict)
+    interfaces: dict[str, InterfaceDescription] = field(default_factory=dict)
+    references: list[TypeReference] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+
+def load_definitions(package: str, folder: Path) -> PackageDefinitions:
+    """Read all definitions of a package.
+
+    Args:
+        package: its name.
+        folder: the folder with `msg/`, `srv/` or `action/`; an installed package has them in
+            `share/<package>`.
+
+    Raises:
+        ParserMissingError: `rosidl_adapter` is not installed.
+    """
+    reading = _Reading(package)
+    if not load_parser().is_valid_package_name(package):
+        message = f'{package!r} is no name of a package'
+        advice = 'expected small letters, digits and single underscores, beginning with a letter'
+        reading.diagnostics.append(_about_file(folder, 'bad-name', message, advice))
+    paths = list(_list_files(reading, folder))
+    if not paths:
+        message = f'there are no definitions of {package} here'
+        advice = 'expected files such as msg/Name.msg, srv/Name.srv or action/Name.action'
+        reading.diagnostics.append(_about_file(folder, 'no-definitions', message, advice))
+    for path in paths:
+        _read_file(reading, path)
+    return PackageDefinitions(
+        package,
+        folder,
+        reading.sources,
+        reading.interfaces,
+        tuple(reading.references),
+        tuple(reading.diagnostics),
+    )
+
+
+def _list_files(reading: _Reading, folder: Path) -> Iterator[Path]:
+    """List the definition files, noting those that lie in the wrong folder."""
+    for kind in PARTS:
+        for path in sorted((folder / kind).glob('*')):
+            suffix = path.suffix.removeprefix('.')
+            if suffix == kind:
+                yield path
+            elif suffix in PARTS:
+                message = f'a .{suffix} file is in the folder {kind}/'
+                advice = f'move it to {suffix}/'
+                reading.diagnostics.append(_about_file(path, 'misplaced-file', message, advice))
+
+
+def _read_file(reading: _Reading, path: Path) -> None:
+    kind, name = path.parent.name, path.stem
+    before = len(reading.diagnostics)
+    text = _read_text(reading, path)
+    source = SourceFile(str(path), tuple(text.splitlines()))
+    reading.sources[f'{kind}/{path.name}'] = text
+    _check_name(reading, path)
+    sections = _cut(reading, source, kind)
+    full_name = f'{reading.package}/{kind}/{name}'
+    for section, part in zip(sections, PARTS[kind], strict=False):
+        _check_section(reading, section, f'{full_name}{part}')
+    sound = len(reading.diagnostics) == before
+    if sound and load_parser().is_valid_package_name(reading.package):
+        _describe(reading, full_name, sections)
+
+
+def _read_text(reading: _Reading, path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        message = f'cannot be read: {error.strerror}'
+        reading.diagnostics.append(_about_file(path, 'unreadable', message))
+        return ''
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        text = data.decode(errors='replace')
+        line = len(data[: error.start + 1].splitlines())
+        place = Span(SourceFile(str(path), tuple(text.splitlines())), line, 1, 0)
+        reading.diagnostics.append(diagnostic_at(place, 'not-utf-8', 'expected UTF-8 text'))
+        return text
+
+
+def _check_name(reading: _Reading, path: Path) -> None:
+    name = path.stem
+    if '_' in name or not load_parser().is_valid_message_name(name):
+        better = ''.join(part[:1].upper() + part[1:] for part in name.split('_'))
+        message = f'{name!r} is no name of an interface: expected CamelCase'
+        advice = f'did you mean {better}{path.suffix}?'
+        reading.diagnostics.append(_about_file(path, 'bad-name', message, advice))
+
+
+def _cut(reading: _Reading, source: SourceFile, kind: str) -> list[Section]:
+    if kind == 'msg':
+        return [Section(source, 1, len(source.lines) + 1)]
+    wanted = len(PARTS[kind]) - 1
+    expected = f'one line {SEPARATOR!r}' if wanted == 1 else f'{wanted} lines {SEPARATOR!r}'
+    expected = f'{expected} between {_WHAT_IS_SEPARATED[kind]}'
+    found = [
+        Span(source, number, 1, len(line))
+        for number, line in enumerate(source.lines, start=1)
+        if is_near_separator(line)
+    ]
+    reading.diagnostics += [
+        diagnostic_at(
+            span,
+            'bad-separator',
+            f'expected exactly {SEPARATOR!r}',
+            help='three dashes, with nothing before or after them',
+        )
+        for span in found[:wanted]
+        if span.text != SEPARATOR
+    ]
+    reading.diagnostics += [
+        diagnostic_at(span, 'bad-separator', f'expected no more than {expected}')
+        for span in found[wanted:]
+    ]
+    if len(found) < wanted:
+        end = Span(source, max(len(source.lines), 1), 1, 0)
+        message = f'expected {expected}, found {len(found) or "none"}'
+        reading.diagnostics.append(diagnostic_at(end, 'missing-separator', message))
+    return split_sections(source)
+
+
+def _check_section(reading: _Reading, section: Section, user: str) -> None:
+    names: dict[str, Span] = {}
+    for statement in section.statements():
+        if is_near_separator(statement.type.text):
+            reading.diagnostics.append(
+                diagnostic_at(
+                    statement.type,
+                    'bad-separator',
+                    'a message has no parts',
+                    help='a service is defined in srv/, an action in action/',
+                )
+            )
+            continue
+        reading.diagnostics += check_statement(statement)
+        reading.diagnostics += _check_duplicate(names, statement)
+        message = find_message(reading.package, statement.type.text)
+        if statement.kind != 'constant' and message is not None:
+            reading.references.append(TypeReference(statement.type, user, message))
+
+
+def _check_duplicate(names: dict[str, Span], statement: Statement) -> Iterator[Diagnostic]:
+    span = statement.name
+    first = names.setdefault(span.text, span)
+    if span.text and first is not span:
+        what = 'constant' if statement.kind == 'constant' else 'field'
+        yield diagnostic_at(
+            span,
+            f'duplicate-{what}',
+            f'the {what} {span.text!r} is already defined',
+            help=f'the first one is on line {first.line}',
+            related=[Related('the first one', first)],
+        )
+
+
+def _describe(reading: _Reading, full_name: str, sections: list[Section]) -> None:
+    parts = []
+    kind = full_name.split('/')[1]
+    for section, part in zip(sections, PARTS[kind], strict=True):
+        try:
+            parts.append(parse_message(reading.package, f'{full_name}{part}', section.text))
+        except SyntaxFault as error:
+            place = Span(section.source, section.start, 1, 0)
+            reading.diagnostics.append(diagnostic_at(place, 'bad-syntax', str(error)))
+            return
+    reading.interfaces[full_name] = _compose(full_name, parts)
+
+
+def _compose(full_name: str, parts: list[MessageDescription]) -> InterfaceDescription:
+    match parts:
+        case [message]:
+            return message
+        case [request, response]:
+            return ServiceDescription(full_name, request, response)
+        case _:
+            goal, result, feedback = parts
+            return ActionDescription(full_name, goal, result, feedback)
+
+
+def _about_file(path: Path, rule: str, message: str, advice: str | None = None) -> Diagnostic:
+    return Diagnostic(rule, message, str(path), help=advice)

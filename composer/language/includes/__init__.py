@@ -1,0 +1,1 @@
+"""Included files: read, and merged into the file that includes them."""

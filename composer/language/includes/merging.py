@@ -1,0 +1,221 @@
+"""What an included file declares becomes part of the including one, under names of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Related, diagnostic_at
+from composer.language.includes.profile_names import (
+    ProfileRenaming,
+    free_name,
+    rename_profiles,
+)
+from composer.language.namespaces import (
+    full_node_name,
+    join_namespaces,
+    note_namespace,
+    split_node_name,
+)
+from composer.language.parsing.process_parser import takes_ros_arguments, with_waits
+
+if TYPE_CHECKING:
+    from composer.language.instances import Instance
+    from composer.yaml_text.positions import DataPath
+
+
+@dataclass(frozen=True, slots=True)
+class Inclusion:
+    """A file that was read for an include.
+
+    Attributes:
+        at: Where the include stands.
+        entry: What it says.
+    """
+
+    part: Instance
+    at: DataPath
+    entry: dict[str, Any]
+
+    @property
+    def label(self) -> str:
+        """The name of the include."""
+        return str(self.at[-1])
+
+    @property
+    def namespace(self) -> str:
+        """The namespace of all that comes out of the file."""
+        return str(self.entry.get('namespace', ''))
+
+    @property
+    def remap(self) -> dict[str, str]:
+        """Rules for all that comes out of the file."""
+        rules: dict[str, str] = self.entry.get('remap', {})
+        return rules
+
+
+class Flattening:
+    """Adds what included files declare to the instance of the file that includes them.
+
+    Args:
+        chain: Where that file is included itself, innermost first.
+    """
+
+    def __init__(self, instance: Instance, chain: tuple[Related, ...] = ()) -> None:
+        self._whole = instance
+        self._chain = chain
+        self._full_names = {
+            full_node_name(*split_node_name(name, node))
+            for name, node in instance.data.get('nodes', {}).items()
+            if ('nodes', name) not in instance.left_out
+        }
+
+    def add(self, inclusion: Inclusion) -> None:
+        """Add what an included file declares."""
+        part = inclusion.part
+        renaming = self._add_profiles(inclusion)
+        keys = self._process_keys(inclusion)
+        for name, node in part.data.get('nodes', {}).items():
+            inner, simple = part.inner_names.get(name) or split_node_name(name, node)
+            full = join_namespaces(inclusion.namespace, inner)
+            is_left_out = ('nodes', name) in part.left_out
+            key = self._node_key(simple, full, is_left_out=is_left_out)
+            if key is not None:
+                entry = with_waits(renaming.in_node(node), keys)
+                if key.startswith('/'):
+                    # Includes around this one must still find a relative namespace as such.
+                    self._whole.inner_names[key] = full, simple
+                self._add_entry(inclusion, ('nodes', name), key, entry)
+            elif not is_left_out:
+                self._report_duplicate(inclusion, name, full_node_name(full, simple))
+        for name, process in part.data.get('processes', {}).items():
+            entry = with_waits(process, keys)
+            if not takes_ros_arguments(process):
+                entry = with_waits(entry, {}, inclusion.namespace)
+            self._add_entry(inclusion, ('processes', name), keys[name], entry)
+        self._add_interfaces(part)
+        self._whole.sampled_spans += part.sampled_spans
+        self._whole.spans_left_out += part.spans_left_out
+
+    def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
+        """Return a key that is free: the name, or the full name; `None` if that is taken too."""
+        nodes = self._whole.data.setdefault('nodes', {})
+        full = full_node_name(namespace, simple)
+        key = full if simple in nodes else simple
+        if is_left_out:
+            return None if key in nodes else key
+        if full in self._full_names:
+            return None
+        self._full_names.add(full)
+        return key
+
+    def _process_keys(self, inclusion: Inclusion) -> dict[str, str]:
+        """Return what the processes of a file are called in the whole system."""
+        processes, left_out = self._whole.data.get('processes', {}), self._whole.left_out
+        # What is left out gives way.
+        own = [name for name in processes if ('processes', name) not in left_out]
+        names = inclusion.part.data.get('processes', {})
+        taken = {*own, *names}
+        keys = {}
+        for name in names:
+            keys[name] = free_name(f'{inclusion.label}_{name}', taken) if name in own else name
+            taken.add(keys[name])
+        return keys
+
+    def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
+        here = Related('included here', self._whole.positions.value((*inclusion.at, 'file')))
+        inner = inclusion.part.chains.get(('nodes', name), ())
+        self._whole.diagnostics.append(
+            diagnostic_at(
+                inclusion.part.positions.key(('nodes', name)),
+                'duplicate-node',
+                f"there is a node '{full}' already",
+                help="give the include a 'namespace'",
+                related=[*inner, here, *self._chain],
+            )
+        )
+
+    def _add_entry(
+        self, inclusion: Inclusion, old: DataPath, key: str, entry: dict[str, Any]
+    ) -> None:
+        whole, part = self._whole, inclusion.part
+        section, name = str(old[0]), old[1]
+        new = (section, key)
+        whole.positions.graft(new, part.branches(section)[name])
+        for path, note in part.notes_by_entry().get(old, ()):
+            whole.notes[new + path] = note
+        if section == 'nodes' or takes_ros_arguments(entry):
+            entry = self._with_outer(inclusion, new, entry)
+        whole.data.setdefault(section, {})[key] = entry
+        whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
+        here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
+        whole.chains[new] = (*part.chains.get(old, ()), here)
+        self._leave_out(new, is_left_out=old in part.left_out)
+
+    def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
+        if is_left_out:
+            self._whole.left_out.add(path)
+        else:
+            self._whole.left_out.discard(path)
+
+    def _with_outer(
+        self, inclusion: Inclusion, path: DataPath, entry: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Return an entry with what the include says of all that comes out of the file."""
+        plain = dict(entry)
+        inner = plain.pop('namespace', '')
+        namespace = join_namespaces(inclusion.namespace, inner)
+        if namespace != inner:
+            note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'), inner)
+        if namespace and not str(path[-1]).startswith('/'):
+            plain = {'namespace': namespace} | plain
+        if inclusion.remap:
+            # The first rule that fits wins: those from outside do, as in ROS launch.
+            plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
+            for rule in inclusion.remap:
+                self._copy_place((*inclusion.at, 'remap', rule), (*path, 'remap', rule))
+        return plain
+
+    def _copy_place(self, old: DataPath, new: DataPath) -> None:
+        positions, notes = self._whole.positions, self._whole.notes
+        positions.keys[new] = positions.key(old)
+        positions.values[new] = positions.value(old)
+        notes.pop(new, None)
+        if old in notes:
+            notes[new] = notes[old]
+
+    def _add_profiles(self, inclusion: Inclusion) -> ProfileRenaming:
+        """Add the QoS profiles of a file; return the new names of those that had to be renamed."""
+        part = inclusion.part
+        profiles = part.data.get('qos', {})
+        renaming = rename_profiles(self._whole.data.get('qos', {}), profiles, inclusion.label)
+        for name, profile in profiles.items():
+            key = str(renaming.in_qos(name))
+            own = self._whole.data.setdefault('qos', {})
+            is_left_out = ('qos', name) in part.left_out
+            if not (key in own and is_left_out):
+                self._leave_out(('qos', key), is_left_out=is_left_out)
+            if key in own:
+                continue
+            own[key] = renaming.in_qos(profile)
+            self._whole.positions.graft(('qos', key), part.branches('qos')[name])
+            for path, note in part.notes_by_entry().get(('qos', name), ()):
+                self._whole.notes['qos', key, *path] = note
+        self._whole.dropped |= {path for path in part.dropped if path[:1] == ('qos',)}
+        return renaming
+
+    def _add_interfaces(self, part: Instance) -> None:
+        for package in part.data.get('interfaces', {}):
+            declared = self._whole.data.setdefault('interfaces', {})
+            path = ('interfaces', package)
+            is_left_out = path in part.left_out
+            if not (package in declared and is_left_out):
+                self._leave_out(path, is_left_out=is_left_out)
+            if package not in declared:
+                declared[package] = part.data['interfaces'][package]
+                branch = part.branches('interfaces')[package]
+                self._whole.positions.graft(path, branch)
+
+
+def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:
+    return {old: new for old, new in (inner or {}).items() if old not in outer}

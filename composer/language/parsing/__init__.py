@@ -1,0 +1,1 @@
+"""Plain data that satisfy the schema → specs."""

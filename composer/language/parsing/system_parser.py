@@ -1,0 +1,63 @@
+"""Plain data that satisfy the schema → specs. Nothing is checked here that the schema checks."""
+
+from __future__ import annotations
+
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from composer.language.parsing.entry_parser import Data, parse_entries, parse_qos
+from composer.language.parsing.node_parser import NodeParser, parse_defaults
+from composer.language.parsing.process_parser import parse_process, write_scalar
+from composer.language.specs import (
+    DEFAULT_DIAGNOSTICS_PERIOD_SEC,
+    DEFAULT_SHUTDOWN_TIMEOUT_SEC,
+    QosSpec,
+    SystemSpec,
+)
+
+if TYPE_CHECKING:
+    from composer.yaml_text.positions import DataPath
+
+
+def parse_system(data: Data, name: str) -> SystemSpec:
+    """Return the system that the data describe.
+
+    Args:
+        data: As the schema wants them.
+        name: The file's name without its ending.
+    """
+    executor = data.get('executor', {})
+    defaults = parse_defaults(data.get('defaults', {}))
+    return SystemSpec(
+        name=name,
+        description=data.get('description', ''),
+        interfaces=MappingProxyType(data.get('interfaces', {})),
+        qos=parse_entries(data, (), 'qos', _parse_named_qos),
+        threads=int(executor['threads']) if 'threads' in executor else None,
+        shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
+        diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
+        nodes=parse_entries(
+            data,
+            (),
+            'nodes',
+            lambda name, node, path: NodeParser(defaults, node, path).parse(name),
+        ),
+        environment=MappingProxyType(
+            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+        ),
+        processes=parse_entries(
+            data, (), 'processes', partial(parse_process, defaults.given_namespace, defaults.node)
+        ),
+    )
+
+
+def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as it is written
+    if data is False:
+        return None
+    period = data.get('period') if isinstance(data, dict) else None
+    return DEFAULT_DIAGNOSTICS_PERIOD_SEC if period is None else float(period)
+
+
+def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa: ARG001 - a parser of entries
+    return parse_qos(data, path)

@@ -1,0 +1,149 @@
+"""`--set path=value`: changes of single values on the command line, the last layer of a file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import SourceFile, Span
+from composer.errors import UsageError
+from composer.language.layers import is_null_a_value
+from composer.names import did_you_mean
+from composer.yaml_text.reader import Document, parse_document
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.yaml_text.positions import DataPath
+
+# Sections whose keys are names that the file gives; all other keys are those of the schema.
+_NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
+_NAMED_IN_NODES = frozenset(
+    (
+        'action_clients',
+        'actions',
+        'parameters',
+        'publishers',
+        'service_clients',
+        'services',
+        'subscriptions',
+        'timers',
+    )
+)
+
+
+def apply_settings(document: Document, settings: Sequence[str]) -> Document:
+    """Return a document with single values changed; they are typed as in a file.
+
+    Args:
+        settings: As in `nodes.talker.timers.tick.period=0.1`; `null` removes.
+
+    Raises:
+        UsageError: A setting has no value, or its path leads nowhere.
+    """
+    if document.data is None or not settings:
+        return document
+    data, positions = document.data, document.positions.copy()
+    for setting in settings:
+        path_text, separator, value_text = setting.partition('=')
+        if not separator or not path_text:
+            message = f"'{setting}' sets nothing"
+            raise UsageError(message, help='write path=value, as in executor.threads=4')
+        path = _resolve(path_text, data)
+        value = _parse(setting, value_text)
+        if value is None and not is_null_a_value(path):
+            _find(path, data, setting)
+        data = _changed(data, path, value, keeps_null=is_null_a_value(path))
+        source = SourceFile(f'--set {setting}', (setting,), home='.')
+        positions.remove(path)
+        start = len(path_text) + 2
+        written = Span(source, 1, 1, len(path_text))
+        for depth in range(1, len(path)):
+            # What is around the value may be new as well.
+            if positions.keys.setdefault(path[:depth], written) is written:
+                positions.values[path[:depth]] = written
+        positions.keys[path] = written
+        positions.values[path] = Span(source, 1, start, len(value_text))
+    return Document(data, positions, document.diagnostics)
+
+
+def _resolve(text: str, data: dict[str, Any]) -> DataPath:
+    """Return the path that a text names; keys may hold dots themselves.
+
+    Raises:
+        UsageError: Some part of it does not exist, and is no key of the language either.
+    """
+    path: list[str] = []
+    inside: Any = data
+    rest = text
+    while rest:
+        if not isinstance(inside, dict):
+            message = f"--set {text}: '{'.'.join(path)}' is a value, and has no '{rest}' in it"
+            raise UsageError(message, help=_help_for(path, inside))
+        key = _longest_key(rest, inside) or rest.partition('.')[0]
+        if key not in inside and inside and _has_given_names(path):
+            message = f"--set {text}: there is no '{key}' in {'.'.join(path)}"
+            raise UsageError(message, help=did_you_mean(key, inside))
+        path.append(key)
+        rest = rest[len(key) + 1 :]
+        inside = inside.get(key, {}) if rest else None
+    return tuple(path)
+
+
+def _find(path: DataPath, data: dict[str, Any], setting: str) -> None:
+    """Make sure that there is something at a path.
+
+    Raises:
+        UsageError: There is nothing to remove.
+    """
+    inside: Any = data
+    for depth, key in enumerate(path):
+        if not isinstance(inside, dict) or key not in inside:
+            where = f' in {".".join(map(str, path[:depth]))}' if depth else ''
+            message = f"--set {setting}: there is no '{key}'{where} to remove"
+            help_text = did_you_mean(str(key), inside, 'there are') if inside else None
+            raise UsageError(message, help=help_text)
+        inside = inside[key]
+
+
+def _help_for(path: list[str], inside: Any) -> str | None:
+    if not isinstance(inside, list):
+        return None
+    return f'give the whole list, as in --set "{".".join(path)}=[first, second]"'
+
+
+def _has_given_names(path: list[str]) -> bool:
+    """Return whether what is inside has names that the file itself gives."""
+    match path:
+        case [section]:
+            return section in _NAMED
+        case ['nodes', _, section]:
+            return section in _NAMED_IN_NODES
+        case _:
+            return False
+
+
+def _longest_key(text: str, mapping: dict[str, Any]) -> str | None:
+    fitting = [key for key in mapping if text == key or text.startswith(f'{key}.')]
+    return max(fitting, key=len, default=None)
+
+
+def _parse(setting: str, text: str) -> Any:
+    document = parse_document(f'value: {text}'.encode(), f'--set {setting}')
+    if document.data is None or document.diagnostics:
+        reason = document.diagnostics[0].message if document.diagnostics else 'it is empty'
+        message = f'--set {setting}: {reason}'
+        raise UsageError(message)
+    return document.data.get('value')
+
+
+def _changed(
+    data: dict[str, Any], path: DataPath, value: Any, *, keeps_null: bool
+) -> dict[str, Any]:
+    head, *rest = path
+    if rest:
+        inner = data.get(str(head))
+        below = inner if isinstance(inner, dict) else {}
+        return data | {str(head): _changed(below, tuple(rest), value, keeps_null=keeps_null)}
+    if value is None and not keeps_null:
+        return {key: each for key, each in data.items() if key != head}
+    return data | {str(head): value}

@@ -1,0 +1,1 @@
+"""External processes and their guardian."""

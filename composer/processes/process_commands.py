@@ -1,0 +1,178 @@
+"""`ProcessSpec` → the command that is run, with the arguments that ROS takes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from composer.ament import list_executables
+from composer.errors import StartError
+from composer.language.paths import PathError, resolve_path
+from composer.names import did_you_mean
+from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from composer.language.specs import ProcessSpec
+
+
+class CommandWriter:
+    """Writes the commands of processes.
+
+    Args:
+        folder: Takes the parameter files that are made for them.
+        ros_arguments: The arguments after `--ros-args` of Composer's own command line.
+        log_levels: `debug` for all loggers, `talker:=debug` for one; they win over the file.
+    """
+
+    def __init__(
+        self, folder: Path, ros_arguments: Sequence[str], log_levels: Sequence[str]
+    ) -> None:
+        self._folder = folder
+        self._ros_arguments = _with_absolute_files(ros_arguments)
+        self._log_levels = [_level_for_rcl(each) for each in log_levels]
+
+    def write(self, spec: ProcessSpec, environment: Mapping[str, str]) -> list[str]:
+        """Return the whole command.
+
+        Raises:
+            StartError: The program or a parameter file is not there.
+        """
+        command = [*_find_program(spec, environment), *self._ros_arguments_of(spec)]
+        for text in (*command, *(f'{key}={value}' for key, value in spec.env.items())):
+            if '\0' in text:
+                message = f"process '{spec.name}': {text!r} has a null character in it"
+                raise StartError(message)
+        return command
+
+    def _ros_arguments_of(self, spec: ProcessSpec) -> list[str]:
+        """Return the arguments: of remapping rules the first wins, of the others the last."""
+        if not spec.is_ros:
+            return []
+        arguments = ['--ros-args']
+        if spec.parameters:
+            path = self._folder / f'{len(list(self._folder.iterdir()))}.yaml'
+            path.write_text(render_parameters(spec.parameters), encoding='utf-8')
+            arguments += ['--params-file', str(path)]
+        for text in spec.parameter_files:
+            arguments += ['--params-file', str(_find_file(spec, text))]
+        if spec.log_level is not None:
+            arguments += ['--log-level', spec.log_level]
+        arguments += self._ros_arguments
+        for level in self._log_levels:
+            arguments += ['--log-level', level]
+        if spec.node_name is not None:
+            arguments += ['-r', f'__node:={spec.node_name}']
+        if spec.namespace is not None:
+            arguments += ['-r', f'__ns:={spec.namespace}']
+        for old, new in spec.remap:
+            arguments += ['-r', f'{old}:={new}']
+        return arguments
+
+
+def find_folder(spec: ProcessSpec) -> str | None:
+    """Return the folder that a process runs in; `None` for that of Composer.
+
+    Raises:
+        StartError: There is no such folder.
+    """
+    if spec.cwd is None:
+        return None
+    folder = _resolve(spec, spec.cwd)
+    if not folder.is_dir():
+        message = f"process '{spec.name}': there is no folder '{folder}' to run in"
+        raise StartError(message)
+    return str(folder)
+
+
+def render_parameters(parameters: Mapping[str, Any]) -> str:
+    """Return a parameter file for all nodes of a process; rcl reads the types that were meant."""
+    values = _converted(dict(parameters))
+    return yaml.dump({'/**': {'ros__parameters': values}}, Dumper=_Dumper, allow_unicode=True)
+
+
+def _with_absolute_files(ros_arguments: Sequence[str]) -> list[str]:
+    """Return arguments that hold in any folder."""
+    before = ['', *ros_arguments[:-1]]
+    return [
+        str(Path(each).absolute()) if option == '--params-file' else each
+        for option, each in zip(before, ros_arguments, strict=False)
+    ]
+
+
+def _level_for_rcl(request: str) -> str:
+    """Return `robot.talker:=debug` for `/robot/talker:=debug`."""
+    name, separator, level = request.rpartition(':=')
+    return f'{name.strip("/").replace("/", ".")}{separator}{level}'
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes all text: what is a number or a boolean is another matter in rcl than in PyYAML."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - as it is called
+        return True  # rcl knows no aliases
+
+
+def _quote(dumper: _Dumper, text: str) -> yaml.Node:
+    return dumper.represent_scalar('tag:yaml.org,2002:str', text, style='"')
+
+
+_Dumper.add_representer(str, _quote)
+
+
+def _converted(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _converted(each) for name, each in value.items()}
+    return convert_parameter_value(value, infer_parameter_type(value))
+
+
+def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str]:
+    """Return the program and its own arguments.
+
+    Raises:
+        StartError: There is no such program.
+    """
+    if spec.package is not None:
+        executables = list_executables(spec.package)
+        for path in executables:
+            if path.name == spec.executable:
+                return [str(path.absolute()), *spec.arguments]
+        names = [path.name for path in executables]
+        message = f"process '{spec.name}': '{spec.package}' has no executable '{spec.executable}'"
+        raise StartError(message, help=did_you_mean(spec.executable or '', names, 'it has'))
+    program = spec.command[0]
+    if '/' not in program:
+        if shutil.which(program, path=environment.get('PATH', os.defpath)) is None:
+            message = f"process '{spec.name}': there is no program '{program}' on the PATH"
+            raise StartError(message)
+        return list(spec.command)
+    path = Path(find_folder(spec) or '.', program)
+    if not path.is_file():
+        message = f"process '{spec.name}': there is no program '{path}'"
+        raise StartError(message)
+    if not os.access(path, os.X_OK):
+        message = f"process '{spec.name}': '{path}' is not executable"
+        raise StartError(message, help=f'chmod +x {path}')
+    return list(spec.command)
+
+
+def _find_file(spec: ProcessSpec, text: str) -> Path:
+    path = _resolve(spec, text)
+    if not path.is_file():
+        message = f"process '{spec.name}': there is no parameter file '{path}'"
+        raise StartError(message)
+    # The process may run in another folder.
+    return path.absolute()
+
+
+def _resolve(spec: ProcessSpec, text: str) -> Path:
+    try:
+        return resolve_path(text, Path())
+    except PathError as error:
+        message = f"process '{spec.name}': {error}"
+        raise StartError(message, help=error.help) from error

@@ -1,0 +1,1 @@
+"""What a behaviour's source says, without importing it."""

@@ -1,0 +1,133 @@
+"""Where the modules of behaviours lie: the project first, then the installed packages."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import dataclass
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer.names import suggest
+from composer.python_source.modules import ModuleSource, read_module
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+_PROJECT_MARKS = ('pyproject.toml', '.git')
+
+
+@dataclass(frozen=True, slots=True)
+class MissingModule:
+    """A module that is not there.
+
+    Attributes:
+        missing: The part of its name that was not found, as in `behaviours.greter`.
+        nearest: The module that may have been meant.
+    """
+
+    missing: str
+    nearest: str | None
+
+
+def project_search_path(configs: Iterable[Path]) -> list[Path]:
+    """Return where the behaviours of files are sought before the installed packages.
+
+    That is the folder the command runs in, then each file's folder and its parents up to the one
+    with a `pyproject.toml` or `.git`; without such a one, the file's folder alone.
+    """
+    folders = dict.fromkeys(config.resolve().parent for config in configs)
+    chains = (each for folder in folders for each in _lineage(folder))
+    return list(dict.fromkeys([Path.cwd(), *chains]))
+
+
+def _lineage(folder: Path) -> list[Path]:
+    """Return a folder and its parents up to the project's."""
+    lineage = [folder, *folder.parents]
+    roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in _PROJECT_MARKS)]
+    return lineage[: roots[0] + 1] if roots else [folder]
+
+
+class ModuleFinder:
+    """Finds and reads modules, each once."""
+
+    def __init__(self, search_path: list[Path]) -> None:
+        installed = [Path(entry) for entry in sys.path if entry]
+        self._roots = list(dict.fromkeys([*search_path, *installed]))
+        self._found: dict[str, ModuleSource | MissingModule] = {}
+        self._listed: dict[Path, list[str]] = {}
+
+    def find(self, name: str) -> ModuleSource | MissingModule:
+        """Return the module `package.module`, or what of its name is missing."""
+        if name not in self._found:
+            self._found[name] = self._find(name)
+        return self._found[name]
+
+    def _find(self, name: str) -> ModuleSource | MissingModule:
+        folders = self._roots
+        done: list[str] = []
+        for part in name.split('.'):
+            file, inner = _locate(part, folders)
+            if file is None and not inner and not done:
+                file, inner = _locate_with_importers(part)
+            if file is None and not inner:
+                return MissingModule('.'.join([*done, part]), self._nearest(part, done, folders))
+            done.append(part)
+            folders = inner
+        return read_module(file) if file else ModuleSource(None)
+
+    def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
+        for folder in folders:
+            if folder not in self._listed:
+                self._listed[folder] = _list_modules(folder)
+        near = suggest(part, {name for folder in folders for name in self._listed[folder]})
+        return '.'.join([*done, near]) if near else None
+
+
+def _locate(part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
+    """Return the file of a module or package, and the folders of what lies inside it.
+
+    As Python's path finder does: the first regular package or module wins, and folders without
+    an `__init__.py` make one namespace package together.
+    """
+    portions: list[Path] = []
+    for folder in folders:
+        package = folder / part
+        if _is_there(package / '__init__.py'):
+            return package / '__init__.py', [package]
+        for suffix in ('.py', *EXTENSION_SUFFIXES):
+            if _is_there(module := folder / f'{part}{suffix}'):
+                return module, []
+        if _is_there(package, is_folder=True):
+            portions.append(package)
+    return None, portions
+
+
+def _is_there(path: Path, *, is_folder: bool = False) -> bool:
+    try:
+        return path.is_dir() if is_folder else path.is_file()
+    except OSError:
+        # The name is too long, or the folder may not be searched.
+        return False
+
+
+def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
+    """Ask Python's other importers, those of editable installs say, for a top-level name."""
+    try:
+        spec = importlib.util.find_spec(part)
+    except (ImportError, ValueError, AttributeError):
+        return None, []
+    if spec is None:
+        return None, []
+    file = Path(spec.origin) if spec.origin else None
+    return file, [Path(entry) for entry in spec.submodule_search_locations or ()]
+
+
+def _list_modules(folder: Path) -> list[str]:
+    try:
+        entries = list(folder.iterdir())
+    except OSError:
+        return []
+    names = [entry.stem for entry in entries if entry.suffix == '.py' or entry.is_dir()]
+    return [name for name in names if name.isidentifier()]

@@ -1,0 +1,74 @@
+"""Whether a function returns something at its end, told by its text."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.python_source.modules import FunctionNode
+
+# Expressions whose value is never `None`.
+_VALUES = (
+    ast.BinOp,
+    ast.Compare,
+    ast.Dict,
+    ast.DictComp,
+    ast.JoinedStr,
+    ast.List,
+    ast.ListComp,
+    ast.Tuple,
+    ast.UnaryOp,
+)
+_CONVERSIONS = {'abs', 'bool', 'dict', 'float', 'int', 'len', 'list', 'round', 'str', 'sum'}
+
+
+def always_answers(function: FunctionNode) -> bool:
+    """Return whether every path through a function ends with a value that is surely not `None`.
+
+    The second parameter, a message, is such a value, and so are its fields.
+    """
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    message = arguments[1].arg if len(arguments) > 1 else ''
+    stored = {
+        node.id
+        for node in ast.walk(function)
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+    }
+    sure = set() if message in stored else {message}
+    answers = [statement.value for statement in _returns(function)]
+    return _ends(function.body) and all(_is_value(answer, sure) for answer in answers)
+
+
+def _returns(function: FunctionNode) -> Iterator[ast.Return]:
+    pending: list[ast.AST] = list(function.body)
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.Return):
+            yield node
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            pending.extend(ast.iter_child_nodes(node))
+
+
+def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
+    if isinstance(answer, ast.Constant):
+        return answer.value is not None
+    if isinstance(answer, ast.Call):
+        name = answer.func.id if isinstance(answer.func, ast.Name) else ''
+        # What is called like a class makes an object.
+        return name in _CONVERSIONS or name[:1].isupper()
+    while isinstance(answer, ast.Attribute):
+        answer = answer.value
+    return isinstance(answer, _VALUES) or (isinstance(answer, ast.Name) and answer.id in sure)
+
+
+def _ends(body: list[ast.stmt]) -> bool:
+    """Return whether a block ends with `return`, whatever way is taken through it."""
+    last = body[-1]
+    if isinstance(last, ast.If):
+        return bool(last.orelse) and _ends(last.body) and _ends(last.orelse)
+    if isinstance(last, ast.With | ast.AsyncWith):
+        return _ends(last.body)
+    return isinstance(last, ast.Return)

@@ -1,0 +1,1 @@
+"""ROS's own parameters: their types, their files, and what overrides them."""

@@ -1,0 +1,305 @@
+"""ROS's own parameter files, as rcl reads them, with the place of each value.
+
+What rcl refuses is a finding, and so is what it takes as something else than is written: names
+that follow `ros__parameters`, empty mappings, lists in lists.
+Source: `parse_key` and `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
+from composer.names import suggest
+from composer.ros_parameters.node_patterns import find_pattern_fault
+from composer.ros_parameters.parameter_types import infer_parameter_type
+from composer.ros_parameters.rcl_values import RULE, ValueReader
+from composer.yaml_text.reader import decode_content, read_content
+from composer.yaml_text.tree import (
+    CompositionError,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    compose_trees,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from composer.diagnostics import Span
+
+PARAMETERS_KEY = 'ros__parameters'
+_SHAPE_HELP = 'a parameter file is node: {ros__parameters: {name: value}}; /** means every node'
+_TYPO = ':='
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ParameterEntry:
+    """A value in a parameter file.
+
+    Attributes:
+        pattern: Which nodes it is for.
+        keys: Its name, key by key; dots join them.
+        opened: How many mappings of names begin with this value.
+        type: As `infer_parameter_type` tells; `None` for an empty list, which has none.
+        spans: Those of a list's items.
+    """
+
+    pattern: str
+    keys: tuple[str, ...]
+    opened: int
+    value: Any
+    type: str | None
+    pattern_span: Span
+    key_span: Span
+    value_span: Span
+    spans: tuple[Span, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The parameter's name."""
+        return '.'.join(self.keys)
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterFile:
+    """What could be read of a parameter file, in the order of its text, and what was wrong.
+
+    Attributes:
+        patterns: The names of nodes, with those that have no parameters.
+    """
+
+    patterns: tuple[tuple[str, Span], ...] = ()
+    entries: tuple[ParameterEntry, ...] = ()
+    faults: tuple[Diagnostic, ...] = ()
+
+
+def read_parameter_file(path: Path, name: str | None = None) -> ParameterFile:
+    """Read a file.
+
+    Args:
+        name: How the file is called in findings; by default as `path` is written.
+    """
+    name = name or str(path)
+    content = read_content(path, name)
+    text = content if isinstance(content, Diagnostic) else decode_content(content, name)
+    if isinstance(text, Diagnostic):
+        return ParameterFile(faults=(text,))
+    return parse_parameter_file(text, name)
+
+
+def parse_parameter_file(text: str, name: str) -> ParameterFile:
+    """Read the text of a file that is called `name` in findings."""
+    source = SourceFile(name, tuple(text.splitlines()))
+    try:
+        trees = compose_trees(text, source, alias_rule=RULE)
+    except CompositionError as error:
+        return ParameterFile(faults=(_explain_typo(error.diagnostic),))
+    reader = _Reader()
+    # ROS reads several documents as if they were one.
+    for tree in trees:
+        reader.read_nodes(tree, '')
+    reader.check_double_names()
+    return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.faults))
+
+
+class _Reader:
+    """Walks down the tree of a file."""
+
+    def __init__(self) -> None:
+        self.patterns: list[tuple[str, Span]] = []
+        self.entries: list[ParameterEntry] = []
+        self.faults: list[Diagnostic] = []
+        self._values = ValueReader(self.faults)
+        # Mappings of names that were entered since the last value.
+        self._opened = 0
+
+    def read_nodes(
+        self, node: TreeNode, prefix: str, place: Span | None = None, *, is_last: bool = True
+    ) -> None:
+        """Read a mapping of names of nodes, or of what belongs to them.
+
+        Args:
+            place: That of the last name before it.
+            is_last: Whether nothing follows in the mappings around it, the outermost excepted.
+        """
+        if not isinstance(node, MappingNode):
+            self._refuse_value(node)
+            return
+        for index, (key_node, value_node) in enumerate(node.pairs):
+            key = self._key(key_node)
+            if key is None:
+                continue
+            if key.startswith(PARAMETERS_KEY):
+                pair = key_node, value_node
+                is_last_key = index + 1 == len(node.pairs)
+                self._read_parameters_of(prefix, place, pair, is_last_key=is_last_key)
+                continue
+            ends = is_last and (not prefix or index + 1 == len(node.pairs))
+            if '/' in key and prefix and not ends:
+                self._fault(
+                    key_node.span,
+                    f"after '{key}', ROS takes the names that follow to be in another namespace",
+                    'write names with slashes at the top of the file, or as the last of a mapping',
+                )
+            if not isinstance(value_node, MappingNode):
+                self._refuse_value(value_node, key)
+                continue
+            if suggest(key, [PARAMETERS_KEY]):
+                self._fault(
+                    key_node.span,
+                    f"'{key}' is no key of parameter files",
+                    f"did you mean '{PARAMETERS_KEY}'?",
+                )
+                continue
+            self.read_nodes(value_node, _join(prefix, key), key_node.span, is_last=ends)
+
+    def _read_parameters_of(
+        self,
+        pattern: str,
+        place: Span | None,
+        pair: tuple[TreeNode, TreeNode],
+        *,
+        is_last_key: bool,
+    ) -> None:
+        key_node, node = pair
+        key = self._key(key_node)
+        if key != PARAMETERS_KEY:
+            message = f"'{key}' is taken as '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
+        if place is None:
+            message = f"'{PARAMETERS_KEY}' stands below the name of a node"
+            self._fault(key_node.span, message, _SHAPE_HELP)
+        elif fault := find_pattern_fault(pattern):
+            self._fault(place, f"'{pattern}': {fault}")
+        elif not is_last_key:
+            message = f"ROS misreads the names that follow '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, 'write it last, or each node at the top')
+        elif not isinstance(node, MappingNode):
+            message = f"'{PARAMETERS_KEY}' is a mapping of parameters"
+            help_text = _help_for(node) or 'write {} if there are none'
+            self._fault(node.span, message, help_text)
+        else:
+            self.patterns.append((pattern, place))
+            self._read_parameters(node, pattern, place, (), is_last=True)
+
+    def _read_parameters(
+        self,
+        node: MappingNode,
+        pattern: str,
+        place: Span,
+        outer: tuple[str, ...],
+        *,
+        is_last: bool,
+    ) -> None:
+        for index, (key_node, value_node) in enumerate(node.pairs):
+            key = self._key(key_node)
+            if key is None:
+                continue
+            keys = (*outer, key)
+            if isinstance(value_node, MappingNode):
+                self._check_names(key_node, key, value_node)
+                ends = is_last and (not outer or index + 1 == len(node.pairs))
+                if '.' in key and outer and not ends:
+                    self._fault(
+                        key_node.span,
+                        f"after '{key}', ROS takes what follows to belong to a part of it",
+                        'write it in steps, without the dot',
+                    )
+                self._opened += 1
+                self._read_parameters(value_node, pattern, place, keys, is_last=ends)
+                continue
+            value = self._values.read(value_node, key)
+            if value is None:
+                continue
+            items = value_node.items if isinstance(value_node, SequenceNode) else []
+            entry = ParameterEntry(
+                pattern,
+                keys,
+                self._opened,
+                value,
+                infer_parameter_type(value),
+                place,
+                key_node.span,
+                value_node.span,
+                tuple(item.span for item in items),
+            )
+            self.entries.append(entry)
+            self._opened = 0
+
+    def check_double_names(self) -> None:
+        """A name is a value or a mapping of names, for one name of nodes."""
+        mappings = {
+            (entry.pattern, '.'.join(entry.keys[:count]))
+            for entry in self.entries
+            for count in range(1, len(entry.keys))
+        }
+        for entry in self.entries:
+            if (entry.pattern, entry.name) in mappings:
+                message = f"'{entry.name}' has a value and, elsewhere, names below it"
+                self._fault(entry.key_span, message, 'ROS loses one of them: rename it')
+
+    def _check_names(self, key_node: TreeNode, key: str, node: MappingNode) -> None:
+        if not node.pairs:
+            self._fault(
+                key_node.span,
+                f"'{key}' is an empty mapping, and ROS misreads what follows one",
+                'remove it',
+            )
+        elif key.startswith(PARAMETERS_KEY):
+            message = f"'{PARAMETERS_KEY}' stands inside of '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, 'names of nodes stand above it')
+
+    def _key(self, node: TreeNode) -> str | None:
+        if isinstance(node, ScalarNode) and node.text:
+            return node.text.split('\0')[0]
+        what = (
+            'nothing stands here'
+            if isinstance(node, ScalarNode)
+            else 'this is a list or a mapping'
+        )
+        self._fault(node.span, f'a key is a text, and {what}')
+        return None
+
+    def _refuse_value(self, node: TreeNode, key: str = '') -> None:
+        near = suggest(key, [PARAMETERS_KEY])
+        if near:
+            message = f"'{key}' is no key of parameter files"
+            self._fault(node.span, message, f"did you mean '{near}'?")
+            return
+        help_text = _help_for(node) or _SHAPE_HELP
+        self._fault(
+            node.span, f"a value stands here, and no '{PARAMETERS_KEY}' above it", help_text
+        )
+
+    def _fault(self, span: Span, message: str, help_text: str | None = None) -> None:
+        self.faults.append(diagnostic_at(span, RULE, message, help=help_text))
+
+
+def _join(prefix: str, key: str) -> str:
+    if not prefix or prefix.endswith('/'):
+        return prefix + key
+    return f'{prefix}/{key}'
+
+
+def _help_for(node: TreeNode) -> str | None:
+    """Return the help for a scalar that was meant as a key with its value."""
+    if not isinstance(node, ScalarNode) or _TYPO not in node.text:
+        return None
+    name, _, value = node.text.partition(_TYPO)
+    return f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"
+
+
+def _explain_typo(finding: Diagnostic) -> Diagnostic:
+    """Return a syntax fault with the help for `:=`, if that is what stands around it."""
+    span = finding.span
+    near = (span.source.line(span.line), span.source.line(span.line - 1)) if span else ()
+    typo = next((line.strip() for line in near if _TYPO in line), None)
+    if typo is None:
+        return finding
+    name, _, value = typo.partition(_TYPO)
+    return replace(
+        finding, help=f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"
+    )

@@ -1,0 +1,1 @@
+"""Behaviours: imported, called, waited for, and what happens when they raise."""

@@ -1,0 +1,92 @@
+"""Behaviours by name → the functions themselves."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import sys
+import traceback
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+from composer.python_source.modules import FunctionKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from composer.language.specs import BehaviourSpec
+
+
+class BehaviourImportError(ComposerError):
+    """A behaviour's module cannot be imported, or has no such function."""
+
+
+def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
+    """Return the function that a behaviour names.
+
+    Raises:
+        BehaviourImportError: The import fails, whatever the module's code raises; there is no
+            such name in it; or it cannot be called.
+    """
+    try:
+        module = importlib.import_module(spec.module)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        where = _innermost_place(error)
+        message = f"importing '{spec.module}' raised {type(error).__name__}: {error}{where}"
+        raise BehaviourImportError(message) from error
+    function = getattr(module, spec.function, None)
+    if function is None:
+        message = f"{spec.module} has no function '{spec.function}'"
+        raise BehaviourImportError(message)
+    if not callable(function):
+        message = f"'{spec.name}' is a {type(function).__name__}, and cannot be called"
+        raise BehaviourImportError(message)
+    return function  # type: ignore[no-any-return]
+
+
+def kind_of(function: Callable[..., Any]) -> FunctionKind:
+    """Return how a function runs; of an object with `__call__`, how that does."""
+    target: Any = inspect.unwrap(function)
+    while isinstance(target, partial):
+        target = target.func
+    if not inspect.isroutine(target) and not inspect.isclass(target):
+        target = type(target).__call__
+    if inspect.isasyncgenfunction(target):
+        return FunctionKind.ASYNC_GENERATOR
+    if inspect.iscoroutinefunction(target):
+        return FunctionKind.COROUTINE
+    return FunctionKind.GENERATOR if inspect.isgeneratorfunction(target) else FunctionKind.PLAIN
+
+
+def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
+    """Return a function's signature; `None` for those of C that tell none."""
+    try:
+        return inspect.signature(function)
+    except (TypeError, ValueError):
+        return None
+
+
+@contextmanager
+def project_on_path(search_path: list[Path]) -> Iterator[None]:
+    """Let modules of the project be imported, before the installed ones of the same name."""
+    entries = [str(folder) for folder in search_path]
+    sys.path[:0] = entries
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        for entry in entries:
+            sys.path.remove(entry)
+
+
+def _innermost_place(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith('<frozen importlib')]
+    if isinstance(error, SyntaxError) and error.filename:
+        return f' ({error.filename}:{error.lineno})'
+    return f' ({own[-1].filename}:{own[-1].lineno})' if len(own) > 1 else ''

@@ -1,0 +1,81 @@
+"""How entities fared → `diagnostic_msgs/msg/DiagnosticStatus`, as ROS's diagnostic tools read it.
+
+The name is `node: task`, as `diagnostic_updater` writes it, with the node's full name:
+`/robot/talker: timer tick`. Viewers group by the slashes in it. The hardware is the system.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+if TYPE_CHECKING:
+    from composer.runtime.health.statistics import EntityReport
+
+_P99 = 0.99
+
+
+class StatusWriter:
+    """Writes the status of one entity over and over; what does not change is kept.
+
+    Args:
+        node: The full name of its node.
+        owner: The entity in words, as in `timer 'tick'`.
+        system: The system's name.
+    """
+
+    def __init__(self, node: str, owner: str, system: str) -> None:
+        self._is_timer = owner.startswith('timer ')
+        self._is_subscription = owner.startswith('subscription ')
+        self._values: dict[str, KeyValue] = {}
+        task = owner.replace("'", '')
+        self._status = DiagnosticStatus(name=f'{node}: {task}', hardware_id=system)
+
+    def write(self, report: EntityReport) -> DiagnosticStatus:
+        """Return the status, the same message each time."""
+        status = self._status
+        status.level, status.message = self._judge(report)
+        times, calls = report.times, report.times.calls()
+        self._set('calls', str(report.all_calls))
+        self._set('errors', str(report.all_errors))
+        self._set('rate (Hz)', f'{calls / report.period_sec:.2f}')
+        if calls or not report.all_calls:
+            self._set('callback time mean (ms)', f'{times.mean_ns() / 1e6:.4f}')
+            self._set('callback time p99 (ms)', f'{times.percentile_ns(_P99) / 1e6:.4f}')
+            self._set('callback time max (ms)', f'{times.most_ns / 1e6:.4f}')
+        if self._is_subscription:
+            self._set('queue overruns', str(report.all_missed.overruns))
+        if self._is_timer:
+            self._set('late ticks', str(report.all_missed.late_ticks))
+            self._set('skipped ticks', str(report.all_missed.skipped_ticks))
+        return status
+
+    def _judge(self, report: EntityReport) -> tuple[bytes, str]:
+        missed, overdue_sec = report.missed, report.overdue_sec
+        concerns = [
+            _count(report.errors, 'error', f', last: {report.last_error}'),
+            f'a call has been running for {overdue_sec:.1f} s' if overdue_sec else '',
+            _count(missed.overruns, 'message', ' dropped from the full queue'),
+            _count(missed.late_ticks, 'late tick'),
+            _count(missed.skipped_ticks, 'skipped tick'),
+        ]
+        text = '; '.join(filter(None, concerns))
+        if report.errors:
+            return DiagnosticStatus.ERROR, text
+        if text:
+            return DiagnosticStatus.WARN, text
+        return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
+
+    def _set(self, key: str, value: str) -> None:
+        pair = self._values.get(key)
+        if pair is None:
+            pair = self._values[key] = KeyValue(key=key)
+            self._status.values.append(pair)
+        pair.value = value
+
+
+def _count(number: int, what: str, more: str = '') -> str:
+    if not number:
+        return ''
+    return f'{number} {what}{"" if number == 1 else "s"}{more}'

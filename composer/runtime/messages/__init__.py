@@ -1,0 +1,1 @@
+"""What behaviours give and get: plain data ⇄ messages."""

@@ -1,0 +1,67 @@
+"""Arrays of NumPy, as payloads and as rclpy keeps fixed arrays of numbers.
+
+Apart from `composer.runtime.messages.arrays`, so that NumPy is imported only where it is in use.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from composer.interfaces.descriptions import FieldType
+from composer.interfaces.values import INTEGER_RANGES, Reader, check_length
+
+
+def fixed_reader(field_type: FieldType, read_numbers: Reader) -> Reader:
+    """Get the rule for arrays of a fixed count of numbers.
+
+    Args:
+        field_type: the type of the array.
+        read_numbers: the rule that reads other containers into an `array.array`.
+    """
+    dtype = _dtype(field_type.kind)
+    shape = (field_type.array_bound,)
+
+    def read(value: object) -> NDArray[Any]:
+        if type(value) is np.ndarray and value.dtype == dtype:
+            if value.shape == shape:
+                return value
+            if value.ndim > 0:
+                check_length(field_type, value.size)
+                return value.reshape(-1)
+        return np.array(read_numbers(value), dtype)
+
+    return read
+
+
+def read_array(kind: str, value: object) -> NDArray[Any] | None:
+    """Read an array as numbers of a kind, in one dimension.
+
+    Returns:
+        None where the numbers are not all of the kind, or do not all fit it: then they are to be
+        looked at one by one.
+    """
+    given: NDArray[Any] = np.asarray(value)
+    wanted = _dtype(kind)
+    if given.ndim == 0 or not _fits(kind, given):
+        return None
+    return given.reshape(-1).astype(wanted, copy=False)
+
+
+def _fits(kind: str, given: NDArray[Any]) -> bool:
+    wanted = _dtype(kind)
+    if given.dtype == wanted:
+        return True
+    if kind in INTEGER_RANGES:
+        low, high = INTEGER_RANGES[kind]
+        if given.dtype.kind not in 'iu':
+            return False
+        return not given.size or (low <= int(given.min()) and int(given.max()) <= high)
+    if given.dtype.kind not in 'iuf':
+        return False
+    limit = float(np.finfo(wanted).max)
+    return bool(np.all((np.abs(given) <= limit) | ~np.isfinite(given)))
+
+
+def _dtype(kind: str) -> np.dtype[Any]:
+    return np.dtype('uint8' if kind == 'char' else kind)

@@ -1,0 +1,181 @@
+"""What a behaviour gives becomes a message that is safe to publish.
+
+A *payload* is a message, a mapping of (nested) fields, or the bare value when the message has one
+field. The same holds inside: wherever a message is wanted, all three will do. In detail:
+
+- A mapping always names the fields of the message itself, also where there is only one; fields
+  that it leaves out keep their defaults.
+- An empty message is `{}` or None.
+- Objects with a `to_msg()` stand for its result: `rclpy`'s `Time` and `Duration` do.
+- A message is checked and returned itself, not a copy. What it holds in another form than rclpy
+  wants (an `int` in a `float64` field, a tuple for a list) is replaced in place: rclpy 7 checks
+  no fields unless `ROS_PYTHON_CHECK_FIELDS=1`, and publishes such an `int` as garbage.
+
+Which values fit which field is the business of `composer.interfaces.values`, for arrays of
+`composer.runtime.messages.arrays`. Both stop at the first fault.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, Final
+
+from composer.errors import ComposerError
+from composer.interfaces.classes import import_interface
+from composer.interfaces.descriptions import FieldType
+from composer.interfaces.slots import describe_class
+from composer.interfaces.values import (
+    FieldError,
+    Reader,
+    no_message,
+    scalar_reader,
+    unknown_field,
+)
+from composer.interfaces.wording import format_fault, is_message_class
+from composer.runtime.messages.arrays import array_reader
+
+# The types of most bare values, told at once from messages and mappings.
+_SCALARS: Final = frozenset({str, int, float, bool})
+
+
+class PayloadError(ComposerError):
+    """A payload does not fit its message.
+
+    Attributes:
+        type_name: full name of the message.
+        path: names and indices that lead to the value at fault, outermost first.
+    """
+
+    def __init__(self, type_name: str, error: FieldError) -> None:
+        """Say where in a message of this type the error lies."""
+        super().__init__(format_fault(type_name, error.path, str(error)), help=error.help)
+        self.type_name = type_name
+        self.path = error.path
+
+
+class PayloadConverter:
+    """Converts payloads to messages of one class; get it from `converter_for`."""
+
+    __slots__ = (
+        '_readers',
+        '_rules',
+        '_single',
+        '_takes_bare_messages',
+        'message_class',
+        'type_name',
+    )
+
+    def __init__(self, message_class: type) -> None:
+        """Compile the rules for a message class, and for those of its nested messages.
+
+        Raises:
+            InterfaceNotFoundError: the class of a nested message cannot be loaded.
+            UnsupportedFieldError: a field has a type that `.msg` files do not have.
+        """
+        description = describe_class(message_class)
+        self.message_class = message_class
+        self.type_name = description.name
+        self._readers = {field.name: _reader_for(field.type) for field in description.fields}
+        self._rules = tuple(
+            (field.name, _type_that_fits(field.type), self._readers[field.name])
+            for field in description.fields
+        )
+        first = description.fields[0] if len(description.fields) == 1 else None
+        self._single = first.name if first else None
+        self._takes_bare_messages = first is not None and first.type.kind == 'message'
+
+    def convert(self, payload: object) -> Any:
+        """Convert a payload to a message, or check the message that it is.
+
+        Raises:
+            PayloadError: the payload does not fit; it names the first field at fault, the type
+                that it has and what it was given.
+        """
+        try:
+            # What behaviours give most often, without a detour.
+            if type(payload) is self.message_class:
+                return self._check(payload)
+            return self.read(payload)
+        except FieldError as error:
+            raise PayloadError(self.type_name, error) from None
+
+    def read(self, payload: object) -> object:
+        """Convert a payload that lies inside another one.
+
+        Raises:
+            FieldError: the payload does not fit; its path begins at this message.
+        """
+        kind = type(payload)
+        if kind is self.message_class:
+            return self._check(payload)
+        if isinstance(payload, dict):
+            return self._build(payload)
+        if kind in _SCALARS and self._single is not None:
+            return self._build({self._single: payload})
+        return self._read_other(payload)
+
+    def _read_other(self, payload: object) -> object:
+        to_msg = getattr(type(payload), 'to_msg', None)
+        value = to_msg(payload) if to_msg else payload
+        if isinstance(value, self.message_class):
+            return self._check(value)
+        if isinstance(value, Mapping):
+            return self._build(value)
+        if value is None and not self._readers:
+            return self.message_class()
+        foreign = is_message_class(type(value)) and not self._takes_bare_messages
+        if self._single is None or foreign:
+            raise no_message(self.type_name, value, self._readers)
+        return self._build({self._single: value})
+
+    def _build(self, fields: Mapping[Any, object]) -> object:
+        message = self.message_class()
+        for name, value in fields.items():
+            read = self._readers.get(name)
+            if read is None:
+                raise unknown_field(self.type_name, name, self._readers)
+            try:
+                setattr(message, name, read(value))
+            except FieldError as error:
+                error.within(name)
+                raise
+        return message
+
+    def _check(self, message: object) -> object:
+        for name, fits, read in self._rules:
+            value = getattr(message, name)
+            if type(value) is fits:
+                continue
+            try:
+                kept = read(value)
+            except FieldError as error:
+                error.within(name)
+                raise
+            if kept is not value:
+                setattr(message, name, kept)
+        return message
+
+
+@cache
+def converter_for(message_class: type) -> PayloadConverter:
+    """Get the converter of a message class; it is compiled once.
+
+    Raises:
+        InterfaceNotFoundError: the class of a nested message cannot be loaded.
+        UnsupportedFieldError: a field has a type that `.msg` files do not have.
+    """
+    return PayloadConverter(message_class)
+
+
+def _type_that_fits(field_type: FieldType) -> type | None:
+    """Return the Python type whose every value a field can hold as it is, if there is one."""
+    if field_type.array is not None:
+        return None
+    return {'float64': float, 'bool': bool}.get(field_type.kind)
+
+
+def _reader_for(field_type: FieldType) -> Reader:
+    if field_type.nested is None:
+        read_item = scalar_reader(field_type)
+    else:
+        read_item = converter_for(import_interface(field_type.nested)).read
+    return read_item if field_type.array is None else array_reader(field_type, read_item)

@@ -1,0 +1,88 @@
+"""How a node is built anew after an error: all of it ends, then it starts as at the first time."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from composer.errors import ComposerError
+from composer.runtime.logs import system_logger
+from composer.runtime.nodes.stop import stop_node
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.start import NodeStarter
+    from composer.runtime.system_services import SystemServices
+
+_GONE_SEC = 2.0
+
+
+class NodeRestarter:
+    """Rebuilds nodes, one at a time.
+
+    Args:
+        nodes: The nodes of the system, by their full names.
+        timeout_sec: How long the behaviours of a node get to end.
+
+    Attributes:
+        lock: Held while a node is rebuilt, so that nobody stops half of one.
+    """
+
+    def __init__(
+        self,
+        nodes: Mapping[str, LiveNode],
+        starter: NodeStarter,
+        services: SystemServices,
+        timeout_sec: float,
+    ) -> None:
+        self.lock = threading.Lock()
+        self._nodes = nodes
+        self._starter = starter
+        self._services = services
+        self._timeout_sec = timeout_sec
+
+    def restart(self, full_name: str) -> None:
+        """Rebuild a node: its entities, parameters and state are as at the start again.
+
+        One that hangs goes on as it is. If the new one cannot start, that is an error of the
+        node, after which it is restarted again.
+        """
+        with self.lock:
+            old = self._nodes[full_name]
+            if self._services.stop.is_set or not self._end(old):
+                return
+            try:
+                self._build(old)
+            except ComposerError as error:
+                system_logger.error(f'restart: {error}')
+                self._services.act_on_error(full_name, 'restart')
+                return
+        system_logger.warn(f"node '{old.spec.key}' was restarted")
+
+    def _end(self, node: LiveNode) -> bool:
+        """Remove a node; return whether a new one may take its place."""
+        stop, executor, name = self._services.stop, self._services.executor, node.spec.key
+        has_ended = stop_node(node, self._timeout_sec, lambda: stop.is_set)
+        if stop.is_set:
+            return False
+        if not has_ended:
+            executor.wake()
+            hanging = ', '.join(call.owner for call in node.ledger.running())
+            system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
+            return False
+        executor.remove_node(node.ros)
+        node.destroy()
+        if not node.ros.wait_until_gone(_GONE_SEC):
+            system_logger.warn(
+                f"node '{name}': something still holds an entity of the node before its "
+                'restart, so its log may be missing on /rosout'
+            )
+        return True
+
+    def _build(self, old: LiveNode) -> None:
+        node = self._starter.create(old.spec)
+        self._services.executor.add_node(node.ros)
+        self._starter.run_on_start(node)
+        self._starter.open([node])

@@ -1,0 +1,225 @@
+"""An error of the JSON Schema validator → faults in the words of the language."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from composer.names import did_you_mean, suggest
+from composer.schema.faults import (
+    StructureFault,
+    conflicting_keys,
+    describe_types,
+    droppable,
+    missing_key,
+    owner_of,
+    path_of,
+    show_value,
+    wrong_type,
+)
+from composer.schema.meant_forms import find_meant_form
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from jsonschema.exceptions import ValidationError
+
+
+def explain(error: ValidationError) -> Iterator[StructureFault]:
+    """Yield the faults behind an error; several for several unknown keys of one mapping."""
+    explanation = _EXPLANATIONS.get(str(error.validator), _explain_otherwise)
+    return explanation(error)
+
+
+def _explain_unknown_keys(error: ValidationError) -> Iterator[StructureFault]:
+    schema = error.schema
+    known = schema.get('properties', {})
+    path = path_of(error)
+    for key in error.instance:
+        if key in known or any(re.search(p, key) for p in schema.get('patternProperties', {})):
+            continue
+        yield StructureFault(
+            'unknown-key',
+            f"unknown key '{key}'{owner_of(error)}",
+            (*path, key),
+            (*path, key),
+            at_key=True,
+            help=did_you_mean(key, known, 'the keys are'),
+            meant=suggest(key, known),
+        )
+
+
+def _explain_missing_keys(error: ValidationError) -> Iterator[StructureFault]:
+    missing = [key for key in error.validator_value if key not in error.instance]
+    # The validator reports each missing key on its own; its message begins with the key.
+    key = next((key for key in missing if error.message.startswith(repr(key))), missing[0])
+    yield missing_key(error, key, f"the key '{key}' is missing{owner_of(error)}")
+
+
+def _explain_type(error: ValidationError) -> Iterator[StructureFault]:
+    yield wrong_type(error, describe_types(error.validator_value))
+
+
+def _explain_enum(error: ValidationError) -> Iterator[StructureFault]:
+    options = [str(option) for option in error.validator_value]
+    yield StructureFault(
+        'bad-value',
+        f'expected one of {", ".join(options)}; got {show_value(error.instance)}',
+        path_of(error),
+        droppable(path_of(error)),
+        help=_near(error.instance, options),
+    )
+
+
+def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
+    path = path_of(error)
+    if path == ('version',):
+        yield StructureFault(
+            'unsupported-version',
+            f'version {show_value(error.instance)} is not known; this Composer reads version 1',
+            path,
+            path,
+        )
+        return
+    yield StructureFault(
+        'bad-value',
+        f'expected {error.validator_value!r}, got {show_value(error.instance)}',
+        path,
+        droppable(path),
+    )
+
+
+def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
+    expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
+    path = path_of(error)
+    meant = find_meant_form(error.instance, error.validator_value)
+    yield StructureFault(
+        'bad-value',
+        f'expected {expected}; got {show_value(error.instance)}',
+        path,
+        droppable(path),
+        help=f"did you mean '{meant}'?" if meant else None,
+    )
+
+
+_BOUNDS = {
+    'minimum': 'at least',
+    'maximum': 'at most',
+    'exclusiveMinimum': 'more than',
+    'minItems': 'at least',
+    'minLength': 'at least',
+}
+_BOUND_UNITS = {'minItems': ' item', 'minLength': ' character'}
+
+
+def _explain_bound(error: ValidationError) -> Iterator[StructureFault]:
+    keyword = str(error.validator)
+    path = path_of(error)
+    limit = f'{error.validator_value:.9f}'.rstrip('0').rstrip('.')
+    yield StructureFault(
+        'out-of-range',
+        f'expected {_BOUNDS[keyword]} {limit}{_BOUND_UNITS.get(keyword, "")}, '
+        f'got {show_value(error.instance)}',
+        path,
+        droppable(path),
+    )
+
+
+def _explain_dependency(error: ValidationError) -> Iterator[StructureFault]:
+    path = path_of(error)
+    for key, needed in error.validator_value.items():
+        for other in needed:
+            if key in error.instance and other not in error.instance:
+                yield StructureFault(
+                    'missing-key',
+                    f"'{key}' needs '{other}' beside it",
+                    (*path, key),
+                    (*path, key),
+                    at_key=True,
+                )
+
+
+def _explain_exclusion(error: ValidationError) -> Iterator[StructureFault]:
+    if isinstance(error.instance, dict):
+        yield conflicting_keys(error, error.validator_value['required'])
+
+
+def _explain_alternatives(error: ValidationError) -> Iterator[StructureFault]:
+    branches = error.validator_value
+    if all(set(branch) == {'required'} for branch in branches):
+        if not isinstance(error.instance, dict):
+            return  # what is no mapping has its finding for that
+        yield _explain_key_alternatives(error, [branch['required'] for branch in branches])
+        return
+    by_branch: dict[int, list[ValidationError]] = {}
+    for inner in error.context or ():
+        by_branch.setdefault(int(inner.schema_path[0]), []).append(inner)
+    expected = []
+    for inner_errors in by_branch.values():
+        mismatch = next((e for e in inner_errors if _is_mismatch(e, error)), None)
+        if mismatch is None:
+            for inner in inner_errors:
+                yield from explain(inner)
+            return
+        expected.append(_describe_mismatch(mismatch))
+    yield wrong_type(error, ' or '.join(dict.fromkeys(expected)))
+
+
+def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
+    """Return whether an alternative is out of the question for what stands there."""
+    if inner.absolute_path != outer.absolute_path:
+        return False
+    if inner.validator == 'const':
+        return True
+    nested = inner.validator == 'oneOf' and all(
+        _is_mismatch(e, outer) for e in inner.context or ()
+    )
+    return inner.validator == 'type' or nested
+
+
+def _describe_mismatch(error: ValidationError) -> str:
+    if error.validator == 'const':
+        return repr(error.validator_value)
+    if error.validator == 'oneOf':
+        return ' or '.join(_describe_mismatch(inner) for inner in error.context or ())
+    return describe_types(error.validator_value)
+
+
+def _explain_key_alternatives(
+    error: ValidationError, alternatives: list[list[str]]
+) -> StructureFault:
+    present = [keys for keys in alternatives if all(key in error.instance for key in keys)]
+    if len(present) > 1:
+        return conflicting_keys(error, [keys[0] for keys in present])
+    absent = [[key for key in keys if key not in error.instance] for keys in alternatives]
+    wanted = ' or '.join(' and '.join(f"'{key}'" for key in keys) for keys in absent)
+    verb = 'is' if all(len(keys) == 1 for keys in absent) else 'are'
+    first = alternatives[0][0]
+    return missing_key(error, first, f'{wanted} {verb} missing{owner_of(error)}')
+
+
+def _explain_otherwise(error: ValidationError) -> Iterator[StructureFault]:
+    path = path_of(error)
+    yield StructureFault('bad-value', error.message, path, droppable(path))
+
+
+def _near(value: Any, options: list[str]) -> str | None:
+    if not isinstance(value, str):
+        return None
+    found = did_you_mean(value, options)
+    return found if found and found.startswith('did') else None
+
+
+_EXPLANATIONS: dict[str, Callable[[ValidationError], Iterator[StructureFault]]] = {
+    'additionalProperties': _explain_unknown_keys,
+    'required': _explain_missing_keys,
+    'type': _explain_type,
+    'enum': _explain_enum,
+    'const': _explain_const,
+    'pattern': _explain_pattern,
+    'dependentRequired': _explain_dependency,
+    'not': _explain_exclusion,
+    'oneOf': _explain_alternatives,
+    'anyOf': _explain_alternatives,
+    **dict.fromkeys(_BOUNDS, _explain_bound),
+}

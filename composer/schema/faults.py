@@ -1,0 +1,144 @@
+"""Faults of structure as data, and how they are worded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, diagnostic_at
+
+if TYPE_CHECKING:
+    from jsonschema.exceptions import ValidationError
+
+    from composer.yaml_text.positions import DataPath, SourceMap
+
+_TYPE_WORDS = {
+    'object': 'a mapping',
+    'array': 'a list',
+    'string': 'a string',
+    'number': 'a number',
+    'integer': 'an integer',
+    'boolean': 'true or false',
+    'null': 'null',
+}
+_LONGEST_SHOWN = 40
+
+# What an entry without one of these keys is read on with; the checks pass over them, since the
+# paths of stand-ins count as dropped.
+_STAND_INS: dict[str, dict[str, Any]] = {
+    'publisher': {'type': 'unknown/msg/Unknown'},
+    'subscription': {'type': 'unknown/msg/Unknown', 'behaviour': 'unknown:unknown'},
+    'timer': {'period': 1.0, 'behaviour': 'unknown:unknown'},
+    'service': {'type': 'unknown/srv/Unknown', 'behaviour': 'unknown:unknown'},
+    'service client': {'type': 'unknown/srv/Unknown'},
+    'action': {'type': 'unknown/action/Unknown', 'behaviour': 'unknown:unknown'},
+    'action client': {'type': 'unknown/action/Unknown'},
+    'condition': {'topic': 'unknown'},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class StructureFault:
+    """One fault of structure.
+
+    Attributes:
+        path: The data that are wrong; of a key, the path of its value.
+        at_key: Whether the key is wrong and not the value.
+        drop: The smallest mapping entry without which the data can be read on.
+        meant: Of an unknown key, the one that it is nearest to.
+        stand_in: Of a missing key, the key and a value to read the rest of its mapping with.
+    """
+
+    rule: str
+    message: str
+    path: DataPath
+    drop: DataPath
+    at_key: bool = False
+    help: str | None = None
+    meant: str | None = None
+    stand_in: tuple[str, Any] | None = None
+
+    def diagnostic(self, positions: SourceMap) -> Diagnostic:
+        """Return the finding for it."""
+        span = positions.key(self.path) if self.at_key else positions.value(self.path)
+        return diagnostic_at(span, self.rule, self.message, help=self.help)
+
+
+def path_of(error: ValidationError) -> DataPath:
+    """Return where what an error speaks of is."""
+    return tuple(error.absolute_path)
+
+
+def droppable(path: DataPath) -> DataPath:
+    """Return the path of the innermost mapping entry; items of lists cannot go alone."""
+    while path and isinstance(path[-1], int):
+        path = path[:-1]
+    return path
+
+
+def missing_key(error: ValidationError, key: str, message: str) -> StructureFault:
+    """Return the fault of a key that is missing."""
+    path = path_of(error)
+    known = _STAND_INS.get(error.schema.get('title', ''), {})
+    stand_in = (key, known[key]) if key in known else None
+    return StructureFault(
+        'missing-key', message, path, droppable(path), at_key=True, stand_in=stand_in
+    )
+
+
+def conflicting_keys(error: ValidationError, keys: list[str]) -> StructureFault:
+    """Return the fault of keys that exclude each other."""
+    path = path_of(error)
+    last = max(keys, key=list(error.instance).index)
+    listed = ' and '.join(f"'{key}'" for key in keys)
+    return StructureFault(
+        'conflicting-keys',
+        f'{listed} exclude each other{owner_of(error)}',
+        (*path, last),
+        (*path, last),
+        at_key=True,
+        help='keep one of them',
+    )
+
+
+def wrong_type(error: ValidationError, expected: str) -> StructureFault:
+    """Return the fault of a value of another type than is expected."""
+    path = path_of(error)
+    empty = error.instance is None and expected == 'a mapping'
+    return StructureFault(
+        'wrong-type',
+        f'expected {expected}, got {show_value(error.instance)}',
+        path,
+        droppable(path),
+        help='write {} for an empty mapping, or remove the key' if empty else None,
+    )
+
+
+def describe_types(types: str | list[str]) -> str:
+    """Return the types of JSON Schema in words."""
+    names = [types] if isinstance(types, str) else types
+    return ' or '.join(_TYPE_WORDS[name] for name in names)
+
+
+def owner_of(error: ValidationError) -> str:
+    """Return the end of a message that says in what the fault is; empty for the whole file."""
+    title = error.schema.get('title')
+    if not title or title == 'Composer system':
+        return ''
+    path = path_of(error)
+    name = f" '{path[-1]}'" if path and path[-1] != title else ''
+    return f' in {title}{name}'
+
+
+def show_value(value: Any) -> str:
+    """Return a value as a finding shows it: scalars as written, collections by their kind."""
+    if value is None:
+        return 'nothing'
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, dict):
+        return 'a mapping'
+    if isinstance(value, list):
+        return 'a list' if value else 'an empty list'
+    text = repr(value)
+    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 1] + '…'

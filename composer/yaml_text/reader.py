@@ -1,0 +1,106 @@
+"""YAML text → plain data, with the position of every key and value beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import Diagnostic, SourceFile
+from composer.yaml_text.plain_data import construct_data
+from composer.yaml_text.positions import SourceMap
+from composer.yaml_text.tree import CompositionError, compose_tree
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# A file of a thousand nodes with five thousand entities has one megabyte.
+MAX_BYTES = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A YAML file as it was read.
+
+    Attributes:
+        data: Mappings, lists and scalars of the core schema; `None` if nothing could be read.
+        diagnostics: What was wrong with the text.
+    """
+
+    data: dict[str, Any] | None
+    positions: SourceMap
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+
+def read_document(path: Path, name: str | None = None) -> Document:
+    """Read a file.
+
+    Args:
+        name: How the file is called in findings; by default as `path` is written.
+    """
+    name = name or str(path)
+    content = read_content(path, name)
+    return (
+        _without_data(content)
+        if isinstance(content, Diagnostic)
+        else parse_document(content, name)
+    )
+
+
+def read_content(path: Path, name: str) -> bytes | Diagnostic:
+    """Return what is in a file, or why it cannot be read."""
+    try:
+        with path.open('rb') as file:
+            return file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        return _unreadable(name, f'cannot read the file: {reason}')
+
+
+def decode_content(content: bytes, name: str) -> str | Diagnostic:
+    """Return the text of a file, or why it has none: it is UTF-8, and not too large."""
+    if len(content) > MAX_BYTES:
+        return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
+    try:
+        return content.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        line = content.count(b'\n', 0, error.start) + 1
+        return _unreadable(
+            name,
+            f'the file is not UTF-8: byte {content[error.start]:#04x} in line {line}',
+            help='save the file as UTF-8',
+        )
+
+
+def parse_document(content: bytes, name: str) -> Document:
+    """Read the text of a file: UTF-8, one YAML document, a mapping at its top."""
+    text = decode_content(content, name)
+    if isinstance(text, Diagnostic):
+        return _without_data(text)
+    positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
+    try:
+        tree = compose_tree(text, positions.source)
+        data, faults = construct_data(tree, positions)
+    except CompositionError as error:
+        return Document(None, positions, (error.diagnostic,))
+    if isinstance(data, dict):
+        return Document(data, positions, faults)
+    if tree is None:
+        return _without_data(
+            _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
+        )
+    top = Diagnostic(
+        'wrong-type',
+        'a file is a mapping with the keys version and nodes',
+        name,
+        tree.span,
+        help="begin with 'version: 1'",
+    )
+    return Document(None, positions, (*faults, top))
+
+
+def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:  # noqa: A002
+    return Diagnostic('unreadable-file', message, name, help=help)
+
+
+def _without_data(finding: Diagnostic) -> Document:
+    return Document(None, SourceMap(SourceFile(finding.file, ())), (finding,))

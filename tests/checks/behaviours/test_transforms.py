@@ -1,0 +1,131 @@
+"""Expressions that make messages of others, before there are any."""
+
+import pytest
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system_text
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """
+version: 1
+nodes:
+  filter:
+    publishers: {{out: {{type: geometry_msgs/msg/TwistStamped, external: true}}}}
+    subscriptions:
+      heard:
+        type: {heard}
+        external: true
+        behaviour: behaviours.topics:transform
+        publish: out
+        with:
+          fields:
+            {fields}
+"""
+
+
+def findings(fields, heard='nav_msgs/msg/Odometry'):
+    text = SYSTEM.format(fields=fields, heard=heard).lstrip()
+    return [
+        (each.rule, each.span.text, each.message, each.help)
+        for each in check_system(load_system_text(text), InterfaceCatalogue())
+    ]
+
+
+@pytest.mark.parametrize(
+    ('fields', 'rule', 'part', 'message', 'help_text'),
+    [
+        (
+            'header.frme_id: child_frame_id',
+            'unknown-field',
+            'header.frme_id',
+            "std_msgs/msg/Header has no field 'frme_id'",
+            "did you mean 'frame_id'? its fields are stamp, frame_id",
+        ),
+        (
+            'haeder.frame_id: child_frame_id',
+            'unknown-field',
+            'haeder.frame_id',
+            "geometry_msgs/msg/TwistStamped has no field 'haeder'",
+            "did you mean 'header'? its fields are header, twist",
+        ),
+        (
+            'twist.linear.x.y: 1',
+            'unknown-field',
+            'twist.linear.x.y',
+            "'x' of geometry_msgs/msg/Vector3 is float64, and has no fields",
+            None,
+        ),
+        (
+            'twist.linear.x: psoe.pose.position.x',
+            'undefined-name',
+            'psoe',
+            "'psoe' is not defined",
+            "did you mean 'pose'?",
+        ),
+        (
+            'twist.linear.x: -message.pose.pose.positon.x',
+            'unknown-field',
+            'positon',
+            "geometry_msgs/msg/Pose has no field 'positon'",
+            "did you mean 'position'? its fields are position, orientation",
+        ),
+        (
+            'twist.linear.x: "[pose.covariance[0] | rond(2), 1] | max"',
+            'bad-expression',
+            'rond',
+            "there is no filter 'rond'",
+            "did you mean 'round'?",
+        ),
+        (
+            'twist.linear.x: 1 if child_frame_id is strng else 2',
+            'bad-expression',
+            'strng',
+            "there is no test 'strng'",
+            "did you mean 'string'?",
+        ),
+        (
+            'twist.linear.x: pose.',
+            'bad-expression',
+            'pose.',
+            'expected name or number',
+            None,
+        ),
+    ],
+)
+def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
+    assert findings(fields) == [(rule, part, message, help_text)]
+
+
+@pytest.mark.parametrize(
+    'fields',
+    [
+        'header: header',
+        'twist: twist.twist',
+        'twist.linear.x: 2',
+        'twist.linear.x: "pose.covariance | max + range(3) | sum"',
+        'twist.linear.x: nothing | default(0)',
+        'twist.linear.x: 1 if nothing is defined else 2',
+        'header.frame_id: child_frame_id.upper()',
+        'twist.linear.x: message.SOME_CONSTANT',
+    ],
+)
+def test_what_may_work_has_no_finding(fields):
+    assert findings(fields) == []
+
+
+def test_fields_of_items_of_arrays_are_known():
+    field = 'twist.linear.x: transforms[0].trnsform.translation.x'
+    heard = 'geometry_msgs/msg/PoseArray'
+    ((rule, part, *_),) = findings('twist.linear.x: poses[0].positon.x', heard)
+    assert (rule, part) == ('unknown-field', 'positon')
+    assert [rule for rule, *_ in findings(field, heard)] == ['undefined-name']
+
+
+def test_a_module_of_the_same_name_is_none_of_ours(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'behaviours').mkdir()
+    code = 'def transform(node, message, fields):\n    return fields\n'
+    (tmp_path / 'behaviours' / 'topics.py').write_text(code)
+    assert findings('x: y +') == []

@@ -1,0 +1,173 @@
+"""What behaviours use and nodes declare: alarms for what is wrong, none for what cannot be told."""
+
+import pytest
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+
+NODE = """
+  a:
+    parameters: {speed: 1.0}
+    publishers: {out: {type: std_msgs/msg/String, external: true}}
+    on_start: parts:run
+"""
+USES_ALL = 'print(node.parameters.speed); node.publish("out", "hello")'
+
+
+def run(*lines, head='def run(node):'):
+    return '\n'.join([head, *(f'    {line}' for line in lines)]) + '\n'
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        "node.publish('outt', 1)",
+        "if node.now(): node.publish('outt', 1)",
+        "[node.publish('outt', each) for each in range(3)]",
+    ],
+)
+def test_a_name_that_the_node_does_not_declare_is_a_fault(check, line):
+    assert check(NODE, run(USES_ALL, line)) == [(6, 'unknown-publisher')]
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        "if node.name == 'b': node.publish('outt', 1)",
+        "if 'sped' in node.parameters: print(node.parameters.sped)",
+        "if hasattr(node.parameters, 'sped'): print(node.parameters.sped)",
+        "print(node.parameters.get('sped', 1.0))",
+        'print(node.parameters.use_sim_time)',
+        "with suppress(KeyError): print(node.parameters['sped'])",
+    ],
+)
+def test_a_behaviour_that_copes_without_is_right(check, line):
+    assert check(NODE, run(USES_ALL, line)) == []
+
+
+def test_a_parameter_may_be_declared_with_rclpy(check):
+    lines = ["node.ros.declare_parameter('mode', 0)", 'print(node.parameters.mode)']
+    assert check(NODE, run(USES_ALL, *lines)) == []
+    assert check(NODE, run(USES_ALL, lines[1])) == [(6, 'unknown-parameter')]
+
+
+def test_what_an_argument_decides_is_left_to_it(check):
+    nodes = NODE.replace('parts:run', '{behaviour: parts:run, with: {kind: out}}')
+    code = run(
+        USES_ALL, "if kind == 'other': node.publish('other', 1)", head='def run(node, kind):'
+    )
+    assert check(nodes, code) == []
+
+
+def test_helpers_are_followed_through_modules(check, tmp_path):
+    (tmp_path / 'far.py').write_text('def far(node, name):\n    node.publish("outt", name)\n')
+    code = 'from far import far\n\ndef near(to): far(to, 1)\n' + run(USES_ALL, 'near(node)')
+    assert check(NODE, code) == [(6, 'unknown-publisher')]
+
+
+def test_a_helper_that_calls_itself_ends(check):
+    lines = ["node.publish('out', 1)", *['tell(node)'] * 40]
+    code = run(*lines, head='def tell(node):') + run('tell(node)')
+    assert check(NODE, code) == []
+
+
+def test_a_behaviour_that_is_imported_is_read_where_it_is(check, tmp_path):
+    (tmp_path / 'far.py').write_text(run(USES_ALL, "node.call('ask')"))
+    assert check(NODE, 'from far import run\n') == [(6, 'unknown-service-client')]
+
+
+def test_what_the_file_has_with_a_fault_is_declared(check):
+    nodes = NODE.replace('type: std_msgs/msg/String', 'type: String')
+    assert [rule for _, rule in check(nodes, run(USES_ALL))] == ['bad-value']
+    nodes = NODE.replace('publishers:', 'xyz:')
+    assert [rule for _, rule in check(nodes, run(USES_ALL))] == ['unknown-key']
+
+
+def test_what_nobody_uses_is_warned_of(check):
+    assert check(NODE, run('pass')) == [(4, 'unused-parameter'), (5, 'unused-publisher')]
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'spawn(node)',
+        'helper(node)',
+        'node.publish(NAME, node.parameters[NAME])',
+        'lambda: node.publish("out", node.parameters.get("speed"))',
+        'if False: node.publish("out", node.parameters.speed)',
+    ],
+)
+def test_what_may_be_used_is_used(check, line):
+    assert check(NODE, run(line)) == []
+
+
+def test_what_a_module_hides_may_be_used(check):
+    for code in ('from far import *\n', 'import functools\n@functools.cache\n' + run('pass')):
+        assert [rule for _, rule in check(NODE, code)] == []
+    assert [rule for _, rule in check(NODE, 'def other(node): ...\n')] == ['unknown-behaviour']
+
+
+def test_parameters_may_be_there_for_others(check):
+    read = "node.get_parameters('a', ['speed'])"
+    nodes = NODE + '  b:\n    on_start: parts:read\n'
+    code = run('node.publish("out", 1)') + run(read, head='def read(node):')
+    assert check(nodes, code) == []
+    assert check('  a:\n    parameters: {speed: 1.0}\n') == []
+    heard = NODE + '    on_parameters: parts:decide\n'
+    decide = run('return None', head='def decide(node, changes):')
+    assert check(heard, run('node.publish("out", 1)') + decide) == []
+
+
+def test_what_nodes_share_is_used_if_one_of_them_uses_it(check):
+    before = 'x-shared: &shared {out: {type: std_msgs/msg/String, external: true}}\n'
+    nodes = """
+  a:
+    publishers: *shared
+    timers: {tick: {period: 1, publish: out, message: hello}}
+  b:
+    publishers: *shared
+"""
+    assert check(nodes, before=before) == []
+
+
+@pytest.mark.parametrize(
+    ('annotation', 'value', 'fits'),
+    [
+        ('int', '3', True),
+        ('int', '3.0', True),
+        ('int', '3.5', False),
+        ('int', 'three', False),
+        ('int', 'true', False),
+        ('float', '3', True),
+        ('float', '.inf', True),
+        ('float', '"3"', False),
+        ('str', '3', False),
+        ('str', 'null', True),
+        ('bool', '1', False),
+        ('bool', 'yes', False),
+        ('int | str', 'three', True),
+        ('int | None', 'three', False),
+        ('Path', '3', True),
+        ('list[int]', '3', True),
+    ],
+)
+def test_a_constant_argument_is_of_the_annotated_type(check, annotation, value, fits):
+    nodes = f"""
+  n:
+    on_start: {{behaviour: parts:begin, with: {{value: {value}}}}}
+"""
+    code = f"""
+        def begin(node, value: {annotation}): ...
+    """
+    assert check(nodes, code) == ([] if fits else [(4, 'bad-argument')])
+
+
+@pytest.mark.ros
+def test_a_choice_that_is_misspelt_comes_with_the_nearest(tmp_path):
+    path = tmp_path / 'system.yaml'
+    path.write_text(
+        'version: 1\nnodes: {n: {parameters: {unit: {default: celcius, choices: [celsius, kelvin]}}}}\n'
+    )
+    (finding,) = check_system(load_system(path), InterfaceCatalogue())
+    assert (finding.rule, finding.help) == ('bad-parameter', "did you mean 'celsius'?")

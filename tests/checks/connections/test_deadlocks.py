@@ -1,0 +1,226 @@
+"""Waits that never end, and waits that only look like it."""
+
+from textwrap import dedent
+
+import pytest
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+
+CODE = """
+    import threading
+
+    def set_it(node, request):
+        return {'success': True}
+
+    def relay(node, request):
+        return node.call('set_it', request)
+
+    async def relay_later(node, request):
+        return await node.call_async('set_it', request)
+
+    def ask(node):
+        node.call('set_it')
+
+    def ask_through(node):
+        ask(node)
+
+    async def ask_later(node):
+        await node.call_async('set_it')
+
+    def forget(node):
+        ask_later(node)
+
+    def ask_beside(node):
+        threading.Thread(target=lambda: node.call('set_it')).start()
+
+    def ask_if(node, asks):
+        if asks:
+            node.call('set_it')
+
+    def do(node, goal):
+        node.call('set_it')
+"""
+ALONE = """
+  a:
+    service_clients: {set_it: std_srvs/srv/SetBool}
+    services: {set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
+"""
+
+
+def deadlocks(check, nodes):
+    return [line for line, rule in check(nodes, CODE) if rule == 'service-deadlock']
+
+
+@pytest.mark.parametrize('behaviour', ['ask', 'ask_through', 'ask_later'])
+def test_a_timer_that_waits_for_its_own_group_never_gets_an_answer(check, behaviour):
+    timer = f'    timers: {{tick: {{period: 1, behaviour: parts:{behaviour}}}}}\n'
+    assert deadlocks(check, ALONE + timer) == [6]
+
+
+@pytest.mark.parametrize(
+    'rest',
+    [
+        '    timers: {tick: {period: 1, behaviour: parts:ask, group: reentrant}}\n',
+        '    timers: {tick: {period: 1, behaviour: parts:ask, group: other}}\n',
+        '    timers: {tick: {period: 1, behaviour: parts:ask_beside}}\n',
+        '    timers: {tick: {period: 1, behaviour: parts:forget}}\n',
+        '    timers: {tick: {period: 1, behaviour: parts:ask_if, with: {asks: false}}}\n',
+        '    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}\n',
+    ],
+)
+def test_who_keeps_no_group_of_the_service_may_wait(check, rest):
+    assert deadlocks(check, ALONE + rest) == []
+
+
+def test_a_service_in_a_group_of_its_own_answers(check):
+    timer = '    timers: {tick: {period: 1, behaviour: parts:ask}}\n'
+    for group in ('reentrant', 'other'):
+        nodes = ALONE.replace('parts:set_it', f'parts:set_it, group: {group}') + timer
+        assert deadlocks(check, nodes) == []
+    both = ALONE.replace('parts:set_it', 'parts:set_it, group: reentrant')
+    both += timer.replace('parts:ask', 'parts:ask, group: reentrant')
+    assert deadlocks(check, both) == []
+    same = timer.replace('parts:ask', 'parts:ask, group: other')
+    assert deadlocks(check, nodes.replace(timer, same)) == [6]
+
+
+def ring(*names, behaviour='relay', groups=None):
+    """Return nodes each of which asks the next to answer."""
+    nodes = ''
+    for name, following in zip(names, [*names[1:], names[0]], strict=True):
+        group = f', group: {groups[name]}' if groups and name in groups else ''
+        nodes += f"""
+  {name}:
+    service_clients: {{set_it: {{type: std_srvs/srv/SetBool, service: {following}/set_it}}}}
+    services: {{~/set_it: {{type: std_srvs/srv/SetBool, behaviour: parts:{behaviour}{group}}}}}
+"""
+    return nodes
+
+
+@pytest.mark.parametrize('behaviour', ['relay', 'relay_later'])
+def test_a_ring_of_services_is_found_once(check, behaviour):
+    nodes = ring('a', 'b', 'c', behaviour=behaviour)
+    assert deadlocks(check, nodes) == [5]
+    (message,) = check(nodes, CODE, rule='service-deadlock')
+    assert message.endswith("none can go on: '/b/set_it' → '/c/set_it' → '/a/set_it'")
+
+
+def test_a_chain_that_ends_is_no_ring(check):
+    nodes = ring('a', 'b', 'c').replace('service: a/set_it', 'service: d/set_it')
+    nodes += (
+        '  d:\n    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}\n'
+    )
+    assert deadlocks(check, nodes) == []
+
+
+def test_two_behaviours_of_one_group_may_ask_each_others_node(check):
+    # Each may have to wait for the other's turn, but not for ever.
+    nodes = """
+  a:
+    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: b/set_it}}
+    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
+    timers: {tick: {period: 1, behaviour: parts:ask}}
+  b:
+    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: c/set_it}}
+    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:relay}}
+  c:
+    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
+"""
+    assert deadlocks(check, nodes) == []
+
+
+def test_a_chain_may_come_back_to_another_service_of_the_group(check):
+    nodes = """
+  a:
+    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: b/set_it}}
+    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
+    timers: {tick: {period: 1, behaviour: parts:ask}}
+  b:
+    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: a/set_it}}
+    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:relay}}
+"""
+    assert deadlocks(check, nodes) == [6]
+
+
+@pytest.mark.parametrize(
+    ('hook', 'lines'), [('on_start', [6]), ('on_stop', [6]), ('on_parameters', [])]
+)
+def test_a_node_answers_between_its_start_and_its_stop(check, hook, lines):
+    assert deadlocks(check, f'{ALONE}    {hook}: parts:ask\n') == lines
+
+
+def test_on_start_may_ask_nodes_that_have_started(check):
+    client = """
+  client:
+    service_clients: {set_it: std_srvs/srv/SetBool}
+    on_start: parts:ask
+"""
+    server = """
+  server:
+    services: {set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
+"""
+    starting = server + '    on_start: parts:ask_if\n'
+    assert deadlocks(check, server + client) == []
+    assert deadlocks(check, client + server) == []
+    assert deadlocks(check, starting + client) == []
+    assert deadlocks(check, client + starting) == [5]
+
+
+@pytest.mark.ros
+def test_what_is_refused_does_time_out_when_it_runs(compose):
+    # The rule reads names that stand in the text.
+    run = compose(
+        f'version: 1\nnodes:{ALONE}'
+        '    timers: {tick: {period: 0.1, behaviour: parts:try_it}}\n',
+        """
+        from composer import CallError
+
+        def set_it(node, request):
+            return {'success': True}
+
+        def try_it(node):
+            name = '_'.join(['set', 'it'])
+            yield
+            try:
+                node.call(name, timeout=2.0)
+                node.logger.info(f'{node.name}: answered')
+            except CallError as error:
+                node.logger.info(f'{node.name}: {type(error).__name__}')
+        """,
+    )
+    run.wait_for_line('a: CallTimeoutError')
+    assert run.stop() == 0
+
+
+@pytest.mark.parametrize(
+    'body',
+    [
+        "name = 'set_it'\n            node.call(name)",
+        'node.call(NAME)',
+        "def wait():\n                node.call('set_it')\n            wait()",
+    ],
+)
+def test_a_wait_by_a_constant_or_in_a_function_inside_is_one(check, body):
+    code = f"""
+        NAME = 'set_it'
+
+        def set_it(node, request): ...
+
+        def tick(node):
+            {body}
+    """
+    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n'
+    assert check(ALONE + timer, code, installed=False) == [(6, 'service-deadlock')]
+
+
+def test_a_deadlock_names_the_client_beside_the_server(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'parts.py').write_text(dedent(CODE))
+    path = tmp_path / 'system.yaml'
+    timer = '    timers: {tick: {period: 1, behaviour: parts:ask}}\n'
+    path.write_text(f'version: 1\nnodes:{ALONE}{timer}')
+    findings = check_system(load_system(path), InterfaceCatalogue([]))
+    (finding,) = [each for each in findings if each.rule == 'service-deadlock']
+    assert [each.span.line for each in finding.related] == [5, 4]

@@ -1,0 +1,142 @@
+"""Names that are all but those of something in the system."""
+
+import pytest
+
+from composer.checks.connections.typos import find_slip
+
+RULE = 'likely-misspelling'
+
+
+@pytest.mark.parametrize(
+    ('word', 'option'),
+    [
+        ('/camrea', '/camera'),
+        ('/left/camrea', '/left/camera'),
+        ('/lfet/camera', '/left/camera'),
+        ('/front_lidar_scna', '/front_lidar_scan'),
+        ('/Camera', '/camera'),
+        ('/trajetcori', '/trajectory'),
+    ],
+)
+def test_a_slip_is_found(word, option):
+    assert find_slip(word, [option]) == option
+
+
+@pytest.mark.parametrize(
+    ('word', 'option'),
+    [
+        ('/camera_1', '/camera_2'),
+        ('/camera1', '/camera2'),
+        ('/arm_l', '/arm_r'),
+        ('/map', '/mop'),
+        ('/cmd_vell', '/cmd_vel'),
+        ('/left/scan', '/right/scan'),
+        ('/scan', '/left/scan'),
+        ('/lfet/camrea', '/left/camera'),
+        ('/trjetcori', '/trajectory'),
+    ],
+)
+def test_another_name_is_no_slip(word, option):
+    assert find_slip(word, [option]) is None
+
+
+WAITS = """
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, external: true}}
+    timers: {take: {period: 1, publish: image, message: x}}
+    services: {reset: {type: std_srvs/srv/Empty, behaviour: parts:reset}}
+  viewer:
+    wait_for: {KIND: NAME}
+"""
+CODE = 'def reset(node, request): ...'
+
+
+@pytest.mark.parametrize(
+    ('kind', 'name', 'near'),
+    [
+        ('node', 'camrea', 'camera'),
+        ('node', '/camrea', '/camera'),
+        ('topic', 'imgae', 'image'),
+        ('service', 'rest', 'reset'),
+        ('service', 'restart', None),
+    ],
+)
+def test_what_is_waited_for_is_no_misspelt_name(check, kind, name, near):
+    nodes = WAITS.replace('KIND', kind).replace('NAME', name)
+    what = f"a {kind} '/{name.lstrip('/')}' is nowhere in this system"
+    assert check(nodes, CODE, rule=RULE, installed=False) == ([what] if near else [])
+
+
+def test_what_is_waited_for_may_be_here_left_out_or_elsewhere(check):
+    for kind, name in (('node', 'camera'), ('topic', '/image'), ('topic', 'scan')):
+        nodes = WAITS.replace('KIND', kind).replace('NAME', name)
+        assert check(nodes, CODE, installed=False) == []
+    nodes = WAITS.replace('KIND', 'node').replace('NAME', 'camrea')
+    left_out = nodes + '  camrea: {when: false}\n'
+    assert check(left_out, CODE, installed=False) == []
+
+
+def test_a_remapping_rule_is_for_no_misspelt_name(check):
+    nodes = """
+  camera:
+    remap: {imgae: /front/image, tf: /tf}
+    publishers: {image: {type: std_msgs/msg/String, external: true}}
+    timers: {take: {period: 1, publish: image, message: x}}
+"""
+    assert check(nodes, installed=False) == [(4, RULE)]
+    assert check(nodes.replace('imgae', 'image'), installed=False) == []
+
+
+def test_a_rule_of_an_include_is_for_all_that_is_in_it(check, tmp_path):
+    (tmp_path / 'part.yaml').write_text("""\
+version: 1
+nodes:
+  one:
+    publishers: {image: {type: std_msgs/msg/String, external: true}}
+    timers: {take: {period: 1, publish: image, message: x}}
+  two:
+    publishers: {images: {type: std_msgs/msg/String, external: true}}
+    timers: {take: {period: 1, publish: images, message: x}}
+""")
+    include = 'include: {{part: {{file: part.yaml, remap: {{{}: other}}}}}}\n'
+    for name in ('image', 'images'):
+        assert check('  n: {}\n', before=include.format(name), installed=False) == []
+    found = check('  n: {}\n', before=include.format('imagse'), installed=False)
+    assert found == [(2, RULE)]
+
+
+@pytest.mark.parametrize(
+    ('group', 'found'), [('reentrnat', True), ('Reentrant', True), ('mine', False)]
+)
+def test_a_group_is_no_misspelt_reentrant(check, group, found):
+    nodes = f"""
+  n:
+    timers: {{tick: {{period: 1, behaviour: parts:tick, group: {group}}}}}
+"""
+    assert check(nodes, 'def tick(node): ...') == ([(4, RULE)] if found else [])
+
+
+@pytest.mark.parametrize(
+    ('condition', 'found'),
+    [
+        ('{topic: a//b}', True),
+        ('{service: a b}', True),
+        ('{action: 1st}', True),
+        ('{node: a-b}', True),
+        ('{node: a//b}', True),
+        ('{topic: ~/state}', False),
+        ('{node: /left/camera}', False),
+    ],
+)
+def test_what_is_waited_for_has_a_name_of_ros(check, condition, found):
+    nodes = f'  n: {{wait_for: {condition}}}\n'
+    assert check(nodes) == ([(2 + 1, 'bad-name')] if found else [])
+
+
+def test_rules_of_processes_have_names_of_ros(check):
+    nodes = """
+  n: {}
+processes:
+  driver: {command: [true], remap: {a//b: c, d: e f, g: /h}}
+"""
+    assert check(nodes) == [(5, 'bad-name'), (5, 'bad-name')]

@@ -1,0 +1,68 @@
+"""`composer explain` and `composer schema`."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from composer.cli import main as cli
+from composer.rules import FAMILIES, RULES
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments):
+        code = cli.run(list(arguments))
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def test_a_rule_is_explained_with_its_examples(run):
+    code, out, err = run('explain', 'bad-argument')
+    assert (code, err) == (0, '')
+    blocks = ['Not so:', 'with driving.py:', 'What is said of it:', 'But so:']
+    assert [line for line in out.splitlines() if line in blocks] == blocks
+    assert out.startswith('bad-argument: error, of the family behaviours\n\n')
+    assert '# composer: ignore[bad-argument]' in out
+    assert 'https://docs.python.org/3/reference/expressions.html#calls' in out
+    assert "help: did you mean 'heading'?" in out
+
+
+@pytest.mark.parametrize('rule', RULES)
+def test_every_rule_can_be_explained(run, rule):
+    code, out, err = run('explain', rule)
+    assert (code, err) == (0, '')
+    assert RULES[rule].meaning in out
+    assert RULES[rule].why in out
+
+
+def test_without_a_rule_all_are_listed_by_family(run):
+    code, out, err = run('explain')
+    assert (code, err) == (0, '')
+    listed = [line.split()[0] for line in out.splitlines() if line.startswith('  ')]
+    assert listed == list(RULES)
+    assert [line.split(':')[0] for line in out.splitlines() if line[:1].isalpha()] == [
+        family.name for family in FAMILIES
+    ]
+
+
+def test_an_unknown_rule_is_wrong_usage(run):
+    code, out, err = run('explain', 'bad-nam')
+    assert (code, out) == (2, '')
+    assert "no rule is called 'bad-nam'\n  help: did you mean 'bad-name'?" in err
+
+
+def test_the_schema_is_printed(run):
+    code, out, err = run('schema')
+    assert (code, err) == (0, '')
+    assert json.loads(out)['title'] == 'Composer system'
+
+
+def test_the_path_of_the_schema_is_printed(run):
+    code, out, err = run('schema', '--path')
+    assert (code, err) == (0, '')
+    path = Path(out.rstrip('\n'))
+    assert path.is_absolute()
+    assert path.read_text() == run('schema')[1]

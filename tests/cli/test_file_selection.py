@@ -1,0 +1,161 @@
+"""Which files a command line means; other people's YAML in a folder is left alone."""
+
+import os
+
+import pytest
+
+from composer.cli.file_selection import looks_like_system, select_files
+
+SYSTEM = 'version: 1\nnodes: {}\n'
+COMPOSE = 'version: "3"\nservices:\n  db:\n    image: x\nnetworks: {}\nvolumes: {}\n'
+WORKFLOW = 'name: ci\non: [push]\njobs:\n  test:\n    runs-on: x\n'
+PARAMETERS = 'talker:\n  ros__parameters:\n    rate: 10\n    nodes: [a]\n'
+
+
+@pytest.fixture
+def tree(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(**files):
+        for name, text in files.items():
+            path = tmp_path / name.replace('__', '/').replace('_yaml', '.yaml')
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+
+    return write
+
+
+def select(*words, **options):
+    selection = select_files(words, **options)
+    return [str(path) for path in selection.paths], [
+        (finding.rule, finding.file, finding.message) for finding in selection.findings
+    ]
+
+
+def test_a_named_file_is_taken_as_it_is(tree):
+    tree(compose_yaml=COMPOSE)
+    assert select('compose.yaml', 'missing.yaml') == (['compose.yaml', 'missing.yaml'], [])
+
+
+def test_of_a_folder_the_systems_are_taken_all_the_way_down(tree):
+    tree(
+        a__one_yaml=SYSTEM,
+        a__b__two_yaml=SYSTEM,
+        a__compose_yaml=COMPOSE,
+        a__github_yaml=WORKFLOW,
+        a__parameters_yaml=PARAMETERS,
+        a__notes=SYSTEM,
+    )
+    assert select('a') == (['a/one.yaml', 'a/b/two.yaml'], [])
+
+
+@pytest.mark.parametrize('folder', ['.venv', '.github', 'node_modules', '__pycache__'])
+def test_folders_of_tools_are_not_searched(tmp_path, folder):
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / 'a.yaml').write_text(SYSTEM)
+    (tmp_path / 'b.yml').write_text(SYSTEM)
+    assert select(str(tmp_path)) == ([str(tmp_path / 'b.yml')], [])
+
+
+def test_a_pattern_is_expanded(tree):
+    tree(a__one_yaml=SYSTEM, a__b__two_yaml=COMPOSE, three_yaml=SYSTEM)
+    assert select('**/*.yaml')[0] == ['a/b/two.yaml', 'a/one.yaml', 'three.yaml']
+    assert select('a/*.y*ml')[0] == ['a/one.yaml']
+
+
+def test_a_file_with_the_name_of_a_pattern_is_a_file(tmp_path):
+    path = tmp_path / 'a[1].yaml'
+    path.write_text(SYSTEM)
+    assert select(str(path)) == ([str(path)], [])
+
+
+def test_a_file_is_taken_once(tree):
+    tree(a__one_yaml=SYSTEM)
+    assert select('a', 'a/one.yaml', './a/*.yaml', 'a/../a/one.yaml') == (['a/one.yaml'], [])
+
+
+def test_nothing_is_a_finding(tree, tmp_path):
+    tree(a__compose_yaml=COMPOSE)
+    assert select('a', '*.yml') == (
+        [],
+        [
+            ('nothing-to-check', 'a', 'there is no system in this folder'),
+            ('nothing-to-check', '*.yml', 'no file matches this pattern'),
+        ],
+    )
+
+
+def test_named_files_can_be_passed_over_too(tree):
+    tree(one_yaml=SYSTEM, compose_yaml=COMPOSE)
+    words = ('one.yaml', 'compose.yaml', 'missing.yaml')
+    assert select(*words, skip_foreign=True) == (['one.yaml', 'missing.yaml'], [])
+
+
+def test_standard_input_is_a_dash():
+    assert select('-', '-') == (['-'], [])
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        SYSTEM,
+        '# yaml-language-server: $schema=../schemas/composer.schema.json\n',
+        'nodes: {}\nversion: 7\n',
+        'version: 1\nnodess:\n  a:\n    on_start: b:c\n',
+        'nodse:\n  a:\n    timers: {}\n',
+        'verson: 1\nnodes:\n  a: {}\n',
+        '"version": 1\n"nodes": {}\n',
+        '{version: 1, nodes: {}}',
+        '{"version": 1,\n "nodes": {}}',
+        'nodes:\n  rover:\n    publishers: {}\n',
+        'version: 1\nnodes:\n\tbroken',
+        '\ufeffversion: 1\r\nnodes:\r\n  a: {}\r\n',
+    ],
+)
+def test_what_is_meant_for_composer_is_known(tmp_path, text):
+    path = tmp_path / 'a.yaml'
+    path.write_bytes(text.encode())
+    assert looks_like_system(path)
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        COMPOSE,
+        WORKFLOW,
+        PARAMETERS,
+        'kind: Cluster\napiVersion: kind.x-k8s.io/v1alpha4\nnodes:\n- role: worker\n',
+        'version: 2\nnodes:\n  # the workers\n  - one\n',
+        'version: 1\nnodes: [one]\n',
+        'version: 2\nupdates: []\n',
+        'nodes:\n  a: {weight: 3}\n',
+        'x:\n  version: 1\n  nodes: {}\n',
+        '- version: 1\n  nodes: {}\n',
+        '{"version": 1}',
+        '',
+        'just text',
+        'version: 1\nnode: {}\n',
+        'model:\n  name: x\noperation:\n  name: y\n',
+        'node:\n  name: x\nversions: {}\n',
+    ],
+)
+def test_what_others_write_is_left_alone(tmp_path, text):
+    path = tmp_path / 'a.yaml'
+    path.write_text(text)
+    assert not looks_like_system(path)
+
+
+def test_an_empty_word_is_not_the_working_folder(tree):
+    tree(one_yaml=SYSTEM)
+    assert select('') == ([], [('nothing-to-check', "''", 'no file matches this pattern')])
+
+
+def test_a_name_that_is_too_long_is_a_missing_file():
+    assert select('a' * 5000) == (['a' * 5000], [])
+    assert select('a' * 5000, skip_foreign=True) == (['a' * 5000], [])
+
+
+def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):
+    tree(one_yaml=SYSTEM)
+    os.mkfifo(tmp_path / 'pipe.yaml')
+    assert select('.') == (['one.yaml'], [])

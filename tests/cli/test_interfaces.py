@@ -1,0 +1,239 @@
+"""`composer interfaces`: build, list and show interface packages."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.cli import main as cli
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parents[2]
+
+HEADER = """\
+# std_msgs/msg/Header
+# Standard metadata for higher-level stamped data types.
+# This is generally used to communicate timestamped data
+# in a particular coordinate frame.
+# Two-integer timestamp that is expressed as seconds and nanoseconds.
+builtin_interfaces/msg/Time stamp
+# Transform frame with which this data is associated.
+string frame_id
+"""
+
+DIAGNOSTIC_STATUS = """\
+# diagnostic_msgs/msg/DiagnosticStatus
+# This message holds the status of an individual component of the robot.
+# Possible levels of operations.
+byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+# Level of operation enumerated above.
+byte level
+# A description of the test/component reporting.
+string name
+# A description of the status.
+string message
+# A hardware unique string.
+string hardware_id
+# An array of values associated with the status.
+diagnostic_msgs/msg/KeyValue[] values
+"""
+
+SET_BOOL = """\
+# std_srvs/srv/SetBool
+# e.g. for hardware enabling / disabling
+bool data
+---
+# indicate successful run of triggered service
+bool success
+# informational, e.g. for error messages
+string message
+"""
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    """Return exit code, standard output and standard error of a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        code = cli.run(list(map(str, arguments)))
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+@pytest.mark.parametrize('text', [HEADER, DIAGNOSTIC_STATUS, SET_BOOL])
+def test_show_prints_fields_types_constants_and_comments(run, text):
+    name = text.splitlines()[0].removeprefix('# ')
+    assert run('interfaces', 'show', name) == (0, text, '')
+
+
+def test_show_prints_the_three_parts_of_an_action(run):
+    pytest.importorskip('test_msgs')
+    expected = (
+        '# test_msgs/action/Fibonacci\n'
+        '# goal definition\nint32 order\n---\n'
+        '# result definition\nint32[] sequence\n---\n'
+        '# feedback\nint32[] sequence\n'
+    )
+    assert run('interfaces', 'show', 'test_msgs/action/Fibonacci') == (0, expected, '')
+
+
+def test_show_prints_the_comment_on_a_service(run):
+    code, out, _ = run('interfaces', 'show', 'action_msgs/srv/CancelGoal')
+    assert code == 0
+    assert out.startswith(
+        '# action_msgs/srv/CancelGoal\n# Cancel one or more goals with the following policy:\n#\n'
+    )
+
+
+@pytest.mark.parametrize(
+    ('name', 'advice'),
+    [
+        ('std_msgs/msg/Heder', "did you mean 'std_msgs/msg/Header'?"),
+        ('std_msgs/Header', "did you mean 'std_msgs/msg/Header'?"),
+        ('std_msgs/srv/Header', "did you mean 'std_msgs/msg/Header'?"),
+        ('std_mgs/msg/Header', "did you mean 'std_msgs/msg/Header'?"),
+        (
+            'std_msgs',
+            "'std_msgs' is a package: 'composer interfaces list std_msgs' shows what it has",
+        ),
+        ('std_msgs/msg/Qqqqqq', "'composer interfaces list std_msgs' shows what it has"),
+        ('nope', "'composer interfaces list' shows all"),
+        ('', "'composer interfaces list' shows all"),
+    ],
+)
+def test_show_says_what_an_unknown_name_may_have_been_meant_to_be(run, name, advice):
+    message = f"error: no installed package has an interface '{name}'\n  help: {advice}\n"
+    assert run('interfaces', 'show', name) == (1, '', message)
+
+
+def test_list_prints_what_is_installed(run):
+    code, out, err = run('interfaces', 'list')
+    assert (code, err) == (0, '')
+    names = out.splitlines()
+    assert {'std_msgs/msg/Header', 'std_srvs/srv/SetBool'} <= set(names)
+    assert len(names) == len(set(names))
+
+
+def test_list_prints_what_one_package_has(run):
+    expected = 'std_srvs/srv/Empty\nstd_srvs/srv/SetBool\nstd_srvs/srv/Trigger\n'
+    assert run('interfaces', 'list', 'std_srvs') == (0, expected, '')
+
+
+def test_list_of_an_unknown_package_suggests_another(run):
+    message = (
+        "error: no interface package 'std_mgs' is installed\n  help: did you mean 'std_msgs'?\n"
+    )
+    assert run('interfaces', 'list', 'std_mgs') == (1, '', message)
+
+
+def test_build_of_what_was_built_before_says_that_it_is_ready(run, interface_cache):
+    path = ROOT / 'configs' / 'self_contained.yaml'
+    # In a process of its own, for what is built can be imported from then on.
+    result = subprocess.run(
+        [sys.executable, '-m', 'composer', 'interfaces', 'build', path],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stdout, result.stderr) == (
+        0,
+        'example_interfaces: ready\n',
+        '',
+    )
+
+
+def test_build_of_a_file_without_packages_says_so(run):
+    path = ROOT / 'configs' / 'greeter.yaml'
+    assert run('interfaces', 'build', path) == (0, f'{path} declares no interfaces\n', '')
+
+
+def test_build_of_an_unreadable_file_says_why(run):
+    code, out, err = run('interfaces', 'build', 'nowhere.yaml')
+    assert (code, out) == (1, '')
+    assert err.startswith('nowhere.yaml: error[unreadable-file]: cannot read the file: ')
+
+
+SYSTEM = """\
+version: 1
+interfaces: {my_defs: defs}
+nodes:
+  a:
+    publishers: {p: {type: my_defs/msg/Thing, external: true}}
+    timers: {t: {period: 1, publish: p, message: {x: 1}}}
+"""
+
+TYPO = """\
+defs/msg/Thing.msg:2:1: error[unknown-type]: there is no type 'strin'
+  2 | strin name
+    | ^^^^^
+  help: did you mean string?
+
+"""
+
+
+def write_system(definition, system=SYSTEM):
+    folder = Path('defs/msg')
+    folder.mkdir(parents=True)
+    (folder / 'Thing.msg').write_text(definition)
+    Path('system.yaml').write_text(system)
+
+
+@pytest.mark.parametrize('command', [['check'], ['up'], ['interfaces', 'build']])
+def test_a_typo_in_a_definition_is_shown_where_it_is_and_alone(run, command):
+    write_system('int32 x\nstrin name\n')
+    code, out, err = run(*command, 'system.yaml')
+    assert code == 1
+    shown = out if command == ['check'] else err
+    assert shown == TYPO
+
+
+@pytest.mark.parametrize('command', [['check'], ['up'], ['interfaces', 'build']])
+def test_a_folder_that_is_not_there_is_said_once(run, command):
+    Path('system.yaml').write_text(SYSTEM)
+    code, out, err = run(*command, 'system.yaml')
+    assert code == 1
+    shown = out if command == ['check'] else err
+    assert shown == (
+        "system.yaml:2:23: error[unknown-interfaces]: there is no folder 'defs' "
+        "with the definitions of 'my_defs'\n"
+        '  2 | interfaces: {my_defs: defs}\n'
+        '    |                       ^^^^\n'
+        '\n'
+    )
+
+
+def test_check_holds_fields_against_definitions_without_building_them(run, monkeypatch, tmp_path):
+    cache = tmp_path / 'cache'
+    monkeypatch.setenv('XDG_CACHE_HOME', str(cache))
+    write_system('int32 x\nfloat64 y\n', SYSTEM.replace('{x: 1}', '{x: 1.5, z: 2}'))
+    code, out, _ = run('check', 'system.yaml')
+    assert code == 1
+    assert 'system.yaml:6:54: error[field-type]: my_defs/msg/Thing: x: expected int32' in out
+    assert 'system.yaml:6:59: error[unknown-field]: my_defs/msg/Thing has no field' in out
+    assert not cache.exists()
+
+
+def test_check_knows_which_types_a_folder_defines(run):
+    write_system('int32 x\n', SYSTEM.replace('msg/Thing', 'msg/Thimg'))
+    code, out, _ = run('check', 'system.yaml')
+    assert code == 1
+    assert "error[unknown-type]: the package 'my_defs' has no message 'Thimg'" in out
+    assert "help: did you mean 'Thing'?" in out
+
+
+def test_a_wrong_interfaces_block_is_not_no_interfaces(run):
+    Path('system.yaml').write_text('version: 1\ninterfaces: {my_defs: 3}\nnodes: {}\n')
+    code, out, err = run('interfaces', 'build', 'system.yaml')
+    assert (code, out) == (1, '')
+    assert err.startswith('system.yaml:2:23: error[wrong-type]: expected a string, got 3\n')

@@ -1,0 +1,325 @@
+"""The command line: what it takes, what it says, and what it exits with."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import composer
+from composer.cli import main as cli
+from composer.errors import ComposerError, UsageError
+
+ROOT = Path(composer.__file__).parents[1]
+GREETER = ROOT / 'configs' / 'greeter.yaml'
+VALID = ROOT / 'tests' / 'data' / 'valid'
+INVALID = ROOT / 'tests' / 'data' / 'invalid'
+EXAMPLES = ROOT / 'composer' / 'examples'
+
+# A `sitecustomize` with which nothing of ROS can be imported, as if it were not installed.
+WITHOUT_ROS = """
+import sys
+from importlib.abc import MetaPathFinder
+
+class Refuse(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        top = name.partition('.')[0]
+        if top in ('rclpy', 'rpyutils', 'builtin_interfaces', 'numpy') or top.endswith('_msgs') or (
+            top.startswith(('rosidl', 'rcl_', 'ament'))
+        ):
+            print('IMPORTED', name, file=sys.stderr)
+            raise ModuleNotFoundError(f'No module named {name!r}', name=name)
+
+sys.meta_path.insert(0, Refuse())
+"""
+
+
+def start(command, folder=ROOT, **variables):
+    """Run a command to its end, with Composer within reach."""
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), **variables},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+
+
+def run_without_ros(*arguments, folder=ROOT):
+    """Run Composer in a process in which ROS cannot be imported."""
+    main = f'{WITHOUT_ROS}\nfrom composer.cli.main import main\nmain()'
+    return start([sys.executable, '-c', main, *map(str, arguments)], folder)
+
+
+@pytest.fixture
+def run(capsys):
+    """Return exit code, standard output and standard error of a command."""
+
+    def run(*arguments):
+        code = cli.run([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+# composer check
+
+
+def test_a_right_file_is_ok(run):
+    assert run('check', GREETER) == (0, f'{GREETER}: ok, 2 nodes\n', '')
+
+
+def test_each_file_is_named(run):
+    smallest = VALID / 'smallest.yaml'
+    code, out, err = run('check', GREETER, smallest)
+    assert (code, err) == (0, '')
+    assert out == f'{GREETER}: ok, 2 nodes\n{smallest}: ok, 0 nodes\n'
+
+
+def test_a_faulty_file_fails_with_all_that_is_wrong(run):
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('check', folder / 'bad.yaml')
+    assert code == 1
+    assert err == '2 faults in 1 file\n'
+    expected = (folder / 'bad.txt').read_text()
+    assert out.replace(f'{folder}/', '') == expected + '\n'
+
+
+def test_faults_of_one_file_do_not_hide_the_others(run):
+    version = EXAMPLES / 'unsupported-version' / 'bad.yaml'
+    missing = INVALID / 'no_such_file.yaml'
+    code, out, err = run('check', version, GREETER, missing)
+    assert code == 1
+    assert err == '2 faults in 2 files\n'
+    assert f'{version}:1:10: error[unsupported-version]: ' in out
+    assert f'{GREETER}: ok, 2 nodes\n' in out
+    assert f'{missing}: error[unreadable-file]: cannot read the file: No such file' in out
+
+
+@pytest.mark.parametrize('name', ['unreadable-file', 'too-deep', 'yaml-syntax'])
+def test_an_unreadable_file_is_one_fault(run, name):
+    code, out, err = run('check', EXAMPLES / name / 'bad.yaml')
+    assert (code, err) == (1, '1 fault in 1 file\n')
+    assert out.count('error[') == 1
+    assert 'Traceback' not in out
+
+
+@pytest.mark.parametrize('name', ['greeter', 'talker_listener', 'parameter', 'logging'])
+def test_check_imports_nothing_of_ros(name):
+    path = ROOT / 'configs' / f'{name}.yaml'
+    result = run_without_ros('check', path)
+    assert (result.returncode, result.stderr) == (0, '')
+    assert result.stdout.startswith(f'{path}: ok, ')
+
+
+def test_check_imports_no_behaviour(tmp_path):
+    (tmp_path / 'noisy.py').write_text("open('ran', 'w')\nraise SystemExit(7)\ndef f(node): ...\n")
+    (tmp_path / 'a.yaml').write_text('version: 1\nnodes: {a: {on_start: noisy:f}}\n')
+    result = run_without_ros('check', 'a.yaml', folder=tmp_path)
+    assert (result.returncode, result.stdout) == (0, 'a.yaml: ok, 1 node\n')
+    assert not (tmp_path / 'ran').exists()
+
+
+def test_without_interfaces_check_says_what_it_did_not_check(run, monkeypatch, tmp_path):
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '')
+    monkeypatch.setattr(sys, 'prefix', str(tmp_path))
+    path = EXAMPLES / 'unknown-type' / 'bad.yaml'
+    code, out, err = run('check', path)
+    assert (code, out) == (0, f'{path}: ok, 1 node\n')
+    assert err == 'not checked without ROS 2: interface types and the fields of messages\n'
+
+
+def test_a_closed_pipe_is_no_bug(tmp_path):
+    text = (INVALID / 'many_faults.yaml').read_text()
+    for number in range(200):
+        (tmp_path / f'{number}.yaml').write_text(text)
+    command = f'{sys.executable} -m composer check {tmp_path} | head -n 1'
+    result = start(['sh', '-c', command])
+    assert 'This is a bug' not in result.stderr
+    assert 'Traceback' not in result.stderr
+    assert len(result.stdout.splitlines()) == 1
+
+
+def test_a_terminal_without_the_characters_gets_escapes(tmp_path):
+    (tmp_path / 'a.yaml').write_text('version: 1\nnodes: {日本: {}}\n')
+    command = [sys.executable, '-m', 'composer', 'check', 'a.yaml']
+    result = start(command, tmp_path, PYTHONIOENCODING='latin-1')
+    assert result.returncode == 1
+    assert r"a.yaml:2:9: error[bad-name]: '\u65e5\u672c' cannot name a node" in result.stdout
+
+
+def test_names_of_files_may_be_any_bytes(tmp_path):
+    result = run_without_ros(
+        'check', b'caf\xe9.yaml'.decode(errors='surrogateescape'), folder=tmp_path
+    )
+    assert result.returncode == 1
+    assert r'caf\udce9.yaml: error[unreadable-file]: ' in result.stdout
+
+
+# Exit codes
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['chek'],
+        ['check'],
+        ['check', '--fast', 'a.yaml'],
+        ['up'],
+        ['up', 'a.yaml', '--fast'],
+        ['up', 'a.yaml', '--log-level', 'loud'],
+        ['up', 'a.yaml', '--log-level', 'talker:=loud'],
+        ['up', '-x'],
+        ['up', ''],
+        ['up', 'a.yaml', '--set'],
+        ['show'],
+        ['show', 'a.yaml', '--fast'],
+        ['show', 'a.yaml', '--args', '--params'],
+        ['show', 'a.yaml', '--origin', '--format', 'json'],
+        ['graph'],
+        ['graph', 'a.yaml', '--output', 'a.pdf'],
+        ['check', 'a.yaml', '--format', 'yaml'],
+        ['check', 'a.yaml', '--ignore', 'bad-nam'],
+        ['check', 'a.yaml', '--ignore', 'bad-name', '--expect', 'bad-name'],
+        ['explain', 'bad-nam'],
+        ['new'],
+        ['new', 'My-Robot'],
+        ['interfaces', 'bild'],
+        ['interfaces', 'build'],
+        ['--nonsense'],
+    ],
+)
+def test_wrong_usage_is_exit_code_2(run, arguments):
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ''
+    assert re.fullmatch(r'error: [^\n]*[^\n.]\n  help: [^\n]*\n', err)
+
+
+def test_a_wrong_level_says_the_right_ones(run):
+    _, _, err = run('up', GREETER, '--log-level', 'loud')
+    assert err == (
+        "error: 'loud' is no log level\n  help: debug, info, warn, error or fatal, or NODE:=LEVEL\n"
+    )
+
+
+def test_a_wrong_option_says_the_nearest_right_one_and_where_the_others_stand(run):
+    _, _, err = run('show', GREETER, '--orign')
+    assert err.startswith("error: no such option '--orign'")
+    assert "'--origin'" in err
+    assert err.endswith("\n  help: 'composer show --help' shows how it is used\n")
+
+
+@pytest.mark.parametrize('command', ['show', 'graph'])
+def test_a_negative_number_is_a_value_for_all_that_take_a_system(run, command):
+    code, _, err = run(command, ROOT / 'configs' / 'add_two_ints_client.yaml', '-5', '3')
+    assert (code, err) == (0, '')
+
+
+def test_a_group_without_a_command_shows_what_it_has(run):
+    code, out, err = run('interfaces')
+    assert (code, out) == (2, '')
+    assert err.startswith('Usage: composer interfaces ')
+
+
+def test_the_help_of_each_command_fits_its_line(run):
+    _, out, _ = run('--help')
+    _, of_interfaces, _ = run('interfaces', '--help')
+    assert '...\n' not in (out + of_interfaces).replace('COMMAND [ARGS]...\n', '')
+
+
+@pytest.mark.parametrize('arguments', [['--help'], ['-h'], ['check', '--help'], ['up', '-h']])
+def test_help_is_exit_code_0(run, arguments):
+    code, out, err = run(*arguments)
+    assert (code, err) == (0, '')
+    assert out.startswith('Usage: composer')
+
+
+def test_without_a_command_there_is_help(run):
+    code, out, err = run()
+    assert code == 2
+    assert 'check' in out + err
+    assert 'up' in out + err
+
+
+def test_the_version_is_told(run):
+    code, out, err = run('--version')
+    assert (code, err) == (0, '')
+    assert out.startswith('composer, version ')
+
+
+def test_up_says_what_is_wrong_and_starts_nothing(run):
+    folder = EXAMPLES / 'bad-key'
+    code, out, err = run('up', folder / 'bad.yaml')
+    assert (code, out) == (1, '')
+    expected = (folder / 'bad.txt').read_text()
+    assert err.replace(f'{folder}/', '') == expected + '\n'
+
+
+@pytest.mark.parametrize(
+    'raised', [RuntimeError('boom'), AssertionError(), RecursionError('deep')]
+)
+def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
+    def fail(path, *more):
+        raise raised
+
+    monkeypatch.setattr('composer.cli.check.load_system', fail)
+    code, out, err = run('check', GREETER)
+    assert (code, out) == (3, '')
+    lines = err.splitlines()
+    assert lines[0] == (
+        'This is a bug in Composer, not in your file. Please report it with what follows.'
+    )
+    assert f"  arguments: ['check', '{GREETER}']" in lines
+    assert lines[-1].startswith(type(raised).__name__)
+
+
+@pytest.mark.parametrize(
+    ('raised', 'code', 'said'),
+    [
+        (ComposerError('it broke', help='mend it'), 1, 'error: it broke\n  help: mend it\n'),
+        (ComposerError('it broke'), 1, 'error: it broke\n'),
+        (UsageError('not so', help='but so'), 2, 'error: not so\n  help: but so\n'),
+        (KeyboardInterrupt(), 1, '\n'),
+    ],
+)
+def test_what_is_raised_on_purpose_becomes_an_exit_code(run, monkeypatch, raised, code, said):
+    def fail(path, *more):
+        raise raised
+
+    monkeypatch.setattr('composer.cli.check.load_system', fail)
+    assert run('check', GREETER) == (code, '', said)
+
+
+def test_python_m_composer_is_the_command():
+    result = start([sys.executable, '-m', 'composer', 'check', str(GREETER)])
+    assert (result.returncode, result.stdout) == (0, f'{GREETER}: ok, 2 nodes\n')
+
+
+# --ros-args
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'own', 'ros'),
+    [
+        ([], [], []),
+        (['up', 'a'], ['up', 'a'], []),
+        (['up', 'a', '--ros-args'], ['up', 'a'], []),
+        (['up', 'a', '--ros-args', '-r', 'b:=c'], ['up', 'a'], ['-r', 'b:=c']),
+        (['up', '--ros-args', '-p', 'b:=1', '--', 'a'], ['up', 'a'], ['-p', 'b:=1']),
+        (['--ros-args', '-r', 'a:=b', '--', 'up', '--ros-args', '-r', 'c:=d', '--', 'x'],
+         ['up', 'x'], ['-r', 'a:=b', '-r', 'c:=d']),
+        (['--ros-args', '--ros-args', '-r', 'a:=b'], [], ['-r', 'a:=b']),
+        (['up', '--', 'a'], ['up', '--', 'a'], []),
+        (['--ros-args', '-r', 'a:=b', '--', '--', 'x'], ['--', 'x'], ['-r', 'a:=b']),
+        (['up', '--log-level', 'debug', '--ros-args', '--log-level', 'info'],
+         ['up', '--log-level', 'debug'], ['--log-level', 'info']),
+    ],
+)  # fmt: skip
+def test_ros_arguments_are_taken_out(arguments, own, ros):
+    assert cli.split_ros_arguments(arguments) == (own, ros)

@@ -1,0 +1,192 @@
+"""`composer new`: what it creates works, and it never writes over anything."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from composer.cli.main import run
+from composer.schema.schema_file import schema_path
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = {
+    '.github/workflows/test.yml',
+    '.gitignore',
+    '.pre-commit-config.yaml',
+    'README.md',
+    'behaviours/my_robot.py',
+    'configs/my_robot.yaml',
+    'pyproject.toml',
+    'requirements.txt',
+    'schemas/composer.schema.json',
+    'tests/test_my_robot.py',
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def project(folder):
+    assert run(['new', 'my_robot']) == 0
+    return folder / 'my_robot'
+
+
+def texts(project):
+    return {
+        path.relative_to(project).as_posix(): path.read_text()
+        for path in project.rglob('*')
+        if path.is_file()
+    }
+
+
+def run_in(project, *words):
+    return subprocess.run(
+        [sys.executable, '-m', *words],
+        cwd=project,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'PYTHONDONTWRITEBYTECODE': '1'},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+
+
+def test_it_creates_all_that_a_project_needs(folder, capsys):
+    assert run(['new', 'my_robot']) == 0
+    assert set(texts(folder / 'my_robot')) == FILES
+    said = capsys.readouterr().out
+    assert all(f'  {path}\n' in said for path in FILES)
+    assert said.endswith(
+        'run it:\n  cd my_robot\n  composer up configs/my_robot.yaml\n  python -m pytest\n'
+    )
+
+
+def test_nothing_of_the_template_s_name_is_left(project):
+    assert not [path for path, text in texts(project).items() if 'my_system' in path + text]
+
+
+def test_the_system_has_no_faults_and_no_warnings(project):
+    assert run(['check', '--strict', str(project)]) == 0
+
+
+def test_editors_find_the_schema(project):
+    config = project / 'configs' / 'my_robot.yaml'
+    modeline = config.read_text().splitlines()[0]
+    schema = config.parent / re.fullmatch(
+        r'# yaml-language-server: \$schema=(.*)', modeline
+    ).group(1)
+    assert schema.read_text() == schema_path().read_text()
+
+
+def test_files_for_other_tools_are_what_these_read(project):
+    workflow = yaml.safe_load((project / '.github/workflows/test.yml').read_text())
+    commands = [step.get('run', '') for step in workflow['jobs']['test']['steps']]
+    assert commands[2:] == [
+        'pip install -r requirements.txt',
+        'composer check --strict --format github configs',
+        'python -m pytest',
+    ]
+    (repository,) = yaml.safe_load((project / '.pre-commit-config.yaml').read_text())['repos']
+    own = yaml.safe_load((ROOT / '.pre-commit-hooks.yaml').read_text())[0]
+    (hook,) = repository['hooks']
+    assert (hook['id'], hook['entry'], hook['types']) == (own['id'], own['entry'], own['types'])
+
+
+def test_it_names_no_host(project):
+    for path, text in texts(project).items():
+        # The schema has the address of its own format.
+        assert path == 'schemas/composer.schema.json' or '://' not in text
+
+
+@pytest.mark.ros
+def test_its_own_tests_pass(project, domain_id):
+    done = run_in(project, 'pytest', '-p', 'no:cacheprovider')
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert '2 passed' in done.stdout
+
+
+@pytest.mark.ros
+def test_its_tests_fail_if_the_system_does_not_work(project, domain_id):
+    behaviours = project / 'behaviours' / 'my_robot.py'
+    behaviours.write_text(behaviours.read_text().replace('I heard', 'I missed'))
+    test = project / 'tests' / 'test_my_robot.py'
+    test.write_text(test.read_text().replace('DEADLINE_SEC = 30.0', 'DEADLINE_SEC = 4.0'))
+    done = run_in(project, 'pytest', '-p', 'no:cacheprovider')
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert 'nothing was heard:' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ('name', 'near'),
+    [
+        ('MyRobot', 'myrobot'),
+        ('my-robot', 'my_robot'),
+        ('2robots', 'robots'),
+        ('robots/arm', 'robots_arm'),
+        ('../x', 'x'),
+        ('_x', 'x'),
+        ('röbot', 'r_bot'),
+        ('x\n', 'x'),
+    ],
+)
+def test_a_name_is_one_of_a_ros_package(folder, capsys, name, near):
+    assert run(['new', name]) == 2
+    assert capsys.readouterr().err == (
+        f"error: '{name}' cannot name a project: a name has lower-case letters, digits and "
+        f"underscores, and begins with a letter\n  help: '{near}', perhaps\n"
+    )
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize('name', ['', '.', '7'])
+def test_a_name_without_any_letter_has_none_near(folder, capsys, name):
+    assert run(['new', name]) == 2
+    assert 'help' not in capsys.readouterr().err
+
+
+def test_a_word_of_python_names_no_project(folder, capsys):
+    assert run(['new', 'class']) == 2
+    assert 'it is a word of Python' in capsys.readouterr().err
+
+
+def test_an_empty_folder_is_filled(folder):
+    (folder / 'my_robot').mkdir()
+    assert run(['new', 'my_robot']) == 0
+    assert set(texts(folder / 'my_robot')) == FILES
+
+
+def test_a_folder_with_something_in_it_is_left_alone(folder, capsys):
+    (folder / 'my_robot').mkdir()
+    (folder / 'my_robot' / '.hidden').write_text('mine')
+    assert run(['new', 'my_robot']) == 1
+    assert capsys.readouterr().err == (
+        'error: my_robot is there already, and is a folder with something in it\n'
+        '  help: take another name, or move it out of the way\n'
+    )
+    assert texts(folder / 'my_robot') == {'.hidden': 'mine'}
+
+
+@pytest.mark.parametrize('is_link', [False, True])
+def test_a_file_or_a_dangling_link_is_left_alone(folder, capsys, is_link):
+    path = folder / 'my_robot'
+    path.symlink_to('nowhere') if is_link else path.write_text('mine')
+    assert run(['new', 'my_robot']) == 1
+    assert 'is there already, and is not a folder' in capsys.readouterr().err
+    assert path.is_symlink() if is_link else path.read_text() == 'mine'
+
+
+def test_a_folder_that_cannot_be_written_is_said(folder, capsys, monkeypatch):
+    def refuse(path, *arguments, **options):
+        raise PermissionError(13, 'Permission denied', str(path))
+
+    monkeypatch.setattr(Path, 'mkdir', refuse)
+    assert run(['new', 'my_robot']) == 1
+    assert capsys.readouterr().err.endswith(': Permission denied\n')

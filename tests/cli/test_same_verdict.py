@@ -1,0 +1,41 @@
+"""`composer up` says of a file what `composer check` says, and refuses what that refuses."""
+
+import pytest
+
+from composer.cli import main as cli
+from composer.diagnostics import Severity
+from composer.rules import RULES
+from composer.rules.examples import examples_folder
+
+FOLDER = examples_folder()
+REFUSED = [
+    pytest.param(path.name, marks=pytest.mark.ros if RULES[path.name].needs else ())
+    for path in sorted(FOLDER.iterdir())
+    if RULES[path.name].severity is Severity.ERROR
+]
+
+
+@pytest.mark.parametrize('rule', REFUSED)
+def test_what_check_refuses_is_refused_in_the_same_words(rule, capsys, monkeypatch):
+    monkeypatch.chdir(FOLDER / rule)
+    imports = ['--import'] if rule == 'broken-behaviour' else []
+    assert cli.run(['check', '--quiet', *imports, 'bad.yaml']) == 1
+    said = capsys.readouterr().out
+    assert f'error[{rule}]: ' in said
+    assert cli.run(['up', 'bad.yaml']) == 1
+    assert capsys.readouterr() == ('', said)
+
+
+@pytest.mark.ros
+def test_what_a_comment_silences_is_started_with(compose):
+    code = 'def start(node, speed): ...\n\ndef end(node):\n    node.shutdown(0)\n'
+    text = """
+        version: 1
+        nodes:
+          rover:
+            on_stop: parts:start  # composer: ignore[bad-signature]
+            timers: {end: {period: 0.1, behaviour: parts:end}}
+        """
+    child = compose(text, code)
+    assert child.wait() == 0
+    assert 'error[' not in child.output

@@ -1,0 +1,109 @@
+"""`composer up FILE [NAME:=VALUE]...`: the words of a file's own, and its help."""
+
+from pathlib import Path
+
+import pytest
+
+from composer.cli import main as cli
+
+ROOT = Path(__file__).resolve().parents[2]
+
+CALCULATOR_ARGUMENTS = """the file declares
+    a (integer, required): The first number.
+    b (integer, required): The second number.
+    operation (string, one of '', add, subtract, default ''): What the server shall do; nothing leaves it as it is.
+"""
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Return exit code, standard output and standard error of a command."""
+    monkeypatch.chdir(ROOT)
+
+    def run(*arguments):
+        code = cli.run(list(arguments))
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+@pytest.mark.parametrize('option', ['--help', '-h'])
+@pytest.mark.parametrize('first', [True, False])
+def test_help_after_or_before_a_file_shows_its_arguments(run, option, first):
+    file = 'configs/calculator_client.yaml'
+    code, out, err = run('up', *([option, file] if first else [file, option]))
+    assert (code, err) == (0, '')
+    usage, arguments = out.split(f'\n{file}: ')
+    assert usage.startswith('Usage: composer up [OPTIONS] FILE [LAYER]... [NAME:=VALUE]...\n')
+    assert arguments == CALCULATOR_ARGUMENTS
+
+
+def test_help_of_a_file_without_arguments_says_so(run):
+    code, out, _ = run('up', 'configs/greeter.yaml', '--help')
+    assert code == 0
+    assert out.endswith('\nconfigs/greeter.yaml: the file declares no arguments\n')
+
+
+def test_help_of_a_file_that_is_not_there_is_still_help(run):
+    code, out, _ = run('up', 'nowhere.yaml', '--help')
+    assert code == 0
+    assert out.endswith('\nnowhere.yaml: the file cannot be read\n')
+
+
+def test_words_that_do_not_fit_are_an_error_of_usage_that_shows_the_declared_ones(run):
+    words = ['ten', 'c:=3', 'operation:=divide']
+    assert run('up', 'configs/calculator_client.yaml', *words) == (
+        2,
+        '',
+        "error: there is no argument 'c'; 'a': expected an integer, got 'ten'; 'b' is missing; "
+        f"'operation': 'divide' is none of '', add, subtract\n  help: {CALCULATOR_ARGUMENTS}",
+    )
+
+
+@pytest.mark.parametrize('option', ['--nope', '--nope=3', '-x', '-xyz', '--log-levle'])
+def test_an_unknown_option_is_an_error_and_no_value(run, option):
+    code, out, err = run('up', 'configs/calculator_client.yaml', '1', option)
+    assert (code, out) == (2, '')
+    assert f'no such option {option!r}' in err or f'no such option: {option}' in err
+
+
+def test_negative_numbers_are_values_and_no_options(run):
+    code, _, err = run('up', 'configs/calculator_client.yaml', '-5', '-6', '-7')
+    assert code == 2
+    assert err.startswith("error: 'operation': '-7' is none of '', add, subtract\n")
+
+
+def test_a_file_whose_declarations_are_wrong_is_reported_before_its_words(run, tmp_path):
+    path = tmp_path / 'system.yaml'
+    path.write_text('version: 1\nargs: {a: {defualt: 3}}\nnodes: {}\n')
+    code, out, err = run('up', str(path), 'b:=3')
+    assert (code, out) == (1, '')
+    assert (
+        err.splitlines()[0]
+        == f"{path}:2:12: error[unknown-key]: unknown key 'defualt' in argument 'a'"
+    )
+
+
+SYSTEM = """
+version: 1
+args: {text: {type: string}, period: {default: 0.05}, name: {default: talker}}
+nodes:
+  "{{ name }}":
+    timers:
+      say: {period: "{{ period }}", behaviour: parts:say, with: {text: "{{ text }}", twice: "<{{ text }}>"}}
+"""
+
+CODE = """
+def say(node, text, twice):
+    node.logger.info(f'{text!r} {twice} {node.name}')
+    node.shutdown()
+"""
+
+
+@pytest.mark.ros
+def test_a_system_runs_with_the_values_that_are_given(compose):
+    pytest.importorskip('rclpy')
+    child = compose(SYSTEM, CODE, '-7', 'name:=speaker')
+    assert child.wait() == 0, child.output
+    assert child.matching('[speaker]') == ["[INFO] [speaker]: '-7' <-7> speaker"]

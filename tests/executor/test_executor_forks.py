@@ -1,0 +1,136 @@
+"""A child that a callback forks: the parent misses nothing, and the child ends."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+_PROGRAM = """
+import json, os, sys, threading, time
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+from composer.executor import ComposerExecutor
+
+rclpy.init()
+node = rclpy.create_node('node')
+executor = ComposerExecutor()
+executor.add_node(node)
+got, sent, children, codes, answers = [], [], [], [], []
+
+
+def group():
+    return MutuallyExclusiveCallbackGroup()
+
+
+def publish():
+    publisher.publish(Int32(data=len(sent)))
+    sent.append(1)
+
+
+def fork():
+    if len(children) < 5:
+        child = os.fork()
+        if child:
+            children.append(child)
+        else:
+            in_child()
+
+
+def in_child():
+    CHILD
+
+
+def serve(request, response):
+    fork()
+    return response
+
+
+publisher = node.create_publisher(Int32, 'count', 1000)
+node.create_subscription(Int32, 'count', lambda m: got.append(m.data), 1000, callback_group=group())
+service = node.create_service(Trigger, 'serve', serve, callback_group=group())
+client = node.create_client(Trigger, 'serve', callback_group=group())
+node.create_timer(0.002, publish, callback_group=group())
+node.create_timer(0.02, WHO, callback_group=group())
+spinning = threading.Thread(target=executor.spin)
+spinning.start()
+deadline = time.monotonic() + 60
+while len(codes) < 5 and time.monotonic() < deadline:
+    time.sleep(0.01)
+    for child in children[len(codes):]:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if not ended:
+            break
+        codes.append(os.waitstatus_to_exitcode(status))
+seen = len(sent)
+while len(got) < seen + 10 and time.monotonic() < deadline:
+    time.sleep(0.01)
+executor.shutdown()
+spinning.join()
+print(json.dumps([codes, got == list(range(len(got))), len(got) >= seen + 10, len(answers)]))
+for child in children[len(codes):]:
+    os.kill(child, 9)
+"""
+_CALL = """lambda: client.call_async(Trigger.Request()).add_done_callback(answers.append)"""
+
+
+def _run(domain_id, who, in_child):
+    program = _PROGRAM.replace('WHO', who).replace('CHILD', in_child)
+    ended = subprocess.run(
+        [sys.executable, '-c', program],
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    return [*json.loads(ended.stdout.splitlines()[-1]), ended.stderr]
+
+
+@pytest.mark.parametrize(
+    ('in_child', 'code', 'said'),
+    [
+        ('pass', 0, ''),
+        ('sys.exit(3)', 3, ''),
+        ('sys.exit("in the child")', 1, 'in the child'),
+        ('raise ValueError("in the child")', 1, 'ValueError: in the child'),
+        ('os._exit(7)', 7, ''),
+    ],
+)
+def test_a_child_ends_with_its_callback_and_the_parent_misses_nothing(
+    domain_id, in_child, code, said
+):
+    codes, in_order, arrived, _, stderr = _run(domain_id, 'fork', in_child)
+    assert codes == [code] * 5
+    assert in_order
+    assert arrived
+    assert (said in stderr) if said else (stderr == '')
+
+
+def test_a_child_finds_the_executor_shut_down(domain_id):
+    in_child = (
+        'executor.create_task(print); executor.wake(); executor.spin_once(); executor.spin(); '
+        'sys.exit(4 if executor.shutdown() else 5)'
+    )
+    codes, in_order, arrived, _, stderr = _run(domain_id, 'fork', in_child)
+    assert codes == [4] * 5
+    assert in_order
+    assert arrived
+    assert not stderr
+
+
+def test_a_child_of_a_service_leaves_the_answer_to_its_parent(domain_id):
+    codes, in_order, _, answers, stderr = _run(
+        domain_id, _CALL, 'service.send_response = lambda *_: os._exit(9)'
+    )
+    assert codes == [0] * 5
+    assert in_order
+    assert answers >= 5
+    assert not stderr

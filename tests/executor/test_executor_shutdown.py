@@ -1,0 +1,257 @@
+"""`shutdown`, `wake`, contexts and signals."""
+
+import signal
+import threading
+import time
+import weakref
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import ShutdownException
+from rclpy.task import Future
+from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
+from std_msgs.msg import Empty
+
+from composer.executor import ComposerExecutor
+
+# A thread watches over the time: a deadlock outside of Python hears no signal.
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+
+
+def test_wait_for_ready_callbacks_raises_after_shutdown(executor: Any) -> None:
+    executor.shutdown()
+    with pytest.raises(ShutdownException):
+        executor.wait_for_ready_callbacks()
+
+
+def test_shutdown_ends_spin_at_once(node: Any, executor: Any) -> None:
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    assert executor.shutdown()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
+def test_shutdown_waits_for_a_callback_and_reports_a_stuck_one(node: Any, executor: Any) -> None:
+    let_go = threading.Event()
+    began = threading.Event()
+    node.create_timer(0.01, lambda: (began.set(), let_go.wait(DEADLINE_SEC)))
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    assert began.wait(DEADLINE_SEC)
+    assert not executor.shutdown(timeout_sec=0.05)
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+    let_go.set()
+    assert executor.shutdown()
+
+
+def test_shutdown_from_a_callback(node: Any, executor: Any) -> None:
+    results: list[bool] = []
+    node.create_timer(0.01, lambda: results.append(executor.shutdown()))
+    executor.spin()
+    assert results == [True]
+
+
+def test_shutdown_of_the_context_from_a_callback_ends_spin(
+    node: Any,
+    executor: Any,
+    context: Context,
+) -> None:
+    node.create_timer(0.01, context.shutdown)
+    executor.spin()
+    assert not context.ok()
+
+
+def test_no_callback_begins_after_spin_has_returned(node: Any, executor: Any) -> None:
+    ticks: list[int] = []
+    node.create_timer(0.001, lambda: ticks.append(1))
+    while not ticks:
+        executor.spin_until_future_complete(Future(), timeout_sec=0.1)
+    wait_until_quiet(ticks)
+
+
+@pytest.mark.parametrize('name', ['SIGINT', 'SIGTERM'])
+@pytest.mark.parametrize('how', ['spin', 'spin_once', 'busy'])
+@pytest.mark.usefixtures('domain_id')
+def test_signals_end_spin(name: str, how: str, start_program: Any) -> None:
+    program = f"""
+import rclpy, time
+from composer.executor import ComposerExecutor
+rclpy.init()
+node = rclpy.create_node('node')
+executor = ComposerExecutor()
+executor.add_node(node)
+if {how!r} == 'busy':
+    node.create_timer(0.001, lambda: time.sleep(0.0005))
+executor.create_task(print, 'spinning', flush=True)
+try:
+    rclpy.spin(node, executor) if {how!r} == 'spin_once' else executor.spin()
+    print('returned', flush=True)
+except KeyboardInterrupt:
+    print('interrupted', flush=True)
+"""
+    process = start_program('-c', program)
+    assert process.stdout.readline() == 'spinning\n'
+    process.send_signal(getattr(signal, name))
+    output, _ = process.communicate(timeout=DEADLINE_SEC)
+    assert output in ('interrupted\n', 'returned\n')
+    assert process.returncode == 0
+
+
+def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
+    executor: Any, context: Context, monkeypatch: Any
+) -> None:
+    lane = executor._engine.lane
+    waits: list[int] = []
+    wait = lane._wait
+
+    def count_and_wait(most_sec: float | None) -> None:
+        waits.append(1)
+        wait(most_sec)
+
+    monkeypatch.setattr(lane, '_wait', count_and_wait)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    wait_for(lambda: waits)
+    wait_until_quiet(waits)
+    seen = len(waits)
+    # As rclpy's thread for signals does it: first this, then, when it runs again, that.
+    executor._sigint_gc.trigger()
+    wait_for(lambda: len(waits) > seen)
+    context.handle.shutdown()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
+@pytest.mark.parametrize('what', ['context', 'executor'])
+def test_spin_once_ends_with_what_ended_right_before_it_waits(
+    node: Any, executor: Any, context: Context, monkeypatch: Any, what: str
+) -> None:
+    engine = executor._engine
+    wait_if = engine.polling.wait_if
+
+    def wait_later(*arguments: Any) -> None:
+        if what == 'context':
+            context.handle.shutdown()
+            engine.wake()
+        else:
+            executor.shutdown(0)
+        wait_if(*arguments)
+
+    monkeypatch.setattr(engine.polling, 'wait_if', wait_later)
+    thread = threading.Thread(target=executor.spin_once, daemon=True)
+    thread.start()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
+def test_spin_ends_when_a_signal_ends_the_context_during_a_look_at_events(
+    node: Any, executor: Any, context: Context, monkeypatch: Any
+) -> None:
+    lane = executor._engine.lane
+    sweep = lane._sweep
+
+    def sweep_in_vain() -> None:
+        if lane._default.sources:
+            context.handle.shutdown()  # As rclpy's handler of signals does it.
+            lane._default.due = 0.0
+        sweep()
+
+    monkeypatch.setattr(lane, '_sweep', sweep_in_vain)
+    node.create_subscription(Empty, 'looked_at', lambda _: None, 1)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
+def test_two_executors_of_two_contexts_do_not_meet(
+    executor: Any, node: Any, other_domain_id: int
+) -> None:
+    other = Context()
+    rclpy.init(context=other, domain_id=other_domain_id)
+    second = ComposerExecutor(context=other)
+    other_node = rclpy.create_node('node', context=other)
+    second.add_node(other_node)
+    ticks: set[str] = set()
+    node.create_timer(0.01, lambda: ticks.add('first'))
+    other_node.create_timer(0.01, lambda: ticks.add('second'))
+    with spinning(executor), spinning(second):
+        wait_for(lambda: len(ticks) == 2)
+    other.shutdown()
+
+
+def test_a_group_shared_by_two_executors_is_exclusive(executor: Any, context: Context) -> None:
+    second = ComposerExecutor(context=context)
+    group = MutuallyExclusiveCallbackGroup()
+    inside = most = total = 0
+
+    def tick() -> None:
+        nonlocal inside, most, total
+        inside += 1
+        most = max(most, inside)
+        time.sleep(0.003)
+        inside -= 1
+        total += 1
+
+    nodes = [rclpy.create_node(name, context=context) for name in ('first', 'second')]
+    for node, some in zip(nodes, (executor, second), strict=True):
+        node.create_timer(0.002, tick, callback_group=group)
+        some.add_node(node)
+    with spinning(executor), spinning(second):
+        wait_for(lambda: total > 50)
+    assert most == 1
+
+
+def test_the_executor_can_be_forgotten(context: Context) -> None:
+    executor = ComposerExecutor(context=context)
+    node = rclpy.create_node('node', context=context)
+    executor.add_node(node)
+    executor.spin_once(timeout_sec=0.01)
+    executor.shutdown()
+    gone = weakref.ref(executor)
+    del executor
+
+    def is_gone() -> bool:
+        import gc
+
+        gc.collect()
+        return gone() is None
+
+    wait_for(is_gone)
+
+
+@pytest.mark.parametrize('how', ['spin', 'spin_once', 'spin_until_future_complete'])
+def test_executors_can_be_shut_down_as_soon_as_they_are_spun(context: Context, how: str) -> None:
+    errors: list[BaseException] = []
+    node = rclpy.create_node('node', context=context)
+    node.create_timer(0.0005, lambda: None)
+
+    def spin() -> None:
+        try:
+            while not executor._is_shutdown:
+                if how == 'spin_until_future_complete':
+                    executor.spin_until_future_complete(Future(), timeout_sec=0.001)
+                else:
+                    getattr(executor, how)()
+        except BaseException as error:  # noqa: BLE001
+            errors.append(error)
+
+    for number in range(40):
+        executor = ComposerExecutor(context=context)
+        executor.add_node(node)
+        thread = threading.Thread(target=spin)
+        thread.start()
+        time.sleep(number * 0.0001)
+        assert executor.shutdown()
+        thread.join(DEADLINE_SEC)
+        assert not thread.is_alive()
+    assert errors == []

@@ -1,0 +1,221 @@
+"""`spin`, `spin_once` and their friends keep rclpy's promises."""
+
+import asyncio
+import sys
+import threading
+import time
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.task import Future
+from spinning import DEADLINE_SEC, wait_for
+
+from composer.executor import ComposerExecutor
+
+# A thread watches over the time: a deadlock outside of Python hears no signal.
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+
+
+@pytest.mark.usefixtures('patient')
+def test_spin_once_runs_one_callback(node: Any, executor: Any) -> None:
+    ticks: list[int] = []
+    node.create_timer(0.01, lambda: ticks.append(1))
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
+    assert ticks == [1]
+
+
+def test_spin_once_with_zero_timeout_does_not_wait(node: Any, executor: Any) -> None:
+    node.create_timer(100.0, lambda: None)
+    executor.spin_once(timeout_sec=0)
+
+
+def test_spin_once_returns_at_its_timeout(node: Any, executor: Any) -> None:
+    begin = time.monotonic()
+    executor.spin_once(timeout_sec=0.1)
+    assert time.monotonic() - begin >= 0.1
+
+
+def test_spin_once_returns_though_its_callback_blocks(node: Any, executor: Any) -> None:
+    let_go = threading.Event()
+    over = threading.Event()
+
+    def block() -> None:
+        let_go.wait(DEADLINE_SEC)
+        over.set()
+
+    node.create_timer(0.01, block)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
+    assert not over.is_set()
+    let_go.set()
+    assert over.wait(DEADLINE_SEC)
+
+
+@pytest.mark.usefixtures('patient')
+def test_spin_once_serves_a_node_that_is_added_while_it_waits(context: Any, executor: Any) -> None:
+    node = rclpy.create_node('late', context=context)
+    ticked = threading.Event()
+    node.create_timer(0.01, ticked.set)
+    thread = threading.Thread(target=executor.spin_once)
+    thread.start()
+    executor.add_node(node)
+    thread.join(DEADLINE_SEC)
+    assert ticked.is_set()
+    node.destroy_node()
+
+
+def test_spin_until_future_complete_returns_when_a_callback_sets_it(
+    node: Any,
+    executor: Any,
+) -> None:
+    future = Future()
+    node.create_timer(0.01, lambda: future.set_result(3))
+    executor.spin_until_future_complete(future)
+    assert future.result() == 3
+
+
+def test_spin_until_future_complete_returns_when_a_thread_sets_it(
+    node: Any,
+    executor: Any,
+) -> None:
+    future = Future()
+    threading.Timer(0.05, future.set_result, ('x',)).start()
+    executor.spin_until_future_complete(future, timeout_sec=-1)
+    assert future.result() == 'x'
+
+
+def test_spin_until_future_complete_keeps_its_timeout_beside_a_blocked_callback(
+    node: Any,
+    executor: Any,
+) -> None:
+    let_go = threading.Event()
+    node.create_timer(0.01, lambda: let_go.wait(DEADLINE_SEC))
+    begin = time.monotonic()
+    executor.spin_until_future_complete(Future(), timeout_sec=0.2)
+    assert 0.2 <= time.monotonic() - begin < DEADLINE_SEC / 2
+    let_go.set()
+
+
+def test_spin_until_future_complete_with_zero_timeout_returns(node: Any, executor: Any) -> None:
+    executor.spin_until_future_complete(Future(), timeout_sec=0)
+
+
+def test_spin_once_until_future_complete_returns_when_it_is_done(
+    node: Any,
+    executor: Any,
+) -> None:
+    future = Future()
+    threading.Timer(0.05, future.set_result, (1,)).start()
+    executor.spin_once_until_future_complete(future, None)
+    assert future.done()
+
+
+@pytest.mark.usefixtures('patient')
+def test_rclpy_functions_take_the_executor(context: Any, executor: Any) -> None:
+    node = rclpy.create_node('given', context=context)
+    future = Future()
+    ticks: list[int] = []
+
+    def tick() -> None:
+        ticks.append(1)
+        if len(ticks) > 2:
+            future.set_result(None)
+
+    node.create_timer(0.01, tick)
+    rclpy.spin_once(node, executor=executor, timeout_sec=DEADLINE_SEC)
+    assert len(ticks) == 1
+    rclpy.spin_until_future_complete(node, future, executor, DEADLINE_SEC)
+    assert future.done()
+    thread = threading.Thread(target=rclpy.spin, args=(node, executor))
+    thread.start()
+    wait_for(lambda: len(ticks) > 5)
+    context.shutdown()
+    thread.join(DEADLINE_SEC)
+    assert not thread.is_alive()
+
+
+def test_spin_can_go_on_after_an_exception(node: Any, executor: Any) -> None:
+    calls: list[int] = []
+
+    def fail() -> None:
+        calls.append(1)
+        raise ValueError(len(calls))
+
+    node.create_timer(0.01, fail)
+    for number in (1, 2, 3):
+        with pytest.raises(ValueError, match=str(number)):
+            executor.spin()
+
+
+@pytest.mark.usefixtures('patient')
+def test_spin_once_raises_what_a_callback_raises(node: Any, executor: Any) -> None:
+    def fail() -> None:
+        raise KeyError
+
+    node.create_timer(0.01, fail)
+    with pytest.raises(KeyError):
+        executor.spin_once(timeout_sec=DEADLINE_SEC)
+
+
+@pytest.mark.parametrize('kind', ['function', 'coroutine', 'suspended'])
+def test_an_exception_of_a_task_is_raised_from_spin(node: Any, executor: Any, kind: str) -> None:
+    def function() -> None:
+        raise ArithmeticError
+
+    async def coroutine() -> None:
+        raise ArithmeticError
+
+    async def suspended() -> None:
+        await asyncio.sleep(0)
+        raise ArithmeticError
+
+    executor.create_task(
+        {'function': function, 'coroutine': coroutine, 'suspended': suspended}[kind]
+    )
+    with pytest.raises(ArithmeticError):
+        executor.spin()
+
+
+def test_an_exception_of_an_async_callback_is_raised_from_spin(node: Any, executor: Any) -> None:
+    async def fail() -> None:
+        await asyncio.sleep(0)
+        raise LookupError
+
+    node.create_timer(0.01, fail)
+    with pytest.raises(LookupError):
+        executor.spin()
+
+
+def test_system_exit_in_a_callback_is_raised_from_spin(node: Any, executor: Any) -> None:
+    node.create_timer(0.01, lambda: sys.exit(3))
+    with pytest.raises(SystemExit):
+        executor.spin()
+
+
+def test_spin_once_waits_for_less_than_a_millisecond_if_told_so(node: Any, executor: Any) -> None:
+    ticks: list[int] = []
+    node.create_timer(0.02, lambda: ticks.append(1))
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
+
+    def waits_between_two_ticks() -> int:
+        seen, waits = len(ticks), 0
+        while len(ticks) == seen:
+            executor.spin_once(timeout_sec=0.0002)
+            waits += 1
+        return waits
+
+    # Waits of whole milliseconds would be 20 at most.
+    wait_for(lambda: waits_between_two_ticks() > 25)
+
+
+def test_num_threads_means_what_it_does_in_rclpy(context: Context) -> None:
+    executor = ComposerExecutor(num_threads=3, context=context)
+    assert executor._executor._max_workers == 3
+    executor.shutdown()
+    with pytest.warns(UserWarning, match='single thread'):
+        ComposerExecutor(num_threads=1, context=context).shutdown()

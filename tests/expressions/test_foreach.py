@@ -1,0 +1,213 @@
+"""`foreach` and `when`."""
+
+import pytest
+
+from composer.language.pipeline import load_system_text
+
+HEAD = 'version: 1\n'
+
+
+def load(text, words=None):
+    return load_system_text(HEAD + text, words=words)
+
+
+def names(system):
+    return [node.name for node in system.spec.nodes.values()]
+
+
+def messages(system):
+    return [(each.rule, each.message) for each in system.diagnostics]
+
+
+def test_a_node_is_repeated_for_each_value_which_keeps_its_type():
+    system = load(
+        """
+nodes:
+  "wheel_{{ i }}":
+    foreach: {i: [1, 2]}
+    parameters: {index: "{{ i }}"}
+"""
+    )
+    assert not system.diagnostics
+    assert names(system) == ['wheel_1', 'wheel_2']
+    values = [node.parameters['index'].value for node in system.spec.nodes.values()]
+    assert values == [1, 2]
+
+
+def test_several_variables_give_all_combinations_and_see_those_before_them():
+    system = load(
+        """
+args: {sides: 2}
+nodes:
+  "leg_{{ side }}_{{ joint }}":
+    foreach: {side: "{{ range(sides) }}", joint: "{{ range(side + 1) }}"}
+"""
+    )
+    assert names(system) == ['leg_0_0', 'leg_1_0', 'leg_1_1']
+
+
+def test_a_node_whose_condition_fails_is_not_there_but_still_held_against_the_schema():
+    system = load(
+        """
+args: {sim: true}
+nodes:
+  real: {when: "{{ not sim }}", log_levl: debug}
+  simulated: {when: "{{ sim }}"}
+"""
+    )
+    assert names(system) == ['simulated']
+    assert [node.name for node in system.unused.nodes.values()] == ['real']
+    assert messages(system) == [('unknown-key', "unknown key 'log_levl' in node 'real'")]
+
+
+def test_a_condition_may_be_a_plain_boolean():
+    assert names(load('nodes: {a: {when: false}, b: {when: true}}')) == ['b']
+
+
+def test_a_condition_sees_the_variables_of_foreach():
+    system = load(
+        """
+nodes:
+  "n{{ i }}": {foreach: {i: [0, 1, 2]}, when: "{{ i != 1 }}"}
+"""
+    )
+    assert names(system) == ['n0', 'n2']
+
+
+def test_findings_in_a_repeated_node_are_at_its_lines_and_said_once():
+    system = load(
+        """
+nodes:
+  "n{{ i }}":
+    foreach: {i: [0, 1]}
+    timers: {t: {period: 0, behaviour: 'a:b'}}
+"""
+    )
+    assert {(each.rule, each.span.line) for each in system.diagnostics} == {('out-of-range', 6)}
+
+
+@pytest.mark.parametrize(
+    ('foreach', 'rule', 'message'),
+    [
+        ('[1, 2]', 'bad-foreach', "foreach is a mapping, as in 'foreach: {i: [1, 2]}'"),
+        ('{}', 'bad-foreach', 'foreach has no variable in it'),
+        ('{i: 3}', 'bad-foreach', "'i' takes a list of values, not 3"),
+        ('{in: [3]}', 'bad-foreach', "'in' cannot stand in an expression as a name"),
+        ('{i: "{{ nope }}"}', 'undefined-name', "'nope' is not defined"),
+    ],
+)
+def test_a_foreach_that_makes_no_sense_is_said_at_its_place(foreach, rule, message):
+    system = load(f'nodes:\n  "n{{{{ i }}}}":\n    foreach: {foreach}\n')
+    assert messages(system)[0] == (rule, message)
+    assert system.diagnostics[0].span.line == 4
+
+
+def test_a_condition_that_is_no_boolean_is_said():
+    system = load('nodes: {a: {when: "{{ 1 }}"}}')
+    assert messages(system) == [('bad-when', 'when is true or false, not 1')]
+
+
+def test_one_name_for_all_repetitions_is_said_with_the_way_out():
+    system = load('nodes: {n: {foreach: {i: [1, 2]}}}')
+    (finding,) = system.diagnostics
+    assert finding.message == "foreach makes more than one 'n'"
+    assert finding.help == 'use its variables in the name, as in "n_{{ i }}"'
+
+
+def test_more_entries_than_anybody_wants_need_to_be_asked_for():
+    text = 'nodes: {"n{{ i }}": {foreach: {i: "{{ range(10001) }}"}}}\n'
+    (finding,) = load(text).diagnostics
+    assert finding.rule == 'too-many-entries'
+    assert finding.message == 'there are more than 10,000 entries in nodes'
+    assert len(load(f'max_nodes: 10001\n{text}').spec.nodes) == 10001
+
+
+def test_alternatives_of_one_name_may_exclude_each_other():
+    system = load(
+        """
+args: {sim: true, name: camera}
+nodes:
+  "{{ name }}": {when: "{{ not sim }}", description: real}
+  camera: {when: "{{ sim }}", description: simulated}
+"""
+    )
+    assert not system.diagnostics
+    assert system.spec.nodes['camera'].description == 'simulated'
+
+
+def test_here_is_the_folder_of_the_file_and_env_the_environment(tmp_path, monkeypatch):
+    monkeypatch.setenv('ROBOT', 'r2')
+    path = tmp_path / 'a.yaml'
+    path.write_text(
+        'version: 1\nnodes: {n: {parameters: {a: "{{ here }}", b: "{{ env(\'ROBOT\') }}", '
+        "c: \"{{ env('NO_SUCH', 'none') }}\"}}}\n"
+    )
+    from composer.language.pipeline import load_system
+
+    system = load_system(path)
+    values = {name: each.value for name, each in system.spec.nodes['n'].parameters.items()}
+    assert values == {'a': str(tmp_path), 'b': 'r2', 'c': 'none'}
+
+
+def test_a_missing_variable_or_package_is_a_finding(monkeypatch):
+    monkeypatch.delenv('NO_SUCH', raising=False)
+    system = load(
+        """
+nodes:
+  n:
+    parameters:
+      a: "{{ env('NO_SUCH') }}"
+      b: "{{ find('no_such_package') }}"
+"""
+    )
+    assert messages(system) == [
+        (
+            'bad-expression',
+            "the environment has no 'NO_SUCH'; give a default, as in env('NO_SUCH', 'none')",
+        ),
+        ('bad-expression', "no package 'no_such_package' is installed"),
+    ]
+
+
+def test_an_entry_is_read_once_where_its_foreach_has_no_list():
+    system = load(
+        """
+nodes:
+  "wheel_{{ i }}":
+    foreach: {i: 3}
+    log_level: "{{ loudness }}"
+    state: {index: "{{ i }}"}
+    colour: red
+"""
+    )
+    assert [each.rule for each in system.diagnostics] == [
+        'bad-foreach',
+        'undefined-name',
+        'unknown-key',
+    ]
+
+
+@pytest.mark.parametrize('limit', ['-1', '0'])
+def test_a_limit_that_is_none_limits_nothing(limit):
+    system = load(f'max_nodes: {limit}\nnodes:\n  "a_{{{{ i }}}}": {{foreach: {{i: [1, 2]}}}}\n')
+    assert [each.rule for each in system.diagnostics] == ['out-of-range']
+
+
+@pytest.mark.parametrize('type_name', ['intger', '[a]', 'text'])
+def test_an_argument_with_a_misspelt_type_has_its_default(type_name):
+    system = load(
+        f"""
+args: {{count: {{type: {type_name}, default: 2}}}}
+nodes:
+  "wheel_{{{{ i }}}}":
+    foreach: {{i: "{{{{ range(count) }}}}"}}
+    warn_after: "{{{{ -count }}}}"
+"""
+    )
+    assert [each.rule for each in system.diagnostics][1:] == ['out-of-range', 'out-of-range']
+    assert names(system) == ['wheel_0', 'wheel_1']
+
+
+def test_arguments_that_are_no_mapping_are_one_fault():
+    system = load('args: [a, b]\nnodes: {n: {log_level: "{{ a }}", on_error: "{{ b }}"}}\n')
+    assert [each.rule for each in system.diagnostics] == ['wrong-type']

@@ -1,0 +1,333 @@
+"""Expressions inside scalars: what they may be, what they give, and where their faults are."""
+
+import json
+import random
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system_text
+from composer.schema.structure import schema_path, without_templates
+
+HEAD = """
+version: 1
+args: {name: {default: rover}, count: {default: 3}, rate: {default: 0.5}, loud: {default: true}}
+nodes:
+  n:
+    state:
+"""
+
+
+def load(state):
+    return load_system_text(f'{HEAD}      {state}\n')
+
+
+def value(scalar):
+    """Return what becomes of a scalar."""
+    loaded = load(f'x: {scalar}')
+    assert loaded.diagnostics == ()
+    return loaded.spec.nodes['n'].state['x']
+
+
+def faults(state):
+    return [
+        (each.rule, each.message, f'{each.span.line}:{each.span.column}', each.span.text)
+        for each in load(state).diagnostics
+    ]
+
+
+@pytest.mark.parametrize(
+    ('scalar', 'expected'),
+    [
+        ('"{{ count }}"', 3),
+        ('"{{count}}"', 3),
+        ('" {{ count }} "', 3),
+        ('"{{ rate }}"', 0.5),
+        ('"{{ loud }}"', True),
+        ('"{{ name }}"', 'rover'),
+        ('"{{ none }}"', None),
+        ('"{{ count * 2 + 1 }}"', 7),
+        ('"{{ count / 2 }}"', 1.5),
+        ('"{{-count}}"', -3),
+        ('"{{ not loud }}"', False),
+        ('"{{ count if loud else 0 }}"', 3),
+        ('"{{ name|upper }}"', 'ROVER'),
+        ('"{{ range(count) }}"', [0, 1, 2]),
+        ('"{{ range(count)|map(\'string\') }}"', ['0', '1', '2']),
+        ('"{{ range(5)|select(\'odd\')|sum }}"', 4),
+        ('"{{ [2, 1]|sort|join(\'-\') }}"', '1-2'),
+        ('"{{ name[1:3] ~ name[0] ~ name[-1] }}"', 'ovrr'),
+        ('"{{ 1 < count <= 3 and count in [3] and 4 not in [3] }}"', True),
+        ('"{{ \'{:>4}|{n}\'.format(count, n=name) }}"', '   3|rover'),
+        ('"{{ \'%03d\' % count }}"', '003'),
+        ("\"{{ {'a': 1}.get('b', 7) + {'a': 1}.a + {'a': 1}['a'] }}\"", 9),
+        ("\"{{ name.replace('r', '').split('v') }}\"", ['o', 'e']),
+        ('"{{ nothing is defined or nothing|default(4) == 4 }}"', True),
+        ('"{{ range(*[1, 3])|list }}"', [1, 2]),
+        ('"{{ -count // 2 }}"', -2),
+        ('"{{ [name, (1, 2)] }}"', ['rover', [1, 2]]),
+        ("\"{{ {'a': {'b': count}} }}\"", {'a': {'b': 3}}),
+        ('"{{ \'}}\' }}"', '}}'),
+        ('"{{ \'{{\' }}"', '{{'),
+        ('"{{ name }}_{{ count }}"', 'rover_3'),
+        ('"{{ count }}{{ count }}"', '33'),
+        ('"at {{ rate }}, {{ loud }}, {{ none }}."', 'at 0.5, true, .'),
+        ('"{{ name }} {% if %} {# x #} }} ${x}"', 'rover {% if %} {# x #} }} ${x}'),
+        ('"{% if x %}"', '{% if x %}'),
+        ('"}} {"', '}} {'),
+        ('"AT{{ count }}\\r\\n"', 'AT3\r\n'),
+        ('"{{ name }}_\\n"', 'rover_\n'),
+        ('"{{ count\\r\\n }}_{{ count }}"', '3_3'),
+        ('"{{ {} }}"', {}),
+    ],
+)
+def test_a_whole_expression_keeps_its_type_and_any_other_becomes_text(scalar, expected):
+    found = value(scalar)
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+def test_keys_and_items_are_filled_too():
+    loaded = load('{"{{ name }}_a": ["{{ count }}", {"b{{ count }}": 1}], "{{ loud }}": 2}')
+    assert loaded.diagnostics == ()
+    assert loaded.spec.nodes['n'].state == {'rover_a': [3, {'b3': 1}], 'true': 2}
+
+
+def test_what_lies_below_a_filled_key_keeps_its_place():
+    loaded = load_system_text(
+        'version: 1\nargs: {name: a}\nnodes:\n  "{{ name }}_x":\n    timers: 3\n    tmers: {}\n'
+        '    state: {y: "{{ nome }}"}\n'
+    )
+    assert [f'{each.span.line}:{each.span.column}' for each in loaded.diagnostics] == [
+        '7:20',
+        '6:5',
+        '5:13',
+    ]
+    assert list(loaded.spec.nodes) == ['a_x']
+
+
+def test_a_filled_key_that_is_there_already_is_a_duplicate():
+    ((rule, message, place, text),) = faults('{rover: 1, "{{ name }}": 2}')
+    assert (rule, message) == ('duplicate-key', "the key 'rover' stands twice in one mapping")
+    assert (place, text) == ('7:18', '"{{ name }}"')
+
+
+@pytest.mark.parametrize(
+    ('state', 'name', 'place'),
+    [
+        ('x: "{{ nmae }}"', 'nmae', '7:14'),
+        ('x: {{ nmae }}', None, None),
+        ('x: "nmae {{ nmae }} nmae"', 'nmae', '7:19'),
+        ('x: "{{ count + nmae }}"', 'nmae', '7:22'),
+        ('x: "{{ name }} {{ am }}"', 'am', '7:25'),
+        ('x: |\n        one nmae\n        {{ nmae }}', 'nmae', '9:12'),
+        ('x: "one\n        {{ nmae }}"', 'nmae', '8:12'),
+        ('"{{ nmae }}": 1', 'nmae', '7:11'),
+        ('x: [1, "{{ nmae }}"]', 'nmae', '7:18'),
+    ],
+)
+def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
+    if name is None:
+        assert [each[0] for each in faults(state)] == ['bad-key']
+        return
+    assert faults(state) == [('undefined-name', f"'{name}' is not defined", place, name)]
+
+
+def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
+    helps = [each.help for each in load('{x: "{{ nmae }}", y: "{{ zzz }}"}').diagnostics]
+    assert helps == [
+        "did you mean 'name'?",
+        'in scope are: count, env, find, here, loud, name, range, rate',
+    ]
+    (finding,) = load_system_text('version: 1\nnodes: {}\ndescription: "{{ a }}"').diagnostics
+    assert finding.help == "declare it as an argument, under 'args'"
+
+
+@pytest.mark.parametrize(
+    'expression',
+    [
+        "''.__class__.__mro__",
+        'count.__class__',
+        'range.__globals__',
+        'name.format.__self__',
+        "'{0.__class__}'.format(name)",
+        "'{x.__class__}'.format_map({'x': name})",
+        "name|attr('__class__')",
+        '[].__init__.__globals__',
+    ],
+)
+def test_ways_out_of_the_sandbox_are_closed(expression):
+    ((rule, message, *_),) = faults(f'x: "{{{{ {expression} }}}}"')
+    assert rule == 'bad-expression'
+    assert 'unsafe' in message or 'has no attribute' in message or 'undefined' in message
+
+
+@pytest.mark.parametrize(
+    'name', ['self', 'lipsum(1)', 'cycler(1).next()', 'dict(a=1)', 'open', 'undefined']
+)
+def test_nothing_is_in_scope_that_is_not_promised(name):
+    assert [each[0] for each in faults(f'x: "{{{{ {name} }}}}"')] != []
+
+
+@pytest.mark.parametrize(
+    ('expression', 'message'),
+    [
+        ('', 'unexpected end of the expression'),
+        ('count +', 'unexpected end of the expression'),
+        ('count count', 'chunk after expression'),
+        ('1 / 0', 'the expression raised ZeroDivisionError: division by zero'),
+        ("count + 'a'", "unsupported operand type(s) for +: 'int' and 'str'"),
+        ('name.nothing', "'str object' has no attribute 'nothing'"),
+        ('[name.nothing]', "'str object' has no attribute 'nothing'"),
+        ('name.upper', 'the expression gives a '),
+        ('range(3)|pprint', "there is no filter 'pprint'"),
+        ('1 is odder', "there is no test 'odder'"),
+        ('{1: 2}', 'the expression gives a dict, which YAML has no place for'),
+        ('9 ** 99999', "the result of '**' is too large"),
+        ("'a' * 10 ** 12", "the result of '*' is too large"),
+        ('1' * 400, 'a number of 1326 bits fits no type of ROS'),
+    ],
+)
+def test_an_expression_that_fails_says_why(expression, message):
+    ((rule, found, place, _),) = faults(
+        f"x: '{{{{ {expression.replace(chr(39), chr(39) * 2)} }}}}'"
+    )
+    assert (rule, place) == ('bad-expression', '7:10')
+    assert message in found
+
+
+@pytest.mark.parametrize(
+    'text', ['{{', 'a {{ b', '{{ "', '{{ (', '{{ count }', '{{{ count }}', '{{ }} }}']
+)
+def test_an_expression_without_an_end_or_a_beginning_is_a_fault_not_a_crash(text):
+    assert [each[0] for each in faults(f"x: '{text}'")] == ['bad-expression']
+
+
+def test_no_odd_text_is_a_crash():
+    chance = random.Random(7)
+    pieces = ['{{', '}}', '{', '}', '{%', '%}', '{#', '-', '(', ')', '[', '"', '\\', ' ', 'name', '.', '|', '\r', '\n', '\0', 'é', '1', '**']  # fmt: skip
+    for _ in range(400):
+        text = ''.join(chance.choices(pieces, k=chance.randint(1, 12)))
+        loaded = load(f'x: {json.dumps(text)}')
+        assert loaded.spec is not None
+        assert {each.rule for each in loaded.diagnostics} <= {'bad-expression', 'undefined-name'}
+
+
+def test_what_could_not_be_evaluated_is_left_out_and_causes_no_more_faults():
+    text = (
+        'version: 1\nnodes: {n: {log_level: "{{ a }}", publishers: {p: "{{ b }}"}, '
+        'parameters: {q: {default: [1, "{{ c }}"], type: integer_array}}, '
+        'timers: {t: {period: "{{ d }}", publish: p, message: 1}}}}'
+    )
+    assert check(text) == [('undefined-name', 2)] * 4
+
+
+SAMPLED = """
+version: 1
+args: {level: {}, count: {type: integer}, kind: {type: string}, mode: {choices: [loud]}}
+nodes:
+  n:
+    log_level: "{{ level }}"
+    publishers: {p: "{{ kind }}", q: {type: std_msgs/msg/Int32, external: true}}
+    timers:
+      a: {period: "{{ 1 / (count - 1) }}", publish: q, message: 1}
+      b: {period: 1, behaviour: "behaviours.{{ kind }}:run"}
+      c: {period: 1, publish: "{{ kind }}", message: 1}
+    parameters: {r: {default: "{{ count }}", minimum: 10}}
+"""
+
+
+def check(text, words=None):
+    found = check_system(load_system_text(text, words=words), InterfaceCatalogue([]))
+    return [(each.rule, each.span.line) for each in found]
+
+
+def test_a_check_says_nothing_of_values_that_only_the_command_line_gives():
+    assert check(SAMPLED) == []
+
+
+def test_with_words_the_same_values_are_checked():
+    assert check(SAMPLED, ['loud', '1', 'x', 'loud']) == [
+        ('bad-value', 6),
+        ('bad-value', 7),
+        ('bad-expression', 9),
+        ('unknown-behaviour', 10),
+        ('unknown-publisher', 11),
+        ('bad-parameter', 12),
+    ]
+
+
+def test_a_check_takes_defaults_and_the_first_choice_as_they_are():
+    assert check(SAMPLED.replace('{{ level }}', '{{ mode }}')) == [('bad-value', 6)]
+
+
+def test_a_check_finds_what_is_wrong_whatever_the_value_is():
+    text = SAMPLED.replace('{{ level }}', '{{ level + nothing }}').replace('Int32', 'Int 32')
+    assert [rule for rule, _ in check(text)] == ['undefined-name', 'bad-value']
+
+
+WANTS = {
+    'executor': '{threads: "{{ v }}", shutdown_timeout: "{{ v }}"}',
+    'qos': '{p: {depth: "{{ v }}", history: "{{ v }}", deadline: "{{ v }}"}}',
+    'nodes': '{n: {use_sim_time: "{{ v }}", log_level: "{{ v }}", on_error: "{{ v }}", '
+    'parameter_services: "{{ v }}", rosout: "{{ v }}", '
+    'type_description_service: "{{ v }}", logger_services: "{{ v }}", '
+    'on_start: "{{ v }}", publishers: {a: "{{ v }}", b: {type: "{{ v }}"}}, '
+    'parameters: {c: {default: 1, read_only: "{{ v }}", minimum: "{{ v }}", type: "{{ v }}"}}, '
+    'timers: {t: {period: "{{ v }}", clock: "{{ v }}", behaviour: "b.{{ v }}:f"}}}}',
+}
+
+
+def test_the_schema_lets_editors_accept_expressions_for_numbers_words_and_types():
+    import yaml
+
+    validator = Draft202012Validator(json.loads(schema_path().read_text()))
+    data = {'version': 1} | {key: yaml.safe_load(text) for key, text in WANTS.items()}
+    assert list(validator.iter_errors(data)) == []
+    for wrong in ('{ v }', 'v }}', 'fast'):
+        text = json.dumps(data).replace('{{ v }}', wrong).replace(f'b.{wrong}:f', 'b:f')
+        # Those of the parameter are one.
+        assert len(list(validator.iter_errors(json.loads(text)))) == 18
+
+
+def test_with_the_values_in_place_the_schema_accepts_no_expression():
+    schema = without_templates(json.loads(schema_path().read_text()))
+    used = json.dumps({key: part for key, part in schema.items() if key != '$defs'})
+    used += json.dumps(
+        {name: part for name, part in schema['$defs'].items() if name != 'template'}
+    )
+    assert 'template"' not in used
+    # A value may be what an expression looks like.
+    text = 'version: 1\nargs: {v: {default: x}}\nnodes: {n: {timers: {t: {period: "{{ \'{{ v }}\' }}", behaviour: a:b}}}}'
+    (finding,) = load_system_text(text).diagnostics
+    assert finding.message == "expected a number, got '{{ v }}'"
+
+
+def test_editors_and_composer_agree_that_declarations_hold_no_expressions():
+    data = {'version': 1, 'nodes': {}, 'args': {'a': {'type': '{{ v }}'}}}
+    validator = Draft202012Validator(json.loads(schema_path().read_text()))
+    assert not validator.is_valid(data)
+    text = 'version: 1\nnodes: {}\nargs: {v: string, a: {type: "{{ v }}"}}\n'
+    assert [each.rule for each in load_system_text(text).diagnostics] == ['bad-value']
+
+
+@pytest.mark.parametrize('expression', ['range(conut)', 'range(2, conut)', 'env(conut)'])
+def test_an_undefined_name_in_a_call_is_one(expression):
+    (fault,) = load(f'x: "{{{{ {expression} }}}}"').diagnostics
+    assert (fault.rule, fault.message) == ('undefined-name', "'conut' is not defined")
+    assert fault.help == "did you mean 'count'?"
+
+
+@pytest.mark.parametrize(
+    ('expression', 'message'),
+    [
+        ('name | uper', "there is no filter 'uper' (did you mean 'upper'?)"),
+        ('name is definde', "there is no test 'definde' (did you mean 'defined'?)"),
+        ('name | xyzzy', "there is no filter 'xyzzy'"),
+    ],
+)
+def test_a_filter_or_test_that_is_not_there_comes_with_the_nearest(expression, message):
+    ((rule, said, *_),) = faults(f'x: "{{{{ {expression} }}}}"')
+    assert (rule, said) == ('bad-expression', message)

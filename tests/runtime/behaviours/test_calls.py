@@ -1,0 +1,99 @@
+"""The ledger of running behaviours, and the calls that keep it."""
+
+import threading
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.runtime.behaviours.calls import BehaviourCall, CallLedger
+
+
+def call_of(function, ledger, deliver=lambda _: None, failed=lambda owner, error: None):
+    return BehaviourCall("timer 'tick'", function, ledger, deliver=deliver, failed=failed)
+
+
+def test_a_running_call_tells_its_thread_its_begin_and_its_stack():
+    ledger = CallLedger()
+    seen = []
+    before = time.monotonic_ns()
+
+    def look_around():
+        (call,) = ledger.running()
+        seen.append((call, call.format_stack()))
+
+    assert call_of(look_around, ledger).run()
+    ((call, stack),) = seen
+    assert (call.owner, call.thread) == ("timer 'tick'", threading.get_ident())
+    assert before <= call.begun_ns <= time.monotonic_ns()
+    assert 'look_around' in stack
+    assert ledger.running() == []
+
+
+def test_a_running_coroutine_tells_where_it_waits():
+    ledger = CallLedger()
+
+    class Pause:
+        def __await__(self):
+            yield
+
+    async def behaviour():
+        await Pause()
+
+    coroutine = call_of(behaviour, ledger).as_callback()()
+    coroutine.send(None)
+    (call,) = ledger.running()
+    assert call.thread is None
+    assert 'in behaviour' in call.format_stack()
+    coroutine.close()
+    assert ledger.running() == []
+
+
+def test_a_call_that_raises_is_no_longer_running():
+    ledger, errors = CallLedger(), []
+    call = call_of(lambda: 1 / 0, ledger, failed=lambda owner, error: errors.append(error))
+    assert not call.run()
+    assert [type(error) for error in errors] == [ZeroDivisionError]
+    assert ledger.wait_until_idle(0.0)
+
+
+def test_waiting_for_idleness_ends_with_the_last_call():
+    ledger = CallLedger()
+    may_end = [threading.Event(), threading.Event()]
+    begun = threading.Barrier(3)
+
+    def work(event):
+        begun.wait(20.0)
+        event.wait(20.0)
+
+    threads = [
+        threading.Thread(target=call_of(work, ledger).run, args=(event,)) for event in may_end
+    ]
+    for thread in threads:
+        thread.start()
+    begun.wait(20.0)
+    idle = []
+    waiters = [
+        threading.Thread(target=lambda: idle.append(ledger.wait_until_idle(20.0)))
+        for _ in range(2)
+    ]
+    for waiter in waiters:
+        waiter.start()
+    may_end[0].set()
+    threads[0].join()
+    assert not ledger.wait_until_idle(0.0)
+    assert idle == []
+    may_end[1].set()
+    for thread in (*threads, *waiters):
+        thread.join(20.0)
+    assert idle == [True, True]
+
+
+def test_what_is_still_to_be_done_is_awaited_but_does_not_run():
+    ledger = CallLedger()
+    token = ledger.begin()
+    assert ledger.running() == []
+    assert not ledger.wait_until_idle(0.0)
+    ledger.end(token)
+    assert ledger.wait_until_idle(0.0)

@@ -1,0 +1,199 @@
+"""What subscriptions and timers miss because callbacks take too long is counted exactly."""
+
+import threading
+from contextlib import contextmanager
+from subprocess import PIPE
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import ROSClock
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from std_msgs.msg import Int32
+
+from composer.executor import Missed
+from tests.running import DEADLINE_SEC
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
+
+SENDER = """
+import sys, time
+import rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Int32
+
+rclpy.init()
+node = rclpy.create_node('sender')
+qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy[sys.argv[1]])
+publisher = node.create_publisher(Int32, 'numbers', qos)
+while not publisher.get_subscription_count():
+    time.sleep(0.01)
+sys.stdin.readline()
+for number in range(int(sys.argv[2])):
+    publisher.publish(Int32(data=number))
+sys.stdin.read()
+"""
+
+
+@contextmanager
+def spinning(executor):
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.shutdown(DEADLINE_SEC)
+        thread.join()
+
+
+class Slow:
+    """A subscription whose callback waits until it is let go."""
+
+    def __init__(self, node, reliability='RELIABLE', group=None, history='KEEP_LAST'):
+        self.heard = []
+        self.may_end = threading.Event()
+        profile = QoSProfile(
+            depth=10,
+            reliability=ReliabilityPolicy[reliability],
+            history=HistoryPolicy[history],
+        )
+        self.entity = node.create_subscription(
+            Int32, 'numbers', self.hear, profile, callback_group=group
+        )
+
+    def hear(self, message):
+        self.heard.append(message.data)
+        self.may_end.wait(60.0)
+
+
+def advertise(node, reliability, wait_for):
+    qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy[reliability])
+    publisher = node.create_publisher(Int32, 'numbers', qos)
+    wait_for(publisher.get_subscription_count, 'the subscription')
+    return publisher
+
+
+@pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
+def test_messages_that_a_full_queue_drops_are_overruns(node, executor, wait_for, reliability):
+    slow = Slow(node, reliability)
+    publisher = advertise(node, reliability, wait_for)
+    with spinning(executor):
+        publisher.publish(Int32(data=-1))
+        wait_for(lambda: slow.heard, 'the first message')
+        for number in range(100):
+            publisher.publish(Int32(data=number))
+        slow.may_end.set()
+        wait_for(lambda: slow.heard == [-1, *range(90, 100)], 'what was kept')
+        wait_for(lambda: executor.missed(node, slow.entity) == Missed(overruns=90), 'overruns')
+
+
+def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
+    slow = Slow(node)
+    publisher = advertise(node, 'RELIABLE', wait_for)
+    with spinning(executor):
+        publisher.publish(Int32(data=-1))
+        wait_for(lambda: slow.heard, 'the first message')
+        for number in range(100):
+            publisher.publish(Int32(data=number))
+        wait_for(lambda: executor.missed(node, slow.entity) == Missed(overruns=90), 'overruns')
+        slow.may_end.set()
+
+
+@pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
+def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
+    node, executor, wait_for, start_program, reliability
+):
+    slow = Slow(node, reliability)
+    sender = start_program('-c', SENDER, reliability, '200', stdin=PIPE)
+    wait_for(slow.entity.get_publisher_count, 'the publisher')
+    with spinning(executor):
+        wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
+        print('go', file=sender.stdin, flush=True)
+        wait_for(lambda: executor.missed(node, slow.entity).overruns, 'the first overrun')
+        slow.may_end.set()
+        wait_for(lambda: slow.heard[-1] == 199, 'the last message')
+        if reliability == 'RELIABLE':
+            wait_for(
+                lambda: executor.missed(node, slow.entity).overruns == 200 - len(slow.heard),
+                'the exact count',
+            )
+
+
+def test_subscriptions_that_keep_up_have_no_overruns(node, executor, wait_for):
+    slow = Slow(node)
+    slow.may_end.set()
+    publisher = advertise(node, 'RELIABLE', wait_for)
+    with spinning(executor):
+        for number in range(300):
+            publisher.publish(Int32(data=number))
+            wait_for(lambda: len(slow.heard) == number + 1, 'the message')  # noqa: B023
+        assert executor.missed(node, slow.entity) == Missed()
+
+
+def test_takes_of_reentrant_groups_are_no_overruns(node, executor, wait_for):
+    slow = Slow(node, group=ReentrantCallbackGroup(), history='KEEP_ALL')
+    publisher = advertise(node, 'RELIABLE', wait_for)
+    with spinning(executor):
+        for number in range(30):
+            publisher.publish(Int32(data=number))
+        wait_for(lambda: len(slow.heard) == 30, 'all at the same time')
+        slow.may_end.set()
+        assert executor.missed(node, slow.entity) == Missed()
+
+
+def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
+    clock = ROSClock()
+    clock._set_ros_time_is_active(True)
+    clock.set_ros_time_override(Time(seconds=100))
+    ticks = []
+    timer = node.create_timer(
+        1.0, lambda: ticks.append(clock.now().nanoseconds / 1e9), clock=clock
+    )
+
+    def leap_to(seconds, tick_count):
+        clock.set_ros_time_override(Time(nanoseconds=int(seconds * 1e9)))
+        wait_for(lambda: len(ticks) == tick_count, f'the tick at {seconds}')
+        return executor.missed(node, timer)
+
+    with spinning(executor):
+        wait_for(lambda: timer in executor_entities(executor, node), 'the timer to be seen')
+        assert leap_to(101.05, 1) == Missed()
+        assert leap_to(102.2, 2) == Missed(late_ticks=1)
+        assert leap_to(107.5, 3) == Missed(late_ticks=2, skipped_ticks=4)
+        assert leap_to(108.0, 4) == Missed(late_ticks=2, skipped_ticks=4)
+        timer.reset()
+        assert leap_to(109.0, 5) == Missed(late_ticks=2, skipped_ticks=4)
+
+
+def executor_entities(executor, node):
+    source = executor._engine.registry
+    return source._nodes[node].sources if node in source._nodes else {}
+
+
+def test_ticks_behind_a_slow_callback_of_their_group_are_late_and_skipped(
+    node, executor, wait_for
+):
+    slow = Slow(node)
+    ticks = []
+    timer = node.create_timer(0.05, lambda: ticks.append(1))
+    publisher = advertise(node, 'RELIABLE', wait_for)
+    with spinning(executor):
+        publisher.publish(Int32())
+        wait_for(lambda: slow.heard, 'the message')
+        before = executor.missed(node, timer)
+        count = len(ticks)
+        ended = threading.Timer(1.0, slow.may_end.set)
+        ended.start()
+        wait_for(lambda: len(ticks) > count, 'the next tick')
+        after = executor.missed(node, timer)
+        assert after.late_ticks > before.late_ticks
+        assert after.skipped_ticks - before.skipped_ticks >= 18
+
+
+def test_what_the_executor_does_not_know_has_missed_nothing(node, executor):
+    timer = node.create_timer(10.0, print, autostart=False)
+    assert executor.missed(node, timer) == Missed()
+    assert executor.missed(None, timer) == Missed()

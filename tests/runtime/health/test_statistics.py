@@ -1,0 +1,268 @@
+"""How entities fare: the numbers, and what a diagnostic status says of them."""
+
+import random
+import threading
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.validate_node_name import validate_node_name
+
+from composer.executor import Missed
+from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, RunningCall
+from composer.runtime.health.diagnostic_status import StatusWriter
+from composer.runtime.health.diagnostics_publisher import node_name
+from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthBoard
+
+
+def times_of(durations):
+    times = CallTimes()
+    for duration in durations:
+        times.add(duration)
+    return times
+
+
+DISTRIBUTIONS = {
+    'constant': lambda chance: 1_000_000,
+    'uniform': lambda chance: chance.randrange(10_000, 5_000_000),
+    'exponential': lambda chance: int(chance.expovariate(1 / 300_000)),
+    'log-normal': lambda chance: int(chance.lognormvariate(11.0, 2.0)),
+    'two peaks': lambda chance: 20_000 if chance.random() < 0.97 else 80_000_000,
+    'hours': lambda chance: chance.randrange(10**12, 10**14),
+}
+
+
+@pytest.mark.parametrize('share', [0.5, 0.9, 0.99, 1.0])
+@pytest.mark.parametrize('name', DISTRIBUTIONS)
+def test_percentiles_are_at_most_a_bucket_too_high(name, share):
+    chance = random.Random(7)
+    durations = sorted(DISTRIBUTIONS[name](chance) for _ in range(5000))
+    exact = durations[max(0, int(len(durations) * share) - 1)]
+    found = times_of(durations).percentile_ns(share)
+    assert exact <= found <= exact * 9 / 8 + 256
+
+
+def test_the_mean_and_the_maximum_are_exact():
+    times = times_of([100, 200, 3_000_000, 5])
+    assert (times.calls(), times.mean_ns(), times.most_ns) == (4, 3_000_305 / 4, 3_000_000)
+
+
+def test_every_duration_counts_in_one_bucket_that_holds_it():
+    for duration in [*range(20_000), *(2**power + 1 for power in range(15, 60))]:
+        times = times_of([duration, duration * 2 + 512])
+        assert duration <= times.percentile_ns(0.5) <= duration * 9 / 8 + 256
+
+
+def test_no_calls_have_no_times():
+    times = CallTimes()
+    assert (times.calls(), times.mean_ns(), times.percentile_ns(0.99)) == (0, 0.0, 0)
+
+
+def test_what_is_taken_begins_anew():
+    times = times_of([10_000, 20_000])
+    first = times.take()
+    times.add(7_000)
+    second = times.take()
+    assert (first.calls(), first.total_ns, first.most_ns) == (2, 30_000, 20_000)
+    assert (second.calls(), second.total_ns, second.most_ns) == (1, 7_000, 7_000)
+    assert times.calls() == 0
+
+
+def test_calls_of_several_threads_are_all_counted():
+    times = CallTimes()
+    taken = []
+    threads = [
+        threading.Thread(target=lambda: [times.add(n) for n in range(50_000)]) for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        taken.append(times.take())
+    taken.append(times.take())
+    assert sum(one.calls() for one in taken) == 200_000
+    assert sum(one.total_ns for one in taken) == 4 * sum(range(50_000))
+
+
+def test_a_report_tells_the_period_and_the_whole():
+    health = EntityHealth()
+    missed = Missed(overruns=3)
+    health.follow(lambda: missed)
+    health.times.add(1000)
+    health.note_error(ValueError('boom'))
+    first = health.report(1.0, 0.0)
+    assert (first.times.calls(), first.errors, first.last_error) == (1, 1, 'ValueError: boom')
+    assert (first.missed, first.all_missed) == (missed, missed)
+    health.times.add(1000)
+    second = health.report(2.0, 7.0)
+    assert (second.times.calls(), second.errors, second.last_error) == (1, 0, '')
+    assert (second.all_calls, second.all_errors) == (2, 1)
+    assert (second.missed, second.all_missed) == (Missed(), missed)
+    assert (second.period_sec, second.overdue_sec) == (2.0, 7.0)
+
+
+def test_an_error_that_cannot_be_shown_counts_too():
+    class MuteError(Exception):
+        def __str__(self):
+            raise ValueError
+
+    health = EntityHealth()
+    health.note_error(MuteError())
+    report = health.report(1.0, 0.0)
+    assert report.errors == 1
+    assert report.last_error == 'MuteError: <its __str__ raised ValueError>'
+
+
+def test_a_huge_error_that_ros_cannot_say_is_made_short_and_sayable():
+    health = EntityHealth()
+    health.note_error(ValueError('\udcff' * 3_000_000))
+    last_error = health.report(1.0, 0.0).last_error
+    assert len(last_error) < 5_000
+    assert last_error.encode()
+
+
+def test_counts_survive_that_the_node_is_built_anew():
+    board = HealthBoard()
+    old = board.entity('/a', "timer 'b'")
+    counts = [Missed(late_ticks=2)]
+    old.follow(lambda: counts[-1])
+    old.report(1.0, 0.0)
+    counts.append(Missed())  # Its timer has been destroyed.
+    assert old.report(1.0, 0.0).all_missed == Missed(late_ticks=2)
+    new = board.entity('/a', "timer 'b'")
+    new.follow(lambda: Missed(late_ticks=1, skipped_ticks=4))
+    report = new.report(1.0, 0.0)
+    assert report.all_missed == Missed(late_ticks=3, skipped_ticks=4)
+    assert report.missed == Missed(late_ticks=1, skipped_ticks=4)
+
+
+def test_the_board_knows_the_oldest_call_of_each_entity():
+    board = HealthBoard()
+    for owner in ("timer 'b'", "timer 'c'"):
+        board.entity('/a', owner)
+    running = [('/a', RunningCall("timer 'b'", begun_ns, 1)) for begun_ns in (9, 4, 6)]
+    reports = board.reports(1.0, [(node, call) for node, call in running], 4 + 2 * 10**9)
+    assert reports['/a', "timer 'b'"].overdue_sec == 2.0
+    assert reports['/a', "timer 'c'"].overdue_sec == 0.0
+
+
+def measured_call(function, times, failed=lambda owner, error: None):
+    return BehaviourCall(
+        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, times=times
+    )
+
+
+def test_calls_count_whether_they_raise_or_not():
+    times = CallTimes()
+    assert measured_call(lambda: None, times).run()
+    assert not measured_call(lambda: 1 / 0, times).run()
+    assert times.calls() == 2
+
+
+def test_coroutines_are_measured_to_their_end():
+    times = CallTimes()
+
+    class Pause:
+        def __await__(self):
+            yield
+
+    async def behaviour():
+        await Pause()
+
+    coroutine = measured_call(behaviour, times).as_callback()()
+    coroutine.send(None)
+    assert times.calls() == 0
+    with pytest.raises(StopIteration):
+        coroutine.send(None)
+    assert times.calls() == 1
+
+
+@pytest.mark.parametrize('system', ['robot', 'fleet.of-two rovers', 'größe', '2', 'x' * 300])
+def test_every_system_has_a_node_with_a_valid_name(system):
+    assert validate_node_name(node_name(system))
+    assert node_name('fleet.of-two rovers') == '_composer_fleet_of_two_rovers'
+
+
+def status_of(owner, durations=(), errors=(), missed=None, overdue_sec=0.0):
+    health = EntityHealth()
+    health.follow(lambda: missed or Missed())
+    for duration in durations:
+        health.times.add(duration)
+    for error in errors:
+        health.note_error(error)
+    return StatusWriter('/ns/talker', owner, 'robot').write(health.report(2.0, overdue_sec))
+
+
+def test_a_status_is_named_as_diagnostic_tools_expect_it():
+    status = status_of("timer 'tick'", [1_000_000] * 5)
+    assert (status.name, status.hardware_id) == ('/ns/talker: timer tick', 'robot')
+    assert (status.level, status.message) == (DiagnosticStatus.OK, 'called')
+    assert {pair.key: pair.value for pair in status.values} == {
+        'calls': '5',
+        'errors': '0',
+        'rate (Hz)': '2.50',
+        'callback time mean (ms)': '1.0000',
+        'callback time p99 (ms)': '1.0000',
+        'callback time max (ms)': '1.0000',
+        'late ticks': '0',
+        'skipped ticks': '0',
+    }
+
+
+def test_only_subscriptions_have_overruns_and_services_neither():
+    keys = {
+        owner: {pair.key for pair in status_of(owner).values}
+        for owner in ("subscription 'in'", "service 'ask'")
+    }
+    assert keys["subscription 'in'"] - keys["service 'ask'"] == {'queue overruns'}
+    assert not {'late ticks', 'skipped ticks', 'queue overruns'} & keys["service 'ask'"]
+
+
+@pytest.mark.parametrize(
+    ('owner', 'arguments', 'level', 'message'),
+    [
+        ("timer 'a'", {}, DiagnosticStatus.OK, 'not called'),
+        (
+            "timer 'a'",
+            {'missed': Missed(late_ticks=1, skipped_ticks=3)},
+            DiagnosticStatus.WARN,
+            '1 late tick; 3 skipped ticks',
+        ),
+        (
+            "subscription 'a'",
+            {'missed': Missed(overruns=2)},
+            DiagnosticStatus.WARN,
+            '2 messages dropped from the full queue',
+        ),
+        (
+            "service 'a'",
+            {'overdue_sec': 12.34},
+            DiagnosticStatus.WARN,
+            'a call has been running for 12.3 s',
+        ),
+        (
+            "timer 'a'",
+            {'errors': [KeyError('x'), ValueError('boom')], 'missed': Missed(late_ticks=2)},
+            DiagnosticStatus.ERROR,
+            '2 errors, last: ValueError: boom; 2 late ticks',
+        ),
+    ],
+)
+def test_the_level_and_the_message_tell_what_is_wrong(owner, arguments, level, message):
+    status = status_of(owner, **arguments)
+    assert (status.level, status.message) == (level, message)
+
+
+def test_a_status_is_right_again_when_the_period_was():
+    health = EntityHealth()
+    writer = StatusWriter('/a', "timer 'b'", 'robot')
+    health.note_error(ValueError('boom'))
+    assert writer.write(health.report(1.0, 0.0)).level == DiagnosticStatus.ERROR
+    health.times.add(3_000_000)
+    assert writer.write(health.report(1.0, 0.0)).level == DiagnosticStatus.OK
+    status = writer.write(health.report(1.0, 0.0))
+    values = {pair.key: pair.value for pair in status.values}
+    # Times are those of the last period with calls, the rate is that of the last period.
+    assert values['callback time mean (ms)'] == '3.0000'
+    assert (values['rate (Hz)'], values['errors']) == ('0.00', '1')

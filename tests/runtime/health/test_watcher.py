@@ -1,0 +1,25 @@
+"""A thread that looks at the system from time to time."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.runtime.health import watcher as watching
+from composer.runtime.health.watcher import Watch
+
+
+def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
+    logged, looks = [], []
+    monkeypatch.setattr(watching.system_logger, 'error', logged.append)
+
+    def look():
+        looks.append(1)
+        raise ValueError
+
+    watch = Watch('watch', look, 0.001)
+    watch.start()
+    wait_for(lambda: len(looks) > 3, 'looks after the first fault')
+    watch.stop()
+
+    assert len(logged) == 1
+    assert logged[0].endswith('\nValueError')

@@ -1,0 +1,318 @@
+"""Arrays in payloads, in the containers that people have them in."""
+
+import subprocess
+import sys
+from array import array
+from collections import deque
+from math import isnan
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovariance
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
+from std_msgs.msg import (
+    ByteMultiArray,
+    Float64MultiArray,
+    Int8MultiArray,
+    UInt8MultiArray,
+)
+from test_msgs.msg import Arrays, BoundedSequences, UnboundedSequences
+
+from composer.runtime.messages.payloads import PayloadError, converter_for
+
+pytestmark = pytest.mark.ros
+
+NUMBERS = {
+    'char': 'B',
+    'int8': 'b',
+    'uint8': 'B',
+    'int16': 'h',
+    'uint16': 'H',
+    'int32': 'i',
+    'uint32': 'I',
+    'int64': 'q',
+    'uint64': 'Q',
+    'float32': 'f',
+    'float64': 'd',
+}
+ALL_ARRAYS = pytest.mark.parametrize(
+    'message_class',
+    [Arrays, BoundedSequences, UnboundedSequences],
+)
+
+
+def convert(message_class: type, payload: object) -> Any:
+    return converter_for(message_class).convert(payload)
+
+
+def received(message: Any) -> Any:
+    return deserialize_message(serialize_message(message), type(message))
+
+
+def fault(message_class: type, payload: object) -> str:
+    with pytest.raises(PayloadError) as caught:
+        convert(message_class, payload)
+    return str(caught.value)
+
+
+@ALL_ARRAYS
+@pytest.mark.parametrize(('kind', 'code'), NUMBERS.items())
+@pytest.mark.parametrize('container', ['list', 'tuple', 'deque', 'array', 'numpy', 'other dtype'])
+def test_numbers_arrive_from_any_container(
+    message_class: type,
+    kind: str,
+    code: str,
+    container: str,
+) -> None:
+    items = [0, 1, 127]
+    given = {
+        'list': list,
+        'tuple': tuple,
+        'deque': deque,
+        'array': lambda _: array(code, items),
+        'numpy': lambda _: np.array(items, code),
+        'other dtype': lambda _: np.array(items, '>i8'),
+    }[container](items)  # type: ignore[operator]
+    message = received(convert(message_class, {f'{kind}_values': given}))
+    assert list(getattr(message, f'{kind}_values')) == items
+
+
+@ALL_ARRAYS
+def test_all_else_arrives_as_well(message_class: type) -> None:
+    message = received(
+        convert(
+            message_class,
+            {
+                'bool_values': np.array([True, False, True]),
+                'byte_values': [0, b'\x01', 255],
+                'string_values': ('a', 'b', 'ü'),
+                'basic_types_values': ({'int8_value': 1}, {}, {'bool_value': True}),
+            },
+        )
+    )
+    assert list(message.bool_values) == [True, False, True]
+    assert list(message.byte_values) == [b'\x00', b'\x01', b'\xff']
+    assert list(message.string_values) == ['a', 'b', 'ü']
+    assert [each.int8_value for each in message.basic_types_values] == [1, 0, 0]
+    assert [each.bool_value for each in message.basic_types_values] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    'octets',
+    [
+        b'\x00\xff',
+        bytearray(b'\x00\xff'),
+        memoryview(b'\x00\xff'),
+        array('B', [0, 255]),
+        memoryview(b'\x00x\xffx')[::2],
+        np.array([0, 255], np.uint8),
+        np.array([0, 255]),
+    ],
+)
+def test_octets_arrive_from_whatever_holds_octets(octets: object) -> None:
+    assert received(convert(CompressedImage, {'data': octets})).data.tobytes() == b'\x00\xff'
+    assert received(convert(ByteMultiArray, {'data': octets})).data == [b'\x00', b'\xff']
+    assert convert(Arrays, {'uint8_values': b'abc'}).uint8_values.tolist() == [97, 98, 99]
+
+
+@pytest.mark.parametrize(
+    ('given', 'got'),
+    [
+        (b'\x01', "bytes b'\\x01'"),
+        (bytearray(b'\x01'), "bytearray bytearray(b'\\x01')"),
+        ('a', "str 'a'"),
+        (5, 'int 5'),
+        (np.array(5), 'int 5'),
+        ({1}, 'set {1}'),
+        (None, 'None'),
+    ],
+)
+def test_what_holds_no_array_is_refused(given: object, got: str) -> None:
+    assert fault(Int8MultiArray, {'data': given}) == (
+        f'std_msgs/msg/Int8MultiArray: data: expected int8[], got {got}'
+    )
+
+
+def test_a_view_of_other_things_than_octets_is_refused() -> None:
+    view = memoryview(np.zeros(2, '>f8'))
+    for message_class in (UInt8MultiArray, Float64MultiArray, ByteMultiArray):
+        assert 'got memoryview <memory at' in fault(message_class, {'data': view})
+
+
+def test_a_matrix_is_laid_out_row_by_row() -> None:
+    matrix = np.arange(36.0).reshape(6, 6)
+    row_by_row = list(range(36))
+    message = received(convert(PoseWithCovariance, {'covariance': matrix}))
+    assert message.covariance.tolist() == row_by_row
+    turned = received(convert(PoseWithCovariance, {'covariance': matrix.T}))
+    assert turned.covariance.tolist() == matrix.T.ravel().tolist()
+    pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)[:, :, ::-1]
+    image = received(convert(Image, {'data': pixels}))
+    assert image.data.tolist() == pixels.ravel().tolist()
+    bools = np.array([[True, False, True]])
+    assert convert(Arrays, {'bool_values': bools}).bool_values == [True, False, True]
+
+
+def test_nested_lists_are_no_matrix() -> None:
+    assert fault(Float64MultiArray, {'data': [[1.0], [2.0]]}) == (
+        'std_msgs/msg/Float64MultiArray: data[0]: expected float64, got list [1.0]'
+    )
+
+
+def test_empty_arrays_have_no_items_of_a_wrong_type() -> None:
+    for empty in ([], (), np.array([]), np.zeros((0, 3)), np.array([], bool)):
+        assert convert(Int8MultiArray, {'data': empty}).data.tolist() == []
+
+
+@ALL_ARRAYS
+@pytest.mark.parametrize(
+    ('name', 'given', 'expected'),
+    [
+        ('int8', [0, 1, 128], '[2]: expected int8 (-128 to 127), got int 128'),
+        ('uint8', [0, -1, 1], '[1]: expected uint8 (0 to 255), got int -1'),
+        (
+            'uint64',
+            [0, 2**64, 1],
+            ('[1]: expected uint64 (0 to 18446744073709551615), got int 18446744073709551616'),
+        ),
+        ('int8', [0, True, 1], '[1]: expected int8, got bool True'),
+        ('int8', [0, 1.0, 1], '[1]: expected int8, got float 1.0'),
+        ('int8', np.array([0, 1, 128]), '[2]: expected int8 (-128 to 127), got int 128'),
+        ('uint8', np.array([0, -1, 1]), '[1]: expected uint8 (0 to 255), got int -1'),
+        ('int8', np.array([0.0, 1.0, 1.0]), '[0]: expected int8, got float 0.0'),
+        ('int8', np.array([True, False, True]), '[0]: expected int8, got bool True'),
+        ('int8', array('d', [0, 1, 2]), '[0]: expected int8, got float 0.0'),
+        ('float64', [0.0, 1, True], '[2]: expected float64, got bool True'),
+        ('float64', np.array([True, False, True]), '[0]: expected float64, got bool True'),
+        ('float64', [0.0, 1, '2'], "[2]: expected float64, got str '2'"),
+        ('float64', [0.0, 1, 10**400], '[2]: expected float64, got an integer beyond its range'),
+        ('float64', np.array([1j, 1, 1]), '[0]: expected float64, got complex 1j'),
+        ('float32', [0, 1e39, 1], '[1]: expected float32 (up to 3.402823e+38), got float 1e+39'),
+        (
+            'float32',
+            np.array([0, 1e39, 1]),
+            '[1]: expected float32 (up to 3.402823e+38), got float 1e+39',
+        ),
+        ('bool', [True, 1, True], '[1]: expected bool, got int 1'),
+        ('byte', [0, 256, 0], '[1]: expected byte (0 to 255), got int 256'),
+        ('byte', [0, b'ab', 0], "[1]: expected byte, got bytes b'ab'"),
+        ('string', ['a', 'b', 3], '[2]: expected string, got int 3'),
+        (
+            'basic_types',
+            [{}, {'int8_value': 300}, {}],
+            '[1].int8_value: expected int8 (-128 to 127), got int 300',
+        ),
+    ],
+)
+def test_the_first_wrong_item_is_named(
+    message_class: type,
+    name: str,
+    given: object,
+    expected: str,
+) -> None:
+    assert fault(message_class, {f'{name}_values': given}) == (
+        f'test_msgs/msg/{message_class.__name__}: {name}_values{expected}'
+    )
+
+
+@pytest.mark.parametrize('name', ['bool', 'byte', 'float32', 'uint8', 'string'])
+@pytest.mark.parametrize('container', [list, np.array])
+def test_the_number_of_items_is_checked(name: str, container: Any) -> None:
+    item: Any = {'bool': True, 'string': 'a'}.get(name, 1)
+    for message_class, length, bound in [
+        (Arrays, 2, '[3]'),
+        (Arrays, 4, '[3]'),
+        (BoundedSequences, 4, '[<=3]'),
+    ]:
+        assert fault(message_class, {f'{name}_values': container([item] * length)}) == (
+            f'test_msgs/msg/{message_class.__name__}: {name}_values: '
+            f'expected {name}{bound}, got {length} items'
+        )
+    shorter = convert(BoundedSequences, {f'{name}_values': container([item])})
+    assert len(getattr(shorter, f'{name}_values')) == 1
+
+
+def test_a_list_too_long_is_told_by_its_length_before_its_items() -> None:
+    assert fault(BoundedSequences, {'int8_values': ['a'] * 4}) == (
+        'test_msgs/msg/BoundedSequences: int8_values: expected int8[<=3], got 4 items'
+    )
+
+
+def test_infinities_and_nan_are_kept() -> None:
+    for given in ([float('inf'), float('nan'), 1], np.array([np.inf, np.nan, 1])):
+        ranges = received(convert(LaserScan, {'ranges': given})).ranges
+        assert ranges[0] == float('inf')
+        assert isnan(ranges[1])
+        assert ranges[2] == 1.0
+
+
+def test_numbers_of_a_message_stay_the_same_object() -> None:
+    image = Image(data=b'abc')
+    data = image.data
+    assert convert(Image, image).data is data
+    pose = PoseWithCovariance()
+    covariance = pose.covariance
+    assert convert(PoseWithCovariance, pose).covariance is covariance
+    names = ['a', 'b']
+    state = JointState(name=names)
+    assert convert(JointState, state).name is names
+
+
+def test_what_grew_in_a_message_is_checked() -> None:
+    message = BoundedSequences()
+    message.int8_values.append(1)
+    message.bool_values = [True] * 4
+    assert fault(BoundedSequences, message) == (
+        'test_msgs/msg/BoundedSequences: bool_values: expected bool[<=3], got 4 items'
+    )
+    message.bool_values = []
+    message.int8_values.extend([1, 2, 3, 4])
+    assert fault(BoundedSequences, message) == (
+        f'test_msgs/msg/BoundedSequences: int8_values: expected int8[<=3], '
+        f'got {len(message.int8_values)} items'
+    )
+
+
+def test_a_matrix_in_a_message_is_laid_out_before_rclpy_reads_beyond_it() -> None:
+    pose = PoseWithCovariance()
+    pose.covariance = np.arange(36.0).reshape(6, 6)
+    assert convert(PoseWithCovariance, pose) is pose
+    assert pose.covariance.shape == (36,)
+    assert received(pose).covariance.tolist() == list(range(36))
+    pose.covariance = np.zeros(9)
+    assert fault(PoseWithCovariance, pose) == (
+        'geometry_msgs/msg/PoseWithCovariance: covariance: expected float64[36], got 9 items'
+    )
+
+
+def test_octets_in_a_message_are_brought_into_the_form_that_subscribers_see() -> None:
+    message = ByteMultiArray(data=b'ab')
+    assert convert(ByteMultiArray, message).data == [b'a', b'b']
+    fixed = Arrays(byte_values=[1, 2, 3])
+    convert(Arrays, fixed)
+    assert received(fixed).byte_values == [b'\x01', b'\x02', b'\x03']
+
+
+def test_what_was_given_is_not_shared_with_the_message() -> None:
+    numbers = [1, 2]
+    pixels = np.zeros(2, np.uint8)
+    first = convert(Int8MultiArray, {'data': numbers})
+    second = convert(UInt8MultiArray, {'data': pixels})
+    numbers[0] = pixels[0] = 9
+    assert (first.data.tolist(), second.data.tolist()) == ([1, 2], [0, 0])
+
+
+def test_numpy_is_not_imported_for_messages_without_fixed_arrays() -> None:
+    code = (
+        'import sys\n'
+        'from std_msgs.msg import Float64MultiArray\n'
+        'from composer.runtime.messages.payloads import converter_for\n'
+        "converter_for(Float64MultiArray).convert({'data': [1, 2.5]})\n"
+        "assert 'numpy' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, '-c', code], check=True, timeout=200)

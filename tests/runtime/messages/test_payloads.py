@@ -1,0 +1,387 @@
+"""Payloads become messages; each test that converts also shows what a subscriber would get."""
+
+from collections import OrderedDict, UserDict
+from math import pi
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from builtin_interfaces.msg import Duration, Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point32, Polygon, PoseStamped, Twist, Vector3
+from rclpy.duration import Duration as RclpyDuration
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.time import Time as RclpyTime
+from std_msgs.msg import Bool, Byte, Char, Empty, Float64, Header, Int32, String
+from std_srvs.srv import SetBool, Trigger
+from test_msgs.action import NestedMessage
+from test_msgs.message_fixtures import get_test_msg
+from test_msgs.msg import BasicTypes, Builtins, Nested, Strings, WStrings
+from visualization_msgs.msg import Marker
+
+from composer.runtime.messages.payloads import PayloadError, converter_for
+
+pytestmark = pytest.mark.ros
+
+
+def convert(message_class: type, payload: object) -> Any:
+    return converter_for(message_class).convert(payload)
+
+
+def received(message: Any) -> Any:
+    return deserialize_message(serialize_message(message), type(message))
+
+
+def failure(message_class: type, payload: object) -> tuple[str, str | None]:
+    with pytest.raises(PayloadError) as caught:
+        convert(message_class, payload)
+    return str(caught.value), caught.value.help
+
+
+@pytest.mark.parametrize(
+    ('message_class', 'payload', 'data'),
+    [
+        (String, 'hello', 'hello'),
+        (String, '', ''),
+        (Bool, True, True),
+        (Int32, -5, -5),
+        (Float64, 2.5, 2.5),
+        (Float64, 2, 2.0),
+        (Byte, 7, b'\x07'),
+        (Byte, b'\x07', b'\x07'),
+        (Char, 7, 7),
+    ],
+)
+def test_a_bare_value_is_the_one_field(message_class: type, payload: object, data: object) -> None:
+    message = received(convert(message_class, payload))
+    assert type(message) is message_class
+    assert message.data == data
+    assert type(message.data) is type(data)
+
+
+@pytest.mark.parametrize('mapping', [dict, OrderedDict, UserDict])
+def test_a_mapping_names_fields_and_leaves_the_rest_at_their_defaults(mapping: type) -> None:
+    message = received(convert(Twist, mapping({'linear': mapping(x=1, z=0.5)})))
+    assert message == Twist(linear=Vector3(x=1.0, y=0.0, z=0.5))
+
+
+def test_a_mapping_names_the_fields_of_the_message_itself_even_where_there_is_one() -> None:
+    assert convert(String, {'data': 'x'}) == String(data='x')
+    assert failure(Polygon, {'x': 1}) == (
+        "geometry_msgs/msg/Polygon has no field 'x'",
+        'its fields are points',
+    )
+
+
+def test_nested_messages_are_given_in_all_three_ways() -> None:
+    status = convert(
+        DiagnosticStatus,
+        {
+            'level': 1,
+            'values': [KeyValue(key='a', value='1'), {'key': 'b'}],
+        },
+    )
+    assert received(status) == DiagnosticStatus(
+        level=b'\x01',
+        values=[KeyValue(key='a', value='1'), KeyValue(key='b')],
+    )
+    nested = convert(NestedMessage.Goal, {'nested_field_no_pkg': {'duration_value': {'sec': 3}}})
+    assert nested.nested_field_no_pkg.duration_value == Duration(sec=3)
+    assert convert(Nested, BasicTypes(int32_value=5)) == (
+        convert(Nested, {'basic_types_value': {'int32_value': 5}})
+    )
+
+
+def test_a_bare_list_is_the_one_array() -> None:
+    polygon = received(convert(Polygon, [{'x': 1}, Point32(y=2.0)]))
+    assert polygon == Polygon(points=[Point32(x=1.0), Point32(y=2.0)])
+
+
+@pytest.mark.parametrize('message_class', [Empty, Trigger.Request])
+@pytest.mark.parametrize('payload', [{}, None])
+def test_an_empty_message_is_an_empty_mapping_or_none(
+    message_class: type,
+    payload: object,
+) -> None:
+    assert convert(message_class, payload) == message_class()
+
+
+def test_the_parts_of_services_and_actions_are_messages_too() -> None:
+    assert convert(SetBool.Request, True) == SetBool.Request(data=True)
+    assert convert(SetBool.Response, {'success': True, 'message': 'on'}) == (
+        SetBool.Response(success=True, message='on')
+    )
+
+
+def test_the_times_of_rclpy_stand_for_their_messages() -> None:
+    stamp = RclpyTime(seconds=5, nanoseconds=7)
+    assert convert(Time, stamp) == Time(sec=5, nanosec=7)
+    assert convert(Header, {'stamp': stamp}) == Header(stamp=Time(sec=5, nanosec=7))
+    lifetime = RclpyDuration(nanoseconds=-1)
+    assert convert(Marker, {'lifetime': lifetime}).lifetime == Duration(sec=-1, nanosec=999999999)
+    assert failure(Marker, {'lifetime': stamp}) == (
+        (
+            'visualization_msgs/msg/Marker: lifetime: expected builtin_interfaces/msg/Duration, '
+            'got builtin_interfaces/msg/Time'
+        ),
+        'give its fields by name: sec, nanosec',
+    )
+
+
+def test_a_time_beyond_its_message_is_refused() -> None:
+    assert failure(Header, {'stamp': RclpyTime(seconds=2**32)})[0] == (
+        'std_msgs/msg/Header: stamp.sec: expected int32 (-2147483648 to 2147483647), '
+        'got int 4294967296'
+    )
+
+
+def test_a_message_is_returned_itself() -> None:
+    twist = Twist(linear=Vector3(x=1.0))
+    linear = twist.linear
+    assert convert(Twist, twist) is twist
+    assert twist.linear is linear
+    given = {'linear': linear}
+    assert convert(Twist, given).linear is linear
+
+
+@pytest.mark.parametrize(
+    'name',
+    [
+        'Arrays',
+        'BasicTypes',
+        'BoundedPlainSequences',
+        'BoundedSequences',
+        'Builtins',
+        'Constants',
+        'Defaults',
+        'Empty',
+        'MultiNested',
+        'Nested',
+        'Strings',
+        'UnboundedSequences',
+        'WStrings',
+    ],
+)
+def test_a_right_message_of_any_type_is_not_changed(name: str) -> None:
+    messages, originals = get_test_msg(name), get_test_msg(name)
+    assert messages
+    for message, original in zip(messages, originals, strict=True):
+        fields = {each: getattr(message, each) for each in message.get_fields_and_field_types()}
+        assert convert(type(message), message) is message
+        assert message == original
+        for field, value in fields.items():
+            assert getattr(message, field) is value, field
+
+
+def test_what_a_message_holds_in_another_form_is_replaced_in_place() -> None:
+    number = Float64(data=5)
+    assert received(number).data != 5.0  # What rclpy does with an int in a float64 field.
+    assert convert(Float64, number) is number
+    assert type(number.data) is float
+    assert received(number).data == 5.0
+
+    pose = PoseStamped()
+    pose.pose.position.x = 1
+    assert convert(PoseStamped, pose) is pose
+    assert received(pose).pose.position.x == 1.0
+
+    status = DiagnosticStatus(values=(KeyValue(key='a'),))
+    convert(DiagnosticStatus, status)
+    assert type(status.values) is list
+
+
+@pytest.mark.parametrize(
+    ('message', 'fault'),
+    [
+        (String(data=5), 'std_msgs/msg/String: data: expected string, got int 5'),
+        (
+            Int32(data=2**31),
+            (
+                'std_msgs/msg/Int32: data: expected int32 (-2147483648 to '
+                '2147483647), got int 2147483648'
+            ),
+        ),
+        (Int32(data=1.0), 'std_msgs/msg/Int32: data: expected int32, got float 1.0'),
+        (Bool(data=1), 'std_msgs/msg/Bool: data: expected bool, got int 1'),
+        (
+            Twist(linear=None),
+            ('geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, got None'),
+        ),
+        (
+            Twist(linear=Vector3(y='1')),
+            ("geometry_msgs/msg/Twist: linear.y: expected float64, got str '1'"),
+        ),
+        (
+            Polygon(points=[Point32(), Point32(z=None)]),
+            'geometry_msgs/msg/Polygon: points[1].z: expected float32, got None',
+        ),
+    ],
+)
+def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message: object, fault: str) -> None:
+    assert failure(type(message), message)[0] == fault
+
+
+@pytest.mark.parametrize(
+    ('message_class', 'payload', 'fault', 'advice'),
+    [
+        (
+            Twist,
+            {'liner': {}},
+            "geometry_msgs/msg/Twist has no field 'liner'",
+            "did you mean 'linear'? its fields are linear, angular",
+        ),
+        (
+            Twist,
+            {'linear': {'w': 1}},
+            "geometry_msgs/msg/Twist: linear: geometry_msgs/msg/Vector3 has no field 'w'",
+            'its fields are x, y, z',
+        ),
+        (
+            Twist,
+            {'linear': {'x': 'fast'}},
+            "geometry_msgs/msg/Twist: linear.x: expected float64, got str 'fast'",
+            None,
+        ),
+        (
+            Twist,
+            {3: 1},
+            'geometry_msgs/msg/Twist has no field 3',
+            'its fields are linear, angular',
+        ),
+        (
+            Twist,
+            1.0,
+            'expected geometry_msgs/msg/Twist, got float 1.0',
+            'give its fields by name: linear, angular',
+        ),
+        (
+            Twist,
+            None,
+            'expected geometry_msgs/msg/Twist, got None',
+            'give its fields by name: linear, angular',
+        ),
+        (
+            Twist,
+            {'linear': [1, 2, 3]},
+            (
+                'geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, '
+                'got list [1, 2, 3]'
+            ),
+            'give its fields by name: x, y, z',
+        ),
+        (
+            Twist,
+            Vector3(),
+            'expected geometry_msgs/msg/Twist, got geometry_msgs/msg/Vector3',
+            'give its fields by name: linear, angular',
+        ),
+        (
+            String,
+            Int32(),
+            'expected std_msgs/msg/String, got std_msgs/msg/Int32',
+            'give its fields by name: data',
+        ),
+        (String, None, 'std_msgs/msg/String: data: expected string, got None', None),
+        (
+            String,
+            String,
+            (
+                'std_msgs/msg/String: data: expected string, got Metaclass_String '
+                "<class 'std_msgs.msg._string.String'>"
+            ),
+            None,
+        ),
+        (Empty, 0, 'expected std_msgs/msg/Empty, got int 0', 'it has no fields: write {}'),
+        (
+            Empty,
+            {'structure_needs_at_least_one_member': 0},
+            "std_msgs/msg/Empty has no field 'structure_needs_at_least_one_member'",
+            'it has no fields',
+        ),
+        (
+            Polygon,
+            [{'x': 1}, {'x': True}],
+            'geometry_msgs/msg/Polygon: points[1].x: expected float32, got bool True',
+            None,
+        ),
+        (
+            Polygon,
+            Vector3(),
+            (
+                'geometry_msgs/msg/Polygon: points: expected '
+                'geometry_msgs/msg/Point32[], got geometry_msgs/msg/Vector3'
+            ),
+            None,
+        ),
+        (
+            Strings,
+            {'bounded_string_value': 'x' * 23},
+            'test_msgs/msg/Strings: bounded_string_value: expected string<=22, got text of 23 bytes',
+            None,
+        ),
+    ],
+)
+def test_a_fault_names_message_field_and_both_types(
+    message_class: type,
+    payload: object,
+    fault: str,
+    advice: str | None,
+) -> None:
+    assert failure(message_class, payload) == (fault, advice)
+
+
+def test_an_error_carries_type_and_path_for_programs() -> None:
+    with pytest.raises(PayloadError) as caught:
+        convert(Polygon, [{}, {'x': True}])
+    assert caught.value.type_name == 'geometry_msgs/msg/Polygon'
+    assert caught.value.path == ('points', 1, 'x')
+
+
+def test_text_arrives_as_it_was_given() -> None:
+    text = 'Hellö wörld! ハロー 😀'
+    assert received(convert(String, text)).data == text
+    wide = received(
+        convert(
+            WStrings,
+            {
+                'wstring_value': 'a\0😀',
+                'array_of_wstrings': ('ü', '', 'ハ'),
+            },
+        )
+    )
+    assert wide.wstring_value == 'a\0😀'
+    assert list(wide.array_of_wstrings) == ['ü', '', 'ハ']
+
+
+def test_every_kind_of_single_value_arrives_as_it_was_given() -> None:
+    values: dict[str, Any] = {
+        'bool_value': True,
+        'byte_value': 255,
+        'char_value': 255,
+        'float32_value': 0.5,
+        'float64_value': pi,
+        'int8_value': -128,
+        'uint8_value': 255,
+        'int16_value': -(2**15),
+        'uint16_value': 2**16 - 1,
+        'int32_value': -(2**31),
+        'uint32_value': 2**32 - 1,
+        'int64_value': -(2**63),
+        'uint64_value': 2**64 - 1,
+    }
+    message = received(convert(BasicTypes, values))
+    for name, value in values.items():
+        assert getattr(message, name) == (b'\xff' if name == 'byte_value' else value), name
+
+
+def test_a_given_mapping_is_not_changed() -> None:
+    payload = {'linear': {'x': 1}, 'angular': Vector3()}
+    convert(Twist, payload)
+    assert payload == {'linear': {'x': 1}, 'angular': Vector3()}
+
+
+def test_a_converter_is_compiled_once() -> None:
+    assert converter_for(Builtins) is converter_for(Builtins)
+    assert converter_for(Builtins) is not converter_for(Twist)

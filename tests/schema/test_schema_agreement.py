@@ -1,0 +1,214 @@
+"""What an editor accepts by the schema, Composer accepts, and the other way round."""
+
+import itertools
+import json
+import math
+import random
+import re
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+
+from composer.language.pipeline import load_system_text
+from composer.schema.compiler import SchemaCompiler
+from composer.schema.structure import schema_path, without_templates
+from composer.schema.validator import create_validator
+
+SCHEMA = json.loads(schema_path().read_text())
+EDITOR = Draft202012Validator(SCHEMA)
+PLAIN = without_templates(SCHEMA)
+NAMES = st.sampled_from(['a', 'b', 'left_wheel', 'x-note', 'type', 'nodes', 'ä', ''])
+NUMBERS = st.one_of(
+    st.integers(-2, 12),
+    st.sampled_from([0.5, 1.0, 10.0, -1.5, 2**31, 2**70, 1e300, 1e-9, 86400, 86401, 1024.0, 1025]),
+)
+WORDS = st.sampled_from(
+    ['a', '', 'a.b:c', 'a:b', 'std_msgs/msg/String', 'std_srvs/srv/Empty', 'a/action/B', 'a/msg/b c',
+     'sensor_data', 'infinite', 'keep_all', 'log', 'ros', 'bool', 'string_array', 'é.b:c', 'a:b:c']
+)  # fmt: skip
+SCALARS = st.one_of(NUMBERS, WORDS, st.booleans(), st.none())
+ANYTHING = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(NAMES, inner, max_size=2),
+    max_leaves=4,
+)
+
+
+def values(schema):
+    """Return data that a schema mostly accepts."""
+    if '$ref' in schema:
+        name = schema['$ref'].rpartition('/')[2]
+        return st.deferred(lambda: values(PLAIN['$defs'][name]))
+    for key in ('oneOf', 'anyOf'):
+        branches = [each for each in schema.get(key, ()) if set(each) != {'required'}]
+        if branches:
+            return st.one_of(*map(values, branches))
+    if 'enum' in schema:
+        return st.sampled_from(schema['enum'])
+    if 'const' in schema:
+        return st.just(schema['const'])
+    return _BY_TYPE.get(str(schema.get('type')), lambda _: ANYTHING)(schema)
+
+
+def mappings(schema):
+    required = {key: values(schema['properties'][key]) for key in schema.get('required', ())}
+    # What repeats or leaves out entries is evaluated before the schema is asked.
+    known = {
+        key: part
+        for key, part in schema.get('properties', {}).items()
+        if key not in ('foreach', 'when')
+    }
+    optional = {key: values(part) for key, part in known.items() if key not in required}
+    rest = schema.get('additionalProperties')
+    if isinstance(rest, dict):
+        return st.dictionaries(NAMES, values(rest), max_size=2)
+    if not known:
+        return st.dictionaries(NAMES, ANYTHING, max_size=2)
+    # All optional keys at once are rarely right, and none of them tells little.
+    few = st.lists(st.sampled_from(sorted(optional)), max_size=4, unique=True) if optional else st.just([])  # fmt: skip
+    chosen = few.flatmap(lambda keys: st.fixed_dictionaries({key: optional[key] for key in keys}))
+    return st.builds(lambda one, other: one | other, st.fixed_dictionaries(required), chosen)
+
+
+_BY_TYPE = {
+    'object': mappings,
+    'array': lambda schema: st.lists(values(schema.get('items', {})), max_size=3),
+    'string': lambda _: WORDS,
+    'number': lambda _: NUMBERS,
+    'integer': lambda _: NUMBERS,
+    'boolean': lambda _: st.booleans(),
+}
+
+
+def places(data, path=()):
+    inner = enumerate(data) if isinstance(data, list) else ()
+    for key, value in list(data.items() if isinstance(data, dict) else inner):
+        yield data, key
+        yield from places(value, (*path, key))
+
+
+@st.composite
+def documents(draw):
+    """Return a document that is right, or wrong in a place or two."""
+    data = draw(values(PLAIN))
+    chance = random.Random(draw(st.integers(0, 2**32)))
+    for _ in range(draw(st.integers(0, 2))):
+        found = list(places(data))
+        if found:
+            container, key = chance.choice(found)
+            choice = chance.randrange(4)
+            if choice == 0:
+                del container[key]
+            elif choice == 1 and isinstance(container, dict):
+                container[f'{key}s'] = container[key]
+            else:
+                container[key] = draw(ANYTHING)
+    return data
+
+
+def composer_accepts(data):
+    loaded = load_system_text(json.dumps(data))
+    structural = {'missing-key', 'unknown-key', 'wrong-type', 'bad-value', 'out-of-range', 'conflicting-keys', 'unsupported-version'}  # fmt: skip
+    others = {'bad-argument-declaration', 'missing-include', 'unknown-qos-profile'}
+    assert {each.rule for each in loaded.diagnostics} <= structural | others
+    assert loaded.spec is not None
+    return not any(each.rule in structural for each in loaded.diagnostics)
+
+
+SETTINGS = settings(
+    max_examples=200, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+)
+
+
+@SETTINGS
+@given(documents())
+def test_an_editor_and_composer_have_the_same_verdict(data):
+    assert composer_accepts(data) == EDITOR.is_valid(data)
+
+
+@SETTINGS
+@given(documents())
+def test_quick_acceptance_has_the_verdict_of_the_validator(data):
+    compiler = SchemaCompiler(PLAIN['$defs'])
+    validator = Draft202012Validator(PLAIN)
+    assert compiler.compile(PLAIN)(data) == validator.is_valid(data)
+    # With what is right passed over, the same faults come out.
+    assert {fault_of(each) for each in create_validator(PLAIN, compiler).iter_errors(data)} == {
+        fault_of(each) for each in validator.iter_errors(data)
+    }
+
+
+def fault_of(error):
+    return tuple(error.absolute_path), error.validator, error.message
+
+
+SAMPLES = {
+    'period': 1, 'rate': 2, 'behaviour': 'a:b', 'with': {'x': 1}, 'publish': 'a', 'message': {}, 'type': 'a/msg/B',
+    'clock': 'ros', 'default': 1, 'choices': [1], 'minimum': 0, 'concurrency': 'queue', 'accept': 'a:b', 'profile': 'a',
+}  # fmt: skip
+KINDS_OF_TYPES = {'service': 'srv', 'action': 'action', 'action_client': 'action'}
+OF_A_NODE = [
+    'subscription',
+    'timer',
+    'service',
+    'action',
+    'publisher',
+    'parameter',
+    'action_client',
+]
+
+
+@pytest.mark.parametrize('kind', OF_A_NODE)
+def test_every_choice_of_keys_has_one_verdict(kind):
+    definition = PLAIN['$defs'][kind]
+    known = definition.get('properties') or definition['oneOf'][-1]['properties']
+    samples = SAMPLES | {'type': f'a/{KINDS_OF_TYPES.get(kind, "msg")}/B'}
+    samples |= {'type': 'integer'} if kind == 'parameter' else {}
+    keys = [key for key in samples if key in known]
+    chosen = itertools.chain.from_iterable(
+        itertools.combinations(keys, count) for count in range(len(keys) + 1)
+    )
+    verdicts = set()
+    for names in chosen:
+        entity = {key: samples[key] for key in names}
+        data = {'version': 1, 'nodes': {'n': {f'{kind}s': {'e': entity}}}}
+        verdict = EDITOR.is_valid(data)
+        assert composer_accepts(data) == verdict, names
+        verdicts.add(verdict)
+    assert verdicts == {True, False}
+
+
+def test_documents_are_right_and_wrong():
+    verdicts = []
+
+    @settings(SETTINGS, max_examples=200)
+    @given(documents())
+    def collect(data):
+        verdicts.append(EDITOR.is_valid(data))
+
+    collect()
+    assert 10 < sum(verdicts) < len(verdicts) - 10
+
+
+@pytest.mark.parametrize('number', [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize('key', ['period', 'rate'])
+def test_no_period_is_endless(key, number):
+    compiler = SchemaCompiler(PLAIN['$defs'])
+    timer = {key: number, 'behaviour': 'a:b'}
+    assert not compiler.compile_reference('#/$defs/timer')(timer)
+
+
+def test_a_keyword_without_an_acceptor_is_refused():
+    with pytest.raises(ValueError, match=re.escape("no acceptor for the keywords ['maxLength']")):
+        SchemaCompiler({}).compile({'type': 'string', 'maxLength': 3})
+
+
+def test_values_that_equal_each_other_in_python_are_not_the_same():
+    accepts = SchemaCompiler({}).compile
+    assert accepts({'const': 1})(1.0)
+    assert not accepts({'const': 1})(True)
+    assert not accepts({'enum': [True]})(1)
+    assert not accepts({'type': 'integer'})(True)
+    assert accepts({'type': 'integer'})(2.0)

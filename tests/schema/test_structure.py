@@ -1,0 +1,442 @@
+"""The structure of a file: what its schema says of it, in the words of the language."""
+
+import json
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from composer.language.pipeline import load_system_text
+from composer.schema.schema_file import schema_path
+
+HEAD = 'version: 1\n'
+
+
+def faults(text):
+    """Return rule, message, place and help of all that is wrong with the structure of a text."""
+    return [
+        (finding.rule, finding.message, f'{finding.span.line}:{finding.span.column}', finding.help)
+        for finding in load_system_text(text).diagnostics
+    ]
+
+
+def node_faults(text):
+    """Return the faults of a node with this content, without their places."""
+    return [fault[:2] + fault[3:] for fault in faults(f'{HEAD}nodes: {{rover: {text}}}')]
+
+
+def test_the_schema_is_one():
+    schema = json.loads(schema_path().read_text())
+    Draft202012Validator.check_schema(schema)
+
+
+def test_the_schema_describes_every_key():
+    def keys(schema):
+        if isinstance(schema, dict):
+            yield from schema.get('properties', {}).items()
+            for value in schema.values():
+                yield from keys(value)
+        elif isinstance(schema, list):
+            for value in schema:
+                yield from keys(value)
+
+    schema = json.loads(schema_path().read_text())
+    undescribed = [
+        name
+        for name, key in keys(schema)
+        if 'description' not in key
+        and 'description' not in schema['$defs'].get(key.get('$ref', '').rpartition('/')[2], {})
+    ]
+    assert undescribed == []
+
+
+def test_a_right_file_has_no_faults():
+    assert faults(HEAD + 'nodes: {rover: {}}\nx-any: [thing]\n') == []
+
+
+@pytest.mark.parametrize(
+    ('text', 'fault'),
+    [
+        ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', None)),
+        (
+            'version: 1',
+            ('missing-key', "'nodes' or 'processes' or 'include' is missing", '1:1', None),
+        ),
+        (
+            'version: 2\nnodes: {}',
+            (
+                'unsupported-version',
+                'version 2 is not known; this Composer reads version 1',
+                '1:10',
+                None,
+            ),
+        ),
+        (
+            'version: "1"\nnodes: {}',
+            (
+                'unsupported-version',
+                "version '1' is not known; this Composer reads version 1",
+                '1:10',
+                None,
+            ),
+        ),
+        (
+            'version: true\nnodes: {}',
+            (
+                'unsupported-version',
+                'version true is not known; this Composer reads version 1',
+                '1:10',
+                None,
+            ),
+        ),
+        (
+            HEAD + 'nodes: {}\nexecutor: {X-any: 1}',
+            (
+                'unknown-key',
+                "unknown key 'X-any' in executor",
+                '3:12',
+                'the keys are: shutdown_timeout, threads',
+            ),
+        ),
+        (HEAD + 'nodes: []', ('wrong-type', 'expected a mapping, got an empty list', '2:8', None)),
+        (
+            HEAD + 'nodes:\n',
+            (
+                'wrong-type',
+                'expected a mapping, got nothing',
+                '2:7',
+                'write {} for an empty mapping, or remove the key',
+            ),
+        ),
+        (
+            HEAD + 'nodes: {}\nexecutor: {threads: 1.5}',
+            ('wrong-type', 'expected an integer, got 1.5', '3:21', None),
+        ),
+        (
+            HEAD + 'nodes: {}\nexecutor: {threads: 2000}',
+            ('out-of-range', 'expected at most 1024, got 2000', '3:21', None),
+        ),
+        (
+            HEAD + 'nodes: {}\nexecutor: {shutdown_timeout: .nan}',
+            ('out-of-range', 'expected at most 86400, got nan', '3:30', None),
+        ),
+        (
+            HEAD + 'nodes: {}\ndefaults: {namespace: 3}',
+            ('wrong-type', 'expected a string, got 3', '3:23', None),
+        ),
+    ],
+)
+def test_a_fault_of_the_file_is_named_and_placed(text, fault):
+    assert faults(text) == [fault]
+
+
+ONE_OF_LEVELS = 'expected one of debug, info, warn, error, fatal; got '
+A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
+
+
+@pytest.mark.parametrize(
+    ('text', 'fault'),
+    [
+        (
+            '{tmers: {}}',
+            ('unknown-key', "unknown key 'tmers' in node 'rover'", "did you mean 'timers'?"),
+        ),
+        ('{log_level: WARN}', ('bad-value', ONE_OF_LEVELS + "'WARN'", "did you mean 'warn'?")),
+        ('{log_level: loud}', ('bad-value', ONE_OF_LEVELS + "'loud'", None)),
+        ('{log_level: 3}', ('bad-value', ONE_OF_LEVELS + '3', None)),
+        ('{use_sim_time: 1}', ('wrong-type', 'expected true or false, got 1', None)),
+        ('{remap: {a: 1}}', ('wrong-type', 'expected a string, got 1', None)),
+        ('{on_start: tick}', ('bad-value', "expected package.module:function; got 'tick'", None)),
+        (
+            '{on_start: "a:b:c"}',
+            ('bad-value', "expected package.module:function; got 'a:b:c'", None),
+        ),
+        ('{on_start: [a:b]}', ('wrong-type', 'expected a string or a mapping, got a list', None)),
+        (
+            '{on_start: {with: {}}}',
+            ('missing-key', "the key 'behaviour' is missing in behaviour 'on_start'", None),
+        ),
+        (
+            '{publishers: {a: std_msgs/String}}',
+            ('bad-value', A_TYPE + "'std_msgs/String'", "did you mean 'std_msgs/msg/String'?"),
+        ),
+        (
+            '{publishers: {a: {type: std_msgs/srv/Empty}}}',
+            ('bad-value', A_TYPE + "'std_msgs/srv/Empty'", None),
+        ),
+        (
+            '{publishers: {a: {}}}',
+            ('missing-key', "the key 'type' is missing in publisher 'a'", None),
+        ),
+        (
+            '{publishers: {a: }}',
+            ('wrong-type', 'expected a string or a mapping, got nothing', None),
+        ),
+        (
+            '{subscriptions: {a: {type: a/msg/B}}}',
+            ('missing-key', "'behaviour' or 'publish' is missing in subscription 'a'", None),
+        ),
+        (
+            '{subscriptions: {a: {type: a/msg/B, publish: b, with: {c: 1}}}}',
+            ('missing-key', "'with' needs 'behaviour' beside it", None),
+        ),
+        (
+            '{timers: {a: {behaviour: b:c}}}',
+            ('missing-key', "'period' or 'rate' is missing in timer 'a'", None),
+        ),
+        (
+            '{timers: {a: {period: 1}}}',
+            (
+                'missing-key',
+                "'behaviour' or 'publish' and 'message' are missing in timer 'a'",
+                None,
+            ),
+        ),
+        (
+            '{timers: {a: {period: 1, publish: b}}}',
+            ('missing-key', "'behaviour' or 'message' is missing in timer 'a'", None),
+        ),
+        (
+            '{timers: {a: {rate: 1, period: 1, behaviour: b:c}}}',
+            (
+                'conflicting-keys',
+                "'period' and 'rate' exclude each other in timer 'a'",
+                'keep one of them',
+            ),
+        ),
+        (
+            '{timers: {a: {rate: 1, behaviour: b:c, publish: d, message: 1}}}',
+            (
+                'conflicting-keys',
+                "'behaviour' and 'message' exclude each other in timer 'a'",
+                'keep one of them',
+            ),
+        ),
+        ('{timers: {a: 3}}', ('wrong-type', 'expected a mapping, got 3', None)),
+        ('{timers: {a: b:c}}', ('wrong-type', "expected a mapping, got 'b:c'", None)),
+        (
+            '{timers: {a: }}',
+            (
+                'wrong-type',
+                'expected a mapping, got nothing',
+                'write {} for an empty mapping, or remove the key',
+            ),
+        ),
+        (
+            '{timers: {a: {period: 1 s, behaviour: b:c}}}',
+            ('wrong-type', "expected a number, got '1 s'", None),
+        ),
+        (
+            '{timers: {a: {period: true, behaviour: b:c}}}',
+            ('wrong-type', 'expected a number, got true', None),
+        ),
+        (
+            '{timers: {a: {period: 0, behaviour: b:c}}}',
+            ('out-of-range', 'expected at least 0.000001, got 0', None),
+        ),
+        (
+            '{timers: {a: {rate: .inf, behaviour: b:c}}}',
+            ('out-of-range', 'expected at most 1000000, got inf', None),
+        ),
+        (
+            '{timers: {a: {rate: 1, behaviour: b:c, group: ""}}}',
+            ('out-of-range', "expected at least 1 character, got ''", None),
+        ),
+        (
+            '{publishers: {a: {type: a/msg/B, qos: {depth: 0}}}}',
+            ('out-of-range', 'expected at least 1, got 0', None),
+        ),
+        (
+            '{publishers: {a: {type: a/msg/B, qos: {deadline: 0}}}}',
+            ('out-of-range', 'expected more than 0, got 0', None),
+        ),
+        (
+            '{publishers: {a: {type: a/msg/B, qos: {lifespan: always}}}}',
+            ('wrong-type', "expected a number or 'infinite', got 'always'", None),
+        ),
+        (
+            '{publishers: {a: {type: a/msg/B, qos: true}}}',
+            ('wrong-type', 'expected an integer or a string or a mapping, got true', None),
+        ),
+        (
+            '{parameters: {a: {type: int}}}',
+            (
+                'bad-value',
+                'expected one of bool, integer, double, string, byte_array, bool_array, '
+                "integer_array, double_array, string_array; got 'int'",
+                "did you mean 'integer'?",
+            ),
+        ),
+        (
+            '{parameters: {a: {}}}',
+            ('missing-key', "'default' or 'type' is missing in parameter 'a'", None),
+        ),
+        (
+            '{parameters: {a: [[1]]}}',
+            ('wrong-type', 'expected true or false or a number or a string, got a list', None),
+        ),
+        (
+            '{parameters: {a: {default: 1, choices: []}}}',
+            ('out-of-range', 'expected at least 1 item, got an empty list', None),
+        ),
+        (
+            '{state: {a: {b: [1, null]}}, x-own: 1}',
+            ('unknown-key', "unknown key 'x-own' in node 'rover'", None),
+        ),
+    ],
+)
+def test_a_fault_of_a_node_is_named(text, fault):
+    ((rule, message, help_text),) = node_faults(text)
+    if "unknown key 'x-own'" in message:
+        help_text = None  # it lists the keys
+    assert (rule, message, help_text) == fault
+
+
+def test_a_missing_key_is_placed_at_the_entry_that_lacks_it():
+    text = HEAD + 'nodes:\n  rover:\n    publishers:\n      scan: {topic: x}\n'
+    assert faults(text) == [
+        ('missing-key', "the key 'type' is missing in publisher 'scan'", '5:7', None)
+    ]
+
+
+def test_a_fault_in_a_merged_mapping_is_placed_where_it_is_written():
+    text = (
+        HEAD + 'x-slow: &slow {period: slow}\n'
+        'nodes: {rover: {timers: {tick: {<<: *slow, behaviour: a:b}}}}\n'
+    )
+    assert faults(text) == [('wrong-type', "expected a number, got 'slow'", '2:24', None)]
+
+
+def test_long_values_are_shown_short():
+    ((_, message, _),) = node_faults(f'{{use_sim_time: {"x" * 500}}}')
+    assert message == f"expected true or false, got '{'x' * 38}…"
+
+
+def test_a_misspelt_key_is_read_as_the_right_one():
+    loaded = load_system_text(
+        HEAD + 'nods:\n  rover:\n    timer:\n      tick: {perod: 2, behavior: a:b}\n',
+    )
+    assert [finding.message for finding in loaded.diagnostics] == [
+        "unknown key 'nods'",
+        "unknown key 'timer' in node 'rover'",
+        "unknown key 'perod' in timer 'tick'",
+        "unknown key 'behavior' in timer 'tick'",
+    ]
+    timer = loaded.spec.nodes['rover'].timers['tick']
+    assert (timer.period_sec, timer.behaviour.name) == (2.0, 'a:b')
+    assert loaded.dropped == frozenset()
+
+
+def test_what_lies_below_a_misspelt_key_keeps_its_place():
+    text = HEAD + 'nods:\n  rover:\n    timer:\n      tick: {perod: fast, behavior: a.b}\n'
+    assert [fault[2] for fault in faults(text)] == ['2:1', '4:5', '5:14', '5:27', '5:21', '5:37']
+
+
+def test_a_misspelt_key_beside_the_right_one_is_reported_and_left_out():
+    loaded = load_system_text(HEAD + 'nodes: {rover: {timers: {}, timer: {a: 3}}}')
+    assert [(f.rule, f.help) for f in loaded.diagnostics] == [
+        ('unknown-key', "did you mean 'timers'?")
+    ]
+    assert ('nodes', 'rover', 'timer') in loaded.dropped
+
+
+def test_two_spellings_of_one_key_are_both_reported():
+    text = HEAD + 'nodes: {rover: {timer: {}, timrs: {}}}'
+    assert [fault[1] for fault in faults(text)] == [
+        "unknown key 'timer' in node 'rover'",
+        "unknown key 'timrs' in node 'rover'",
+    ]
+
+
+def test_what_is_wrong_is_left_out_and_the_rest_is_read():
+    loaded = load_system_text(
+        HEAD + 'description: [a]\n'
+        'nodes:\n'
+        '  rover:\n'
+        '    log_level: loud\n'
+        '    publishers: {good: a/msg/B, bad: 3}\n'
+        '  lander: 3\n'
+    )
+    assert len(loaded.diagnostics) == 4
+    assert list(loaded.spec.nodes) == ['rover']
+    assert list(loaded.spec.nodes['rover'].publishers) == ['good']
+    assert loaded.spec.nodes['rover'].log_level is None
+    assert loaded.dropped == {
+        ('description',),
+        ('nodes', 'rover', 'log_level'),
+        ('nodes', 'rover', 'publishers', 'bad'),
+        ('nodes', 'lander'),
+    }
+
+
+def test_all_faults_are_found_in_one_run():
+    text = (
+        HEAD
+        + 'nodes:\n'
+        + ''.join(f'  n{i}: {{log_level: {i}, tmers: {{}}}}\n' for i in range(50))
+    )
+    assert len(faults(text)) == 100
+
+
+@pytest.mark.parametrize(
+    ('text', 'meant'),
+    [
+        ('std_msgs/String', 'std_msgs/msg/String'),
+        ('std_msgs.msg.String', 'std_msgs/msg/String'),
+        ('std_msgs::msg::String', 'std_msgs/msg/String'),
+        ('std_msgs/msgs/String', 'std_msgs/msg/String'),
+        ('std_srvs/srv/Empty', None),
+        ('String', None),
+        ('a/b/c/String', None),
+    ],
+)
+def test_a_type_in_the_form_of_other_places_is_understood(text, meant):
+    ((_, _, help_text),) = node_faults(f'{{publishers: {{a: "{text}"}}}}')
+    assert help_text == (meant and f"did you mean '{meant}'?")
+
+
+@pytest.mark.parametrize(
+    ('text', 'meant'),
+    [
+        ('robot.arm.move', 'robot.arm:move'),
+        ('robot/arm.py:move', 'robot.arm:move'),
+        ('robot.arm:move-up', 'robot.arm:move_up'),
+        ('robot.arm::move', 'robot.arm:move'),
+        ('robot.arm:move()', 'robot.arm:move'),
+        ('move', None),
+        ('robot:', None),
+    ],
+)
+def test_a_behaviour_in_another_form_is_understood(text, meant):
+    ((_, _, help_text),) = node_faults(f'{{on_start: {{behaviour: "{text}"}}}}')
+    assert help_text == (meant and f"did you mean '{meant}'?")
+
+
+def test_a_fault_in_an_item_of_a_list_is_left_out_alone():
+    text = '{wait_for: [{topic: a, timeout: 0}, {node: [b]}, {service: c, tiemout: 1}]}'
+    assert [rule for rule, *_ in node_faults(text)] == [
+        'unknown-key',
+        'out-of-range',
+        'wrong-type',
+    ]
+    system = load_system_text(f'{HEAD}nodes: {{rover: {text}}}')
+    conditions = system.spec.nodes['rover'].wait_for
+    assert [each.kind for each in conditions] == ['topic', 'topic', 'service']
+
+
+def test_misspelt_keys_that_count_before_the_schema_are_one_fault_each():
+    text = """
+arg: {count: {defualt: 2}}
+nodes:
+  "wheel_{{ i }}":
+    foraech: {i: "{{ range(count) }}"}
+    whne: "{{ count > 1 }}"
+    log_level: "{{ 'debug' if i else 'info' }}"
+"""
+    system = load_system_text('version: 1' + text)
+    assert sorted((each.rule, each.help) for each in system.diagnostics) == [
+        ('unknown-key', "did you mean 'args'?"),
+        ('unknown-key', "did you mean 'default'?"),
+        ('unknown-key', "did you mean 'foreach'?"),
+        ('unknown-key', "did you mean 'when'?"),
+    ]
+    assert [node.log_level for node in system.spec.nodes.values()] == ['info', 'debug']
