@@ -56,11 +56,11 @@ def _rule_example(rule: Rule) -> Iterator[str]:
     example = read_example(rule.name)
     if example is None:
         return
-    yield from _block('Not so:', example.bad, 'yaml')
+    yield from _block('Bad:', example.bad, 'yaml')
     for path, text in example.others.items():
         yield from _block(f'With `{path}`:', text, 'python' if path.endswith('.py') else '')
-    yield from _block('What is said of it:', example.said, 'text')
-    yield from _block('But so:', example.good, 'yaml')
+    yield from _block('Output:', example.said, 'text')
+    yield from _block('Good:', example.good, 'yaml')
 
 
 def _block(title: str, text: str, language: str) -> Iterator[str]:

@@ -41,7 +41,7 @@ class CheckOptions:
         expected: The rules that have to fire, exactly these; empty if none should.
         is_quiet: Whether findings are all that is shown.
         imports: Whether behaviours are imported.
-        skip_foreign: Whether named files that do not look like systems are passed over.
+        skip_other_files: Whether named files that do not look like systems are passed over.
         stdin_name: The path that standard input is checked as.
     """
 
@@ -52,7 +52,7 @@ class CheckOptions:
     expected: tuple[str, ...] = ()
     is_quiet: bool = False
     imports: bool = False
-    skip_foreign: bool = False
+    skip_other_files: bool = False
     stdin_name: str = '<stdin>'
 
 
@@ -83,7 +83,7 @@ def _refuse_contradictions(options: CheckOptions) -> None:
 
 def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     catalogue = InterfaceCatalogue()
-    selection = select_files(words, skip_foreign=options.skip_foreign)
+    selection = select_files(words, skip_other_files=options.skip_other_files)
     imports = _import_check() if options.imports else None
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     for path in selection.paths:

@@ -143,7 +143,7 @@ def up_command(
 )
 @click.option('--quiet', '-q', is_flag=True, help='Show what is wrong and nothing else.')
 @click.option(
-    '--skip-foreign', is_flag=True, help='Pass over named files that do not look like systems.'
+    '--skip-other-files', is_flag=True, help='Pass over named files that do not look like systems.'
 )
 @click.option(
     '--stdin-filename',
@@ -161,7 +161,7 @@ def check_command(  # noqa: PLR0913 - one for each option
     expected: tuple[str, ...],
     imports: bool,
     quiet: bool,
-    skip_foreign: bool,
+    skip_other_files: bool,
     stdin_filename: str,
 ) -> int:
     """Say all that is wrong with FILES, without running anything.
@@ -179,7 +179,7 @@ def check_command(  # noqa: PLR0913 - one for each option
         expected=expected,
         is_quiet=quiet,
         imports=imports,
-        skip_foreign=skip_foreign,
+        skip_other_files=skip_other_files,
         stdin_name=stdin_filename,
     )
     return check(files, options)

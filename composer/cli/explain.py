@@ -61,11 +61,11 @@ def _explain(rule: Rule) -> Iterator[str]:
 
 
 def _show(example: Example) -> Iterator[str]:
-    yield from _block('Not so:', example.bad, 'red')
+    yield from _block('Bad:', example.bad, 'red')
     for path, text in example.others.items():
         yield from _block(f'with {path}:', text, None)
-    yield from _block('What is said of it:', example.said, None)
-    yield from _block('But so:', example.good, 'green')
+    yield from _block('Output:', example.said, None)
+    yield from _block('Good:', example.good, 'green')
 
 
 def _block(title: str, text: str, colour: str | None) -> Iterator[str]:

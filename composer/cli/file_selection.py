@@ -47,14 +47,14 @@ class Selection:
     findings: tuple[Diagnostic, ...]
 
 
-def select_files(words: Sequence[str], *, skip_foreign: bool = False) -> Selection:
+def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Selection:
     """Return the files that the words of a command line mean.
 
     Files that are named, or matched by a pattern, are taken as they are. Of folders, searched
     all the way down, those `.yaml` and `.yml` files are taken that look like systems.
 
     Args:
-        skip_foreign: Whether named files, too, are passed over if they do not look like systems.
+        skip_other_files: Whether named files, too, are passed over if they do not look like systems.
     """
     paths: dict[str, Path] = {}
     findings = []
@@ -63,7 +63,7 @@ def select_files(words: Sequence[str], *, skip_foreign: bool = False) -> Selecti
         for path, is_named in _expand(word):
             if path is None:
                 fault = _explain_nothing(word)
-            elif not (is_named and skip_foreign) or looks_like_system(path):
+            elif not (is_named and skip_other_files) or looks_like_system(path):
                 paths.setdefault(os.path.abspath(path) if word != '-' else '-', path)  # noqa: PTH100
         findings += [fault] if fault else []
     return Selection(tuple(paths.values()), tuple(findings))

@@ -60,8 +60,8 @@ def render_report(report: Report) -> str:
 def _describe_rule(rule: Rule) -> dict[str, Any]:
     example = read_example(rule.name)
     shown = (
-        f'{rule.meaning} {rule.why}\n\nNot so:\n\n```yaml\n{example.bad}```\n\n'
-        f'But so:\n\n```yaml\n{example.good}```\n'
+        f'{rule.meaning} {rule.why}\n\nBad:\n\n```yaml\n{example.bad}```\n\n'
+        f'Good:\n\n```yaml\n{example.good}```\n'
         if example
         else f'{rule.meaning} {rule.why}\n'
     )

@@ -22,7 +22,7 @@ def run(capsys):
 def test_a_rule_is_explained_with_its_examples(run):
     code, out, err = run('explain', 'bad-argument')
     assert (code, err) == (0, '')
-    blocks = ['Not so:', 'with driving.py:', 'What is said of it:', 'But so:']
+    blocks = ['Bad:', 'with driving.py:', 'Output:', 'Good:']
     assert [line for line in out.splitlines() if line in blocks] == blocks
     assert out.startswith('bad-argument: error, of the family behaviours\n\n')
     assert '# composer: ignore[bad-argument]' in out

@@ -85,7 +85,7 @@ def test_a_faulty_file_fails_with_all_that_is_wrong(run):
     folder = EXAMPLES / 'bad-key'
     code, out, err = run('check', folder / 'bad.yaml')
     assert code == 1
-    assert err == '2 faults in 1 file\n'
+    assert err == '2 errors in 1 file\n'
     expected = (folder / 'bad.txt').read_text()
     assert out.replace(f'{folder}/', '') == expected + '\n'
 
@@ -95,7 +95,7 @@ def test_faults_of_one_file_do_not_hide_the_others(run):
     missing = INVALID / 'no_such_file.yaml'
     code, out, err = run('check', version, GREETER, missing)
     assert code == 1
-    assert err == '2 faults in 2 files\n'
+    assert err == '2 errors in 2 files\n'
     assert f'{version}:1:10: error[unsupported-version]: ' in out
     assert f'{GREETER}: ok, 2 nodes\n' in out
     assert f'{missing}: error[unreadable-file]: cannot read the file: No such file' in out
@@ -104,7 +104,7 @@ def test_faults_of_one_file_do_not_hide_the_others(run):
 @pytest.mark.parametrize('name', ['unreadable-file', 'too-deep', 'yaml-syntax'])
 def test_an_unreadable_file_is_one_fault(run, name):
     code, out, err = run('check', EXAMPLES / name / 'bad.yaml')
-    assert (code, err) == (1, '1 fault in 1 file\n')
+    assert (code, err) == (1, '1 error in 1 file\n')
     assert out.count('error[') == 1
     assert 'Traceback' not in out
 
