@@ -10,17 +10,17 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.executor.crew import PATIENCE_SEC, Crew, Worker
-from composer.executor.execution import Execution
-from composer.executor.forks import end_child, free_locks
-from composer.executor.lane import Lane
+from composer.executor.after_fork import end_child, free_locks
+from composer.executor.entity_registry import Registry
+from composer.executor.event_loop import Execution
+from composer.executor.event_source import Desk
 from composer.executor.leader import Leader
 from composer.executor.news import News
 from composer.executor.polling import Polling
-from composer.executor.registry import Registry
-from composer.executor.schedule import Schedule
-from composer.executor.sources import Desk
-from composer.executor.switching import prompt_switching
+from composer.executor.scheduler import Schedule
+from composer.executor.switch_interval import prompt_switching
+from composer.executor.wait_set_thread import Lane
+from composer.executor.worker_threads import PATIENCE_SEC, Crew, Worker
 
 COURTESY_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""

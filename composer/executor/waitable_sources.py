@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.executor import rcl
-from composer.executor.signals import UNKNOWN
-from composer.executor.sources import NOTHING, Source
+from composer.executor import c_bindings
+from composer.executor.event_poller import UNKNOWN
+from composer.executor.event_source import NOTHING, Source
 
 if TYPE_CHECKING:
-    from composer.executor.alarms import ClockWatch
-    from composer.executor.signals import Signal
+    from composer.executor.deadlines import ClockWatch
+    from composer.executor.event_poller import Signal
 
 
 class _WaitablePart:
@@ -32,7 +32,7 @@ class _WaitablePart:
         desk = self._source.desk
         try:
             with self._source.held():
-                until_ns = rcl.time_until_next_call(self._pointer)
+                until_ns = c_bindings.time_until_next_call(self._pointer)
         except InvalidHandle:
             return
         if until_ns is None:
@@ -62,11 +62,11 @@ class ActionSource(Source):
         self._watched_clock: ClockWatch | None = None
         with self.held():
             self._wait_set = wait_set_for(self.entity, self.desk.executor.context)
-            self._parts = rcl.parts_of(self._wait_set)
+            self._parts = c_bindings.parts_of(self._wait_set)
             self.signal = self.desk.board.attach(self, shared)
             for watch, pointer in self._parts:
                 watch(pointer, self.signal.fd)
-                if watch is rcl.watch_timer_reset:
+                if watch is c_bindings.watch_timer_reset:
                     self._timers.append(_WaitablePart(pointer, self))
         if self._timers:
             self._watched_clock = self.desk.alarms.follow(self.entity._node.get_clock(), self)  # noqa: SLF001
@@ -79,7 +79,7 @@ class ActionSource(Source):
             self.desk.alarms.set(timer, None)
         if self._watched_clock is not None:
             self.desk.alarms.unfollow(self._watched_clock, self)
-        with suppress(InvalidHandle, rcl.ExecutorError), self.held():
+        with suppress(InvalidHandle, c_bindings.ExecutorError), self.held():
             for watch, pointer in self._parts:
                 watch(pointer, None)
         if self.signal is not None:

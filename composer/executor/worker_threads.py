@@ -18,8 +18,8 @@ from threading import get_ident
 from time import monotonic, sleep
 from typing import Any
 
-from composer.executor.forks import end_child
-from composer.executor.rcl import TimerFd
+from composer.executor.after_fork import end_child
+from composer.executor.c_bindings import TimerFd
 
 PATIENCE_SEC = 0.001
 _PATIENCE_NS = int(PATIENCE_SEC * 1e9)

@@ -12,8 +12,8 @@ import select
 import threading
 from typing import Protocol
 
-from composer.executor.forks import lay_over
-from composer.executor.rcl import (
+from composer.executor.after_fork import lay_over
+from composer.executor.c_bindings import (
     peek_epoll,
     read_eventfd,
     wait_readable,

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor import rcl
+from composer.executor import c_bindings
+from composer.executor.event_source import NOTHING, Source
 from composer.executor.missed import LATE_LEAST_NS, LATE_SHARE, Missed
-from composer.executor.sources import NOTHING, Source
 
 if TYPE_CHECKING:
-    from composer.executor.alarms import ClockWatch
-    from composer.executor.signals import Signal
+    from composer.executor.deadlines import ClockWatch
+    from composer.executor.event_poller import Signal
 
 
 class TimerSource(Source):
@@ -30,7 +30,7 @@ class TimerSource(Source):
         self.signal = self.desk.board.attach(self, shared)
         try:
             with self.entity.handle:
-                rcl.watch_timer_reset(self.entity.handle.pointer, self.signal.fd)
+                c_bindings.watch_timer_reset(self.entity.handle.pointer, self.signal.fd)
         except BaseException:
             self.desk.board.detach(self, self.signal)
             raise
@@ -42,7 +42,7 @@ class TimerSource(Source):
         self.desk.alarms.set(self, None)
         if self._watched_clock is not None:
             self.desk.alarms.unfollow(self._watched_clock, self)
-        self._unwatch(rcl.watch_timer_reset)
+        self._unwatch(c_bindings.watch_timer_reset)
 
     def on_signal(self, count: int) -> None:  # noqa: ARG002
         """Hear of a reset."""

@@ -13,15 +13,15 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
-from composer.executor import rcl
-from composer.executor.forks import end_child
+from composer.executor import c_bindings
+from composer.executor.after_fork import end_child
+from composer.executor.event_poller import UNKNOWN
 from composer.executor.missed import Missed
-from composer.executor.schedule import Group, Schedule
-from composer.executor.signals import UNKNOWN
+from composer.executor.scheduler import Group, Schedule
 
 if TYPE_CHECKING:
-    from composer.executor.alarms import Alarms
-    from composer.executor.signals import Signal, SignalBoard
+    from composer.executor.deadlines import Alarms
+    from composer.executor.event_poller import Signal, SignalBoard
 
 NOTHING = object()
 """What `Source.run` returns when there was nothing to take."""
@@ -129,7 +129,7 @@ class Source:
 
     def _unwatch(self, watch: Callable[[int, int | None], None]) -> None:
         self.alive = False
-        with suppress(InvalidHandle, rcl.ExecutorError), self.entity.handle:
+        with suppress(InvalidHandle, c_bindings.ExecutorError), self.entity.handle:
             watch(self.entity.handle.pointer, None)
         if self.signal is not None:
             self.desk.board.detach(self, self.signal)
@@ -151,7 +151,7 @@ class SubscriptionSource(Source):
         self._announced = 0
         self._taken = 0
         self._overruns = 0
-        self._watch(rcl.watch_subscription, shared)
+        self._watch(c_bindings.watch_subscription, shared)
 
     def on_signal(self, count: int) -> None:
         """See the base class."""
@@ -173,7 +173,7 @@ class SubscriptionSource(Source):
 
     def close(self) -> None:
         """See the base class."""
-        self._unwatch(rcl.watch_subscription)
+        self._unwatch(c_bindings.watch_subscription)
 
     def run(self) -> Any:
         """See the base class."""
@@ -213,11 +213,11 @@ class ClientSource(Source):
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
         self._gave_way = False
-        self._watch(rcl.watch_client, shared)
+        self._watch(c_bindings.watch_client, shared)
 
     def close(self) -> None:
         """See the base class."""
-        self._unwatch(rcl.watch_client)
+        self._unwatch(c_bindings.watch_client)
 
     def run(self) -> Any:
         """See the base class."""
@@ -252,11 +252,11 @@ class ServiceSource(Source):
 
     def open(self, shared: 'Signal | None' = None) -> None:
         """See the base class."""
-        self._watch(rcl.watch_service, shared)
+        self._watch(c_bindings.watch_service, shared)
 
     def close(self) -> None:
         """See the base class."""
-        self._unwatch(rcl.watch_service)
+        self._unwatch(c_bindings.watch_service)
 
     def run(self) -> Any:
         """See the base class."""

@@ -19,8 +19,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.waitable import NumberOfEntities
 
-from composer.executor.sources import Desk, Source
-from composer.executor.waitables import (
+from composer.executor.event_source import Desk, Source
+from composer.executor.waitable_sources import (
     GuardConditionSource,
     PolledSource,
     WaitableSource,

@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.executor import signals
-from composer.executor.rcl import write_eventfd
-from composer.executor.signals import SignalBoard
+from composer.executor import event_poller
+from composer.executor.c_bindings import write_eventfd
+from composer.executor.event_poller import SignalBoard
 
 pytestmark = pytest.mark.ros
 
@@ -46,7 +46,7 @@ def test_of_several_signals_the_least_rank_is_heard_first():
 
 def test_the_last_descriptors_of_the_process_are_left_to_others(monkeypatch):
     board = SignalBoard()
-    monkeypatch.setattr(signals, '_descriptors', signals._Descriptors())
+    monkeypatch.setattr(event_poller, '_descriptors', event_poller._Descriptors())
     monkeypatch.setattr(resource, 'setrlimit', lambda _what, _limits: None)
     first = board.attach(Listener(0, []))
     soft = first.fd + 20

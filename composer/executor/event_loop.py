@@ -3,9 +3,9 @@
 from contextlib import suppress
 from typing import Any
 
-from composer.executor.alarms import Alarms, Delay
-from composer.executor.schedule import Schedule
-from composer.executor.sources import NOTHING, Source
+from composer.executor.deadlines import Alarms, Delay
+from composer.executor.event_source import NOTHING, Source
+from composer.executor.scheduler import Schedule
 from composer.executor.tasks import Resume, TaskRun, awaited_future, task_of
 
 _RETRY_SEC = 0.001

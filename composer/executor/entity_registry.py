@@ -9,17 +9,17 @@ from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.lane import Lane
-from composer.executor.signals import Signal
-from composer.executor.sources import (
+from composer.executor.entity_sources import TimerSource
+from composer.executor.event_poller import Signal
+from composer.executor.event_source import (
     ClientSource,
     Desk,
     ServiceSource,
     Source,
     SubscriptionSource,
 )
-from composer.executor.timers import TimerSource
-from composer.executor.waitables import (
+from composer.executor.wait_set_thread import Lane
+from composer.executor.waitable_sources import (
     ActionSource,
     GuardConditionSource,
     PolledSource,

@@ -9,7 +9,7 @@ pytest.importorskip('rclpy')
 from rclpy.context import Context
 
 from composer.executor import ComposerExecutor
-from composer.executor.switching import INTERVAL_SEC, PromptSwitching
+from composer.executor.switch_interval import INTERVAL_SEC, PromptSwitching
 
 DEADLINE_SEC = 40.0
 

@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 
 from spinning import DEADLINE_SEC, spinning, wait_for
 
-from composer.executor.crew import Crew
+from composer.executor.worker_threads import Crew
 
 pytestmark = pytest.mark.ros
 

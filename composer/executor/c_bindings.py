@@ -21,7 +21,7 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.errors import ComposerError
-from composer.executor.forks import lay_over
+from composer.executor.after_fork import lay_over
 
 _CLOCK_MONOTONIC = 1
 _TFD_TIMER_ABSTIME = 1

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 
-from composer.executor.signals import UNKNOWN
+from composer.executor.event_poller import UNKNOWN
 
 
 class Group:
