@@ -1,4 +1,4 @@
-"""`composer explain`: what a rule means, why it is there, and how to do it right."""
+"""`composer explain`: what a rule means, why it exists, and how to fix what it finds."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from composer.rules.record import Rule
 
 _NEEDS = {
-    'interfaces': 'It needs interface packages, which come with ROS 2.',
-    'import': '`composer check --import` can tell more than the source of the behaviour.',
+    'interfaces': 'Needs interface packages, which come with ROS 2.',
+    'import': '`composer check --import` finds more than the source of the behaviour shows.',
 }
 
 
@@ -39,12 +39,12 @@ def _list_all() -> Iterator[str]:
         for rule in family.rules:
             yield f'  {rule.name:<{widest}}  {rule.meaning}'
         yield ''
-    yield "'composer explain RULE' shows one with an example."
+    yield "'composer explain RULE' explains a rule, with an example."
 
 
 def _explain(rule: Rule) -> Iterator[str]:
     family = FAMILY_OF[rule.name]
-    heading = f'{rule.name}: {rule.severity.value}, of the family {family.name}'
+    heading = f'{rule.name}: {rule.severity.value}, in the family {family.name}'
     yield click.style(heading, bold=True)
     yield ''
     yield f'  {rule.meaning}'
@@ -52,7 +52,7 @@ def _explain(rule: Rule) -> Iterator[str]:
     if rule.needs:
         yield f'  {_NEEDS[rule.needs]}'
     if rule.is_ignorable:
-        yield f'  A comment in its line silences it: # composer: ignore[{rule.name}]'
+        yield f'  To silence it, add a comment to the line: # composer: ignore[{rule.name}]'
     if rule.source:
         yield f'  Source: {rule.source}'
     example = read_example(rule.name)
@@ -63,7 +63,7 @@ def _explain(rule: Rule) -> Iterator[str]:
 def _show(example: Example) -> Iterator[str]:
     yield from _block('Bad:', example.bad, 'red')
     for path, text in example.others.items():
-        yield from _block(f'with {path}:', text, None)
+        yield from _block(f'With {path}:', text, None)
     yield from _block('Output:', example.said, None)
     yield from _block('Good:', example.good, 'green')
 
