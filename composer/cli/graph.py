@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def graph(
     paths: Sequence[Path],
     words: Sequence[str],
-    settings: Sequence[str],
+    set_values: Sequence[str],
     *,
     format_name: str | None,
     output: Path | None,
@@ -43,7 +43,7 @@ def graph(
         ComposerError: The drawing cannot be written.
     """
     format_name = format_name or _format_of(output)
-    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
+    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
     catalogue = InterfaceCatalogue()
     findings = check_system(system, catalogue)
     context, _ = create_context(system, catalogue)

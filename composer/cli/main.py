@@ -55,7 +55,7 @@ def run(arguments: list[str]) -> int:
 
 
 def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
-    """Split a command line into own arguments and those between `--ros-args` and `--` (or the end).
+    """Split a command line into its own arguments and those after `--ros-args`, up to a `--`.
 
     Returns:
         The own arguments, and the ROS arguments.

@@ -54,8 +54,8 @@ def template_folder() -> Path:
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
         message = (
-            f"'{name}' cannot name a project: a name has lower-case letters, digits and "
-            'underscores, and begins with a letter'
+            f"'{name}' cannot name a project: use lower-case letters, digits and underscores, "
+            'starting with a letter'
         )
         near = _NAME.search(re.sub('[^a-z0-9_]+', '_', name.lower()).strip('_'))
         raise UsageError(message, help=f"try '{near[0]}'" if near else None)

@@ -42,7 +42,7 @@ def feed(monkeypatch, content):
 # What is checked
 
 
-def test_all_faults_of_all_files_are_found_in_one_run(run):
+def test_all_errors_of_all_files_are_found_in_one_run(run):
     code, out, err = run('faulty.yaml', 'right.yaml', 'missing.yaml', '*.yml', 'nowhere*')
     assert code == 1
     assert 'faulty.yaml:2:9: error[bad-name]: ' in out
@@ -85,7 +85,7 @@ def test_standard_input_may_hold_anything(run, monkeypatch, content):
     assert err == '1 error in 1 file\n'
 
 
-def test_foreign_files_can_be_passed_over(run, tmp_path):
+def test_other_files_can_be_skipped(run, tmp_path):
     (tmp_path / 'compose.yaml').write_text('version: "3"\nservices: {}\n')
     assert run('compose.yaml', '-q')[0] == 1
     assert run('compose.yaml', '--skip-other-files') == (0, '', '')
@@ -185,7 +185,7 @@ def test_warnings_count_when_that_is_asked_for(run):
     assert run('right.yaml', '--strict')[0] == 0
 
 
-def test_faults_and_warnings_are_counted_apart(run):
+def test_errors_and_warnings_are_counted_apart(run):
     _, _, err = run('warned.yaml', 'faulty.yaml')
     assert err == '2 errors and 1 warning in 2 files\n'
 
@@ -211,8 +211,8 @@ def test_an_expectation_fails_if_other_rules_fire(run):
     code, _, err = run('faulty.yaml', '--expect', 'bad-name', '--expect', 'bad-key')
     assert code == 1
     assert err.splitlines()[1:] == [
-        "'bad-key' was expected and did not fire",
-        "'bad-value' fired and was not expected",
+        "expected 'bad-key', which found nothing",
+        "'bad-value' was not expected",
     ]
     assert run('right.yaml', '--expect', 'bad-name')[0] == 1
     assert run('warned.yaml', '--expect', 'unused-ignore')[0] == 0
@@ -222,10 +222,10 @@ def test_an_expectation_fails_if_other_rules_fire(run):
 def test_an_unknown_rule_is_wrong_usage(run, option):
     code, out, err = run('faulty.yaml', option, 'bad-nam')
     assert (code, out) == (2, '')
-    assert "no rule is called 'bad-nam'\n  help: did you mean 'bad-name'?" in err
+    assert "there is no rule 'bad-nam'\n  help: did you mean 'bad-name'?" in err
     code, out, err = run('faulty.yaml', option, 'qqqqqq')
     assert code == 2
-    assert "no rule is called 'qqqqqq'\n  help: 'composer explain' lists them" in err
+    assert "there is no rule 'qqqqqq'\n  help: 'composer explain' lists them" in err
 
 
 # --import
@@ -290,7 +290,7 @@ def test_an_import_that_fails_is_a_finding(imports, code):
     assert "error[broken-behaviour]: importing 'driving' raised " in out
 
 
-def test_a_fault_is_not_found_twice(imports):
+def test_an_error_is_not_found_twice(imports):
     node = '{on_start: {behaviour: driving:start, with: {sped: 1}}, on_stop: driving:stpo}'
     code, out, _ = imports(node, 'def start(node, *, speed): ...\n\ndef stop(node): ...\n', '-q')
     assert code == 1

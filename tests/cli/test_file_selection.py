@@ -79,7 +79,7 @@ def test_nothing_is_a_finding(tree, tmp_path):
     assert select('a', '*.yml') == (
         [],
         [
-            ('nothing-to-check', 'a', 'there is no system in this folder'),
+            ('nothing-to-check', 'a', 'no system in this folder'),
             ('nothing-to-check', '*.yml', 'no file matches this pattern'),
         ],
     )
