@@ -13,7 +13,7 @@ from threading import get_ident
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from composer.executor.forks import end_child
+from composer.executor.after_fork import end_child
 from composer.python_source.modules import FunctionKind
 from composer.runtime import forks
 from composer.runtime.behaviours.callables import kind_of

@@ -1,0 +1,182 @@
+"""The kinds of entity that a node has: one row for each, with the facts that all rooms share.
+
+A new kind is a row here, a record and a parser in `language`, a creator in `runtime/entities`, and
+its part of the schema; everything else follows from its row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+ChannelKind: TypeAlias = Literal['topic', 'service', 'action']
+
+# The payload of the publisher that `publish:` names.
+PUBLISHED = 'published'
+# The folder of a channel's types in an interface package.
+TYPE_FOLDERS: dict[ChannelKind, str] = {'topic': 'msg', 'service': 'srv', 'action': 'action'}
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourKey:
+    """A key that names a behaviour, and how this is called.
+
+    Attributes:
+        key: The key, as in `accept`.
+        arguments: The names of the positional arguments.
+        given: The part of the entity's type that the last argument has, as in `Request`; an empty
+            string for the type itself, `None` if the behaviour is given its node alone.
+        returned: The part that a returned payload becomes, `PUBLISHED`, or `None` for no payload.
+        yielded: The same for each payload that it yields.
+        may_yield: Whether it may be a generator.
+    """
+
+    key: str
+    arguments: tuple[str, ...]
+    given: str | None = None
+    returned: str | None = None
+    yielded: str | None = None
+    may_yield: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class EntityKind:
+    """A kind of entity.
+
+    Attributes:
+        section: The key of a node under which its entities stand.
+        noun: One of them in words.
+        channel: What it meets others on, `None` for nothing.
+        provides: Whether it is the end that publishes or serves.
+        has_qos: Whether it has the key `qos`.
+        publishes: Whether it has the key `publish`, for what its behaviour returns.
+        behaviours: The keys that name its behaviours.
+        unused: What to say of one that no behaviour uses; `None` if behaviours do not use them.
+        unmatched: The rule, and what to say of the channel, if there is no other end; `None` if
+            none is needed.
+        stand_in: The values with which the rest of a faulty entry is read if these keys are
+            missing.
+    """
+
+    section: str
+    noun: str
+    channel: ChannelKind | None = None
+    provides: bool = False
+    has_qos: bool = False
+    publishes: bool = False
+    behaviours: tuple[BehaviourKey, ...] = ()
+    unused: str | None = None
+    unmatched: tuple[str, str] | None = None
+    stand_in: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def slug(self) -> str:
+        """The noun as names of rules have it, as in `service-client`."""
+        return self.noun.replace(' ', '-')
+
+
+_BEHAVIOUR = 'unknown:unknown'
+_NO_SERVER = ('no-server', "nothing in this system serves '{}'")
+
+ENTITY_KINDS: tuple[EntityKind, ...] = (
+    EntityKind('parameters', 'parameter', unused='no behaviour of the node reads it'),
+    EntityKind(
+        'publishers',
+        'publisher',
+        'topic',
+        provides=True,
+        has_qos=True,
+        unused='nothing publishes on it',
+        unmatched=('no-subscription', "nothing in this system hears '{}'"),
+        stand_in={'type': 'unknown/msg/Unknown'},
+    ),
+    EntityKind(
+        'subscriptions',
+        'subscription',
+        'topic',
+        has_qos=True,
+        publishes=True,
+        behaviours=(BehaviourKey('behaviour', ('node', 'message'), given='', returned=PUBLISHED),),
+        unmatched=('no-publisher', "nothing in this system publishes '{}'"),
+        stand_in={'type': 'unknown/msg/Unknown', 'behaviour': _BEHAVIOUR},
+    ),
+    EntityKind(
+        'timers',
+        'timer',
+        publishes=True,
+        behaviours=(
+            BehaviourKey(
+                'behaviour', ('node',), returned=PUBLISHED, yielded=PUBLISHED, may_yield=True
+            ),
+        ),
+        stand_in={'period': 1.0, 'behaviour': _BEHAVIOUR},
+    ),
+    EntityKind(
+        'services',
+        'service',
+        'service',
+        provides=True,
+        has_qos=True,
+        behaviours=(
+            BehaviourKey('behaviour', ('node', 'request'), given='Request', returned='Response'),
+        ),
+        stand_in={'type': 'unknown/srv/Unknown', 'behaviour': _BEHAVIOUR},
+    ),
+    EntityKind(
+        'service_clients',
+        'service client',
+        'service',
+        has_qos=True,
+        unused='no behaviour of the node calls it',
+        unmatched=_NO_SERVER,
+        stand_in={'type': 'unknown/srv/Unknown'},
+    ),
+    EntityKind(
+        'actions',
+        'action',
+        'action',
+        provides=True,
+        behaviours=(
+            BehaviourKey(
+                'behaviour',
+                ('node', 'goal'),
+                given='Goal',
+                returned='Result',
+                yielded='Feedback',
+                may_yield=True,
+            ),
+            BehaviourKey('accept', ('node', 'goal'), given='Goal'),
+        ),
+        stand_in={'type': 'unknown/action/Unknown', 'behaviour': _BEHAVIOUR},
+    ),
+    EntityKind(
+        'action_clients',
+        'action client',
+        'action',
+        behaviours=(
+            BehaviourKey('feedback', ('node', 'feedback'), given='Feedback'),
+            BehaviourKey('result', ('node', 'result'), given='Result'),
+        ),
+        unused='no behaviour of the node sends it a goal',
+        unmatched=_NO_SERVER,
+        stand_in={'type': 'unknown/action/Unknown'},
+    ),
+)
+# The behaviours of a node itself.
+NODE_BEHAVIOURS: tuple[BehaviourKey, ...] = (
+    BehaviourKey('on_start', ('node',)),
+    BehaviourKey('on_stop', ('node',)),
+    BehaviourKey('on_parameters', ('node', 'changes')),
+)
+
+KIND_OF_SECTION: dict[str, EntityKind] = {kind.section: kind for kind in ENTITY_KINDS}
+KIND_OF_NOUN: dict[str, EntityKind] = {kind.noun: kind for kind in ENTITY_KINDS}
+# Those that meet others on a topic, service or action.
+CHANNEL_KINDS: tuple[EntityKind, ...] = tuple(kind for kind in ENTITY_KINDS if kind.channel)
+# Those that behaviours use by name.
+USED_KINDS: tuple[EntityKind, ...] = tuple(kind for kind in ENTITY_KINDS if kind.unused)
+# Every key of an entity that names a behaviour.
+BEHAVIOUR_KEYS = frozenset(each.key for kind in ENTITY_KINDS for each in kind.behaviours)
