@@ -195,7 +195,8 @@ class Node:
             GoalRejectedError: The server refused the goal.
         """
         client = self._entity('action_clients', name)
-        return client.send_goal({} if payload is None else payload, timeout)
+        goal: Goal = client.send_goal({} if payload is None else payload, timeout)
+        return goal
 
     def set_parameters(
         self, node_name: str, values: Mapping[str, Any], timeout: float | None = 5.0
