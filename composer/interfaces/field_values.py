@@ -22,7 +22,7 @@ from typing import Final, Literal, TypeAlias
 
 from composer.errors import ComposerError
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.wording import describe_value
+from composer.interfaces.field_errors import describe_value
 from composer.names import suggest
 
 FieldRule: TypeAlias = Literal[

@@ -10,6 +10,7 @@ from difflib import unified_diff
 from pathlib import Path
 
 from composer.errors import ComposerError
+from composer.interfaces.definitions.installed_definitions import describe_package
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.statements import SEPARATOR
 from composer.interfaces.descriptions import (
@@ -18,7 +19,6 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.documentation import describe_package
 
 
 @dataclass(frozen=True, slots=True)

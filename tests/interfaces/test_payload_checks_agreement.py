@@ -13,8 +13,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import FieldType, MessageDescription
-from composer.interfaces.payload_faults import find_payload_faults
-from composer.interfaces.values import INTEGER_RANGES
+from composer.interfaces.field_values import INTEGER_RANGES
+from composer.interfaces.payload_checks import find_payload_faults
 from composer.runtime.messages.payloads import PayloadError, converter_for
 
 pytestmark = pytest.mark.ros

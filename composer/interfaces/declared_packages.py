@@ -62,7 +62,7 @@ def _describe_folders(
 ) -> list[Diagnostic]:
     """Add what folders define to a catalogue; return what is wrong with it instead, if it is."""
     # The parser of definitions is slow to import, and most files declare no packages.
-    from composer.interfaces.packages import DefinitionsError, load_packages
+    from composer.interfaces.build.provision import DefinitionsError, load_packages
 
     try:
         packages = load_packages(folders)
@@ -97,6 +97,6 @@ def provide_declared(system: LoadedSystem, progress: Callable[[str], None]) -> S
     folders = declared_folders(system)
     if not folders:
         return ()
-    from composer.interfaces.packages import provide_packages
+    from composer.interfaces.build.provision import provide_packages
 
     return [provided.package for provided in provide_packages(folders, progress)]

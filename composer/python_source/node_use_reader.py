@@ -6,9 +6,9 @@ import ast
 import builtins
 from typing import TYPE_CHECKING
 
-from composer.python_source.branches import WayReader
+from composer.python_source.control_flow import WayReader
 from composer.python_source.local_names import is_name
-from composer.python_source.use_records import ALL_KINDS, NodePass, NodeUse, UseKind
+from composer.python_source.node_uses import ALL_KINDS, NodePass, NodeUse, UseKind
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping

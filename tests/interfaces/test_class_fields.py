@@ -5,6 +5,7 @@ pytest.importorskip('rosidl_parser')
 from rosidl_parser import definition as idl
 
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.class_fields import UnsupportedFieldError, describe_class
 from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import (
     ActionDescription,
@@ -13,7 +14,6 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.slots import UnsupportedFieldError, describe_class
 
 pytestmark = pytest.mark.ros
 

@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 from composer.interfaces.catalogue import default_prefixes
+from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import MessageDescription
-from composer.interfaces.documentation import describe_interface
 from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
 
 pytestmark = pytest.mark.ros

@@ -13,10 +13,10 @@ from composer.names import did_you_mean, suggest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.checks.behaviours.node_uses import BehaviourUses, FoundUse
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
     from composer.language.bindings import Binding
+    from composer.python_source.behaviour_uses import BehaviourUses, FoundUse
     from composer.python_source.uses import UseKind
     from composer.yaml_text.positions import DataPath
 

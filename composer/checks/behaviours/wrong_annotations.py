@@ -10,7 +10,7 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.payload_faults import find_payload_faults
+from composer.interfaces.payload_checks import find_payload_faults
 from composer.language.bindings import node_bindings
 from composer.python_source.annotations import Annotation, read_annotation
 from composer.python_source.modules import FunctionKind, ModuleSource

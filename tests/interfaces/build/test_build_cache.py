@@ -8,7 +8,12 @@ import pytest
 from building import WriteDefinitions
 
 from composer.interfaces.build import cache
-from composer.interfaces.build.cache import BuildFolder, CacheError, compute_key, provide_cached
+from composer.interfaces.build.build_cache import (
+    BuildFolder,
+    CacheError,
+    compute_key,
+    provide_cached,
+)
 from composer.interfaces.catalogue import default_prefixes
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from composer.interfaces.definitions.syntax import (
+from composer.interfaces.definitions.definition_parser import (
     ParserMissingError,
     SyntaxFault,
     load_parser,

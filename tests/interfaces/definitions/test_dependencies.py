@@ -5,12 +5,12 @@ from building import WriteDefinitions
 
 from composer.diagnostics import Diagnostic
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions.package_folder import load_definitions
-from composer.interfaces.definitions.references import (
+from composer.interfaces.definitions.dependencies import (
     check_definitions,
     order_packages,
     used_packages,
 )
+from composer.interfaces.definitions.package_folder import load_definitions
 
 pytestmark = pytest.mark.ros
 

@@ -15,8 +15,8 @@ from composer.interfaces.descriptions import (
     FieldType,
     MessageDescription,
 )
+from composer.interfaces.field_errors import interface_name
 from composer.interfaces.type_descriptions import EMPTY_MESSAGE_FIELD
-from composer.interfaces.wording import interface_name
 
 # The IDL names of the types whose .msg name differs (see rosidl_adapter).
 _MSG_NAMES: Final = {

@@ -9,20 +9,20 @@ from pathlib import Path
 import pytest
 from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
 
-from composer.interfaces.differences import DefinitionsDifferError
-from composer.interfaces.packages import (
+from composer.interfaces.build.provision import (
     DefinitionsError,
     ProvidedPackage,
     load_packages,
     provide_packages,
 )
+from composer.interfaces.definitions.differences import DefinitionsDifferError
 
 pytestmark = pytest.mark.ros
 
 PROVIDE = """
 import sys
 from pathlib import Path
-from composer.interfaces.packages import provide_packages
+from composer.interfaces.build.provision import provide_packages
 folders = {name: Path(folder) for name, folder in zip(sys.argv[1::2], sys.argv[2::2])}
 for each in provide_packages(folders, lambda line: print(line, flush=True)):
     print(each.package, each.origin)

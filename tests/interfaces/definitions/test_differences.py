@@ -5,12 +5,12 @@ import pytest
 from building import WriteDefinitions
 
 from composer.interfaces.catalogue import default_prefixes
-from composer.interfaces.definitions.package_folder import load_definitions
-from composer.interfaces.differences import (
+from composer.interfaces.definitions.differences import (
     DefinitionsDifferError,
     compare_definitions,
     require_same,
 )
+from composer.interfaces.definitions.package_folder import load_definitions
 from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
 
 pytestmark = pytest.mark.ros

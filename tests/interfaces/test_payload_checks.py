@@ -4,7 +4,7 @@ import pytest
 
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
-from composer.interfaces.payload_faults import FieldFault, find_payload_faults
+from composer.interfaces.payload_checks import FieldFault, find_payload_faults
 
 VECTOR = MessageDescription(
     'my_msgs/msg/Vector',

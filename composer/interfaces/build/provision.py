@@ -8,14 +8,14 @@ from typing import Literal, TypeAlias
 
 from composer.diagnostics import Diagnostic
 from composer.errors import ComposerError
-from composer.interfaces.build.cache import BuildFolder, compute_key, provide_cached
+from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
-from composer.interfaces.definitions.references import (
+from composer.interfaces.definitions.dependencies import (
     check_definitions,
     order_packages,
     used_packages,
 )
+from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 from composer.interfaces.importing import make_importable
 from composer.interfaces.prefixes import find_package_prefix
 
@@ -115,7 +115,7 @@ class _Provider:
         installed = find_package_prefix(definitions.package, self._prefixes)
         if installed is not None:
             # Imported here, as the builder below: a cached start must not pay for it.
-            from composer.interfaces.differences import require_same
+            from composer.interfaces.definitions.differences import require_same
 
             require_same(definitions, installed)
             return ProvidedPackage(definitions.package, installed, 'installed', definitions)

@@ -1,6 +1,6 @@
 import pytest
 
-from composer.interfaces.wording import describe_value, format_fault, format_path
+from composer.interfaces.field_errors import describe_value, format_fault, format_path
 
 
 @pytest.mark.parametrize(

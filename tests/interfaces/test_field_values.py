@@ -5,7 +5,7 @@ from math import inf, isnan, nan
 import pytest
 
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.values import (
+from composer.interfaces.field_values import (
     FLOAT32_MAX,
     INTEGER_RANGES,
     FieldError,

@@ -1,7 +1,7 @@
 """Check plain data against the description of a message, and find all that is wrong with it.
 
 The verdict is that of the conversion at run time (`composer.runtime.messages.payloads`): both
-apply the rules of `composer.interfaces.values`. This one needs no message class, so it works
+apply the rules of `composer.interfaces.field_values`. This one needs no message class, so it works
 without ROS.
 """
 
@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import FieldType, MessageDescription
-from composer.interfaces.values import (
+from composer.interfaces.field_errors import format_fault
+from composer.interfaces.field_values import (
     FieldError,
     FieldRule,
     check_length,
@@ -19,7 +20,6 @@ from composer.interfaces.values import (
     scalar_reader,
     unknown_field,
 )
-from composer.interfaces.wording import format_fault
 
 
 @dataclass(frozen=True, slots=True)
