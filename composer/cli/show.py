@@ -19,9 +19,9 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.paths import resolve_path
 from composer.language.pipeline import LoadedSystem, load_system
+from composer.ros_parameters.file_reader import read_parameter_file
+from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import read_parameter_file
-from composer.ros_parameters.writer import render_parameter_file
 from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:

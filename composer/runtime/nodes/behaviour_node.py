@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
+from composer.entity_kinds import KIND_OF_SECTION
 from composer.errors import ComposerError
 from composer.names import did_you_mean
 
@@ -17,14 +18,11 @@ if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger
     from rclpy.time import Time
 
-    from composer.runtime.entities.action_clients import ActionClient, Goal
-    from composer.runtime.entities.remote_parameters import RemoteParameters
-    from composer.runtime.entities.service_clients import ServiceClient
+    from composer.runtime.nodes.goals import Goal
+    from composer.runtime.nodes.remote_parameters import RemoteParameters
 
 # A message, a mapping of (nested) fields, or the bare value of a message with one field.
 Payload: TypeAlias = Any
-
-Entity = TypeVar('Entity')
 
 
 class Publish(Protocol):
@@ -95,10 +93,8 @@ class Node:
     """
 
     __slots__ = (
-        '_action_clients',
-        '_publishers',
+        '_entities',
         '_remote_parameters',
-        '_service_clients',
         '_shutdown',
         'name',
         'own_state',
@@ -111,7 +107,8 @@ class Node:
         self,
         ros: rclpy.node.Node,
         state: SimpleNamespace,
-        publishers: Mapping[str, Publish],
+        entities: Mapping[str, Mapping[str, Any]],
+        remote_parameters: RemoteParameters,
         shutdown: Callable[[int], None],
     ) -> None:
         self.name: str = ros.get_name()
@@ -119,25 +116,15 @@ class Node:
         self.state = state
         self.own_state: dict[str, Any] = {}
         self.parameters = Parameters(ros)
-        self._publishers = publishers
+        self._entities = entities
+        self._remote_parameters = remote_parameters
         self._shutdown = shutdown
 
-    def connect(
-        self,
-        service_clients: Mapping[str, ServiceClient],
-        action_clients: Mapping[str, ActionClient],
-        remote_parameters: RemoteParameters,
-    ) -> None:
-        """Take what reaches other nodes; for Composer itself."""
-        self._service_clients = service_clients
-        self._action_clients = action_clients
-        self._remote_parameters = remote_parameters
-
-    def for_entity(self) -> Node:
+    def with_own_state(self) -> Node:
         """Return the same node with an `own_state` of its own; for Composer itself."""
-        face = copy.copy(self)
-        face.own_state = {}
-        return face
+        node = copy.copy(self)
+        node.own_state = {}
+        return node
 
     @property
     def logger(self) -> RcutilsLogger:
@@ -160,7 +147,7 @@ class Node:
             UndeclaredError: The node declares no such publisher.
             PayloadError: The payload does not fit the publisher's type.
         """
-        self._declared(name, self._publishers, 'publisher')(payload)
+        self._entity('publishers', name)(payload)
 
     def call(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Any:
         """Call a service and return its response; works in any behaviour.
@@ -178,7 +165,7 @@ class Node:
             CallTimeoutError: The server did not answer in time.
             ServiceFailedError: The server is in this system, and its behaviour raised.
         """
-        client = self._declared(name, self._service_clients, 'service client')
+        client = self._entity('service_clients', name)
         return client.call({} if payload is None else payload, timeout)
 
     async def call_async(
@@ -188,7 +175,7 @@ class Node:
         timeout: float | None = 5.0,  # noqa: ASYNC109 - as in `call`; rclpy's loop has no scopes
     ) -> Any:
         """As `call`, for `async def` behaviours: no thread is held while it waits."""
-        client = self._declared(name, self._service_clients, 'service client')
+        client = self._entity('service_clients', name)
         return await client.call_async({} if payload is None else payload, timeout)
 
     def send_goal(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Goal:
@@ -207,8 +194,9 @@ class Node:
             GoalTimeoutError: The server did not answer in time.
             GoalRejectedError: The server refused the goal.
         """
-        client = self._declared(name, self._action_clients, 'action client')
-        return client.send_goal({} if payload is None else payload, timeout)
+        client = self._entity('action_clients', name)
+        goal: Goal = client.send_goal({} if payload is None else payload, timeout)
+        return goal
 
     def set_parameters(
         self, node_name: str, values: Mapping[str, Any], timeout: float | None = 5.0
@@ -238,9 +226,10 @@ class Node:
         """End the whole system with this exit code; it stops after this behaviour has returned."""
         self._shutdown(code)
 
-    def _declared(self, name: str, entities: Mapping[str, Entity], kind: str) -> Entity:
+    def _entity(self, section: str, name: str) -> Any:
+        entities = self._entities[section]
         entity = entities.get(name)
         if entity is None:
-            message = f"node '{self.name}' declares no {kind} '{name}'"
+            message = f"node '{self.name}' declares no {KIND_OF_SECTION[section].noun} '{name}'"
             raise UndeclaredError(message, help=did_you_mean(name, entities, 'it declares'))
         return entity

@@ -13,19 +13,40 @@ from composer.errors import (
     ParametersRefusedError,
     ServiceNotAvailableError,
 )
-from composer.names import expand_namespace, join_names
+from composer.names import join_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping
 
-    from composer.runtime.nodes.live_node import LiveNode
+    from rclpy.callback_groups import CallbackGroup
+    from rclpy.node import Node
+
+    from composer.runtime.behaviours.waits import ThreadWaits
 
 
 class RemoteParameters:
-    """Gets and sets parameters of any node of the graph."""
+    """Gets and sets parameters of any node of the graph.
 
-    def __init__(self, node: LiveNode) -> None:
-        self._node = node
+    Args:
+        ros: The node that asks.
+        namespace: Where relative names of nodes lie.
+        group: The callback group of its clients.
+        without_services: The full names of the system's nodes without parameter services.
+    """
+
+    def __init__(
+        self,
+        ros: Node,
+        namespace: str,
+        waits: ThreadWaits,
+        group: CallbackGroup,
+        without_services: Collection[str],
+    ) -> None:
+        self._ros = ros
+        self._namespace = namespace
+        self._waits = waits
+        self._group = group
+        self._without_services = without_services
         self._clients: dict[str, Any] = {}
 
     def set(self, node_name: str, values: Mapping[str, Any], timeout_sec: float | None) -> None:
@@ -72,16 +93,16 @@ class RemoteParameters:
     def _call(
         self, node_name: str, kind: Any, service: str, request: Any, timeout_sec: float | None
     ) -> Any:
-        full_name = expand_namespace(node_name, self._node.spec.namespace)
+        full_name = node_name
         if not node_name.startswith('/'):
-            full_name = join_names(self._node.spec.namespace, node_name)
-        if full_name in self._node.services.without_parameter_services:
+            full_name = join_names(self._namespace, node_name)
+        if full_name in self._without_services:
             message = f"node '{full_name}' has no parameter services"
             advice = "write 'parameter_services: true' where the file declares it"
             raise ServiceNotAvailableError(message, help=advice)
         client = self._client(kind, join_names(full_name, service))
         begun = monotonic()
-        waits = self._node.waits
+        waits = self._waits
         if not waits.until_true(client.service_is_ready, timeout_sec):
             message = f"no node '{full_name}' with parameter services appeared in time"
             raise ServiceNotAvailableError(message)
@@ -99,7 +120,7 @@ class RemoteParameters:
     def _client(self, kind: Any, service: str) -> Any:
         # A client is kept: to make one and find its server takes longer than the call.
         if service not in self._clients:
-            self._clients[service] = self._node.ros.create_client(
-                kind, service, callback_group=self._node.background
+            self._clients[service] = self._ros.create_client(
+                kind, service, callback_group=self._group
             )
         return self._clients[service]

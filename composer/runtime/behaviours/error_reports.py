@@ -1,7 +1,4 @@
-"""What happens when a behaviour raises: it is said once in full, counted after that, and acted on.
-
-A behaviour that raises never takes another node down; this is the only place that decides more.
-"""
+"""Errors of behaviours in the log: each kind once with its traceback, then counted."""
 
 from __future__ import annotations
 
@@ -10,20 +7,13 @@ from dataclasses import dataclass, field
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from composer.runtime.behaviours.error_texts import format_error, place_of, summarize
+from composer.runtime.behaviours.tracebacks import format_error, place_of, summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.language.specs import OnError
-
 # At most one line about the same entity in this time.
 _QUIET_SEC = 1.0
-
-_FIRST_BACKOFF_SEC = 0.1
-_LONGEST_BACKOFF_SEC = 30.0
-# A node that lived this long has recovered: the next restart is prompt again.
-_RECOVERED_SEC = 60.0
 
 
 @dataclass(slots=True)
@@ -98,64 +88,3 @@ def _say_count(owner: str, place: str, count: _ErrorCount) -> str:
     times = 'once more' if count.unsaid == 1 else f'{count.unsaid} more times'
     count.unsaid = 0
     return f'{owner} ({place}) raised {times}, last: {count.last_error}'
-
-
-@dataclass(slots=True)
-class Backoff:
-    """How long to wait before the next restart of a node: from 0.1 s, doubled, to 30 s."""
-
-    _delay_sec: float = _FIRST_BACKOFF_SEC
-    _last_restart: float = float('-inf')
-
-    def next_delay_sec(self) -> float:
-        """Return the delay before the restart that is due now."""
-        now = monotonic()
-        if now - self._last_restart > _RECOVERED_SEC:
-            self._delay_sec = _FIRST_BACKOFF_SEC
-        delay = self._delay_sec
-        self._delay_sec = min(delay * 2, _LONGEST_BACKOFF_SEC)
-        self._last_restart = now + delay
-        return delay
-
-
-class Supervisor:
-    """Acts on errors as `on_error` says.
-
-    Args:
-        restart: Rebuilds the node of this name.
-        shutdown: Ends the system with this exit code.
-    """
-
-    def __init__(self, restart: Callable[[str], None], shutdown: Callable[[int], None]) -> None:
-        self._restart = restart
-        self._shutdown = shutdown
-        self._backoffs: dict[str, Backoff] = {}
-        self._restarting: set[str] = set()
-        self._lock = threading.Lock()
-        self._stopped = threading.Event()
-
-    def act(self, node: str, on_error: OnError) -> None:
-        """Do what `on_error` says about an error of a node."""
-        if on_error == 'shutdown':
-            self._shutdown(1)
-        elif on_error == 'restart':
-            with self._lock:
-                if node in self._restarting:
-                    return
-                self._restarting.add(node)
-            # The behaviour that raised is one of the node's callbacks: it must end first.
-            threading.Thread(
-                target=self._restart_later, args=(node,), name=f'restart-{node}', daemon=True
-            ).start()
-
-    def stop(self) -> None:
-        """Restart no more nodes."""
-        self._stopped.set()
-
-    def _restart_later(self, node: str) -> None:
-        backoff = self._backoffs.setdefault(node, Backoff())
-        stopped = self._stopped.wait(backoff.next_delay_sec())
-        with self._lock:
-            self._restarting.discard(node)
-        if not stopped:
-            self._restart(node)

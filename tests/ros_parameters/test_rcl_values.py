@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from composer.ros_parameters.rcl_scalars import read_plain_scalar
+from composer.ros_parameters.rcl_values import read_plain_scalar
 
 CASES = {
     'yes': True,

@@ -4,9 +4,9 @@ import textwrap
 
 import pytest
 
+from composer.ros_parameters.file_reader import parse_parameter_file
 from composer.ros_parameters.node_patterns import find_pattern_fault, matches_pattern
 from composer.ros_parameters.overrides import find_overrides, parse_command_line
-from composer.ros_parameters.parameter_files import parse_parameter_file
 from composer.ros_parameters.rcl_values import parse_override
 
 

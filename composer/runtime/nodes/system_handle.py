@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,15 +13,32 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.language.specs import OnError, QosSpec
-    from composer.runtime.behaviours.failures import ServiceFailures
-    from composer.runtime.behaviours.waiting import StopSignal
+    from composer.runtime.behaviours.waits import StopSignal
     from composer.runtime.health.statistics import HealthBoard
     from composer.runtime.system_executor import SystemExecutor
     from composer.yaml_text.positions import SourceMap
 
 
+class ServiceFailures:
+    """When the behaviour of a service last raised, by the service's full name."""
+
+    def __init__(self) -> None:
+        self._times: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    def note(self, service: str) -> None:
+        """Note that a request got no response because the behaviour raised."""
+        with self._lock:
+            self._times[service] = monotonic()
+
+    def since(self, service: str, begun: float) -> bool:
+        """Return whether the service failed after `begun`, a time of `time.monotonic`."""
+        with self._lock:
+            return self._times.get(service, float('-inf')) >= begun
+
+
 @dataclass(frozen=True, slots=True)
-class SystemServices:
+class SystemHandle:
     """What nodes need of the system that they are part of.
 
     Attributes:

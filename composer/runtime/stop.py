@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.python_source.modules import FunctionKind
-from composer.runtime.behaviours.functions import kind_of
+from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -142,12 +142,12 @@ def _end(node: LiveNode, timeout_sec: float) -> None:
     if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
         done = threading.Event()
         task = node.services.executor.create_task(
-            call.as_callback(FunctionKind.COROUTINE), node.face
+            call.as_callback(FunctionKind.COROUTINE), node.behaviour_node
         )
         task.add_done_callback(lambda _task: done.set())
         done.wait(timeout_sec)
     else:
-        call.run(node.face)
+        call.run(node.behaviour_node)
 
 
 def _wait_until_idle(node: LiveNode, deadline: float) -> bool:

@@ -1,22 +1,90 @@
-"""How a node is built anew after an error: all of it ends, then it starts as at the first time."""
+"""What `on_error` says is done when a behaviour raises; above all, nodes are restarted."""
 
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
 from composer.runtime.logs import system_logger
-from composer.runtime.nodes.stop import stop_node
+from composer.runtime.stop import stop_node
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
+    from composer.language.specs import OnError
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.runtime.nodes.start import NodeStarter
-    from composer.runtime.system_services import SystemServices
+    from composer.runtime.nodes.system_handle import SystemHandle
+    from composer.runtime.start import NodeStarter
 
 _GONE_SEC = 2.0
+_FIRST_BACKOFF_SEC = 0.1
+_LONGEST_BACKOFF_SEC = 30.0
+# A node that ran this long has recovered: the next restart is prompt again.
+_RECOVERED_SEC = 60.0
+
+
+@dataclass(slots=True)
+class Backoff:
+    """How long to wait before the next restart of a node: from 0.1 s, doubled, to 30 s."""
+
+    _delay_sec: float = _FIRST_BACKOFF_SEC
+    _last_restart: float = float('-inf')
+
+    def next_delay_sec(self) -> float:
+        """Return the delay before the restart that is due now."""
+        now = monotonic()
+        if now - self._last_restart > _RECOVERED_SEC:
+            self._delay_sec = _FIRST_BACKOFF_SEC
+        delay = self._delay_sec
+        self._delay_sec = min(delay * 2, _LONGEST_BACKOFF_SEC)
+        self._last_restart = now + delay
+        return delay
+
+
+class ErrorPolicy:
+    """Does what `on_error` says when a behaviour raises.
+
+    Args:
+        restart: Rebuilds the node of this name.
+        shutdown: Ends the system with this exit code.
+    """
+
+    def __init__(self, restart: Callable[[str], None], shutdown: Callable[[int], None]) -> None:
+        self._restart = restart
+        self._shutdown = shutdown
+        self._backoffs: dict[str, Backoff] = {}
+        self._restarting: set[str] = set()
+        self._lock = threading.Lock()
+        self._stopped = threading.Event()
+
+    def act(self, node: str, on_error: OnError) -> None:
+        """Do what `on_error` says about an error of a node."""
+        if on_error == 'shutdown':
+            self._shutdown(1)
+        elif on_error == 'restart':
+            with self._lock:
+                if node in self._restarting:
+                    return
+                self._restarting.add(node)
+            # The behaviour that raised is one of the node's callbacks: it must end first.
+            threading.Thread(
+                target=self._restart_later, args=(node,), name=f'restart-{node}', daemon=True
+            ).start()
+
+    def stop(self) -> None:
+        """Restart no more nodes."""
+        self._stopped.set()
+
+    def _restart_later(self, node: str) -> None:
+        backoff = self._backoffs.setdefault(node, Backoff())
+        stopped = self._stopped.wait(backoff.next_delay_sec())
+        with self._lock:
+            self._restarting.discard(node)
+        if not stopped:
+            self._restart(node)
 
 
 class NodeRestarter:
@@ -34,7 +102,7 @@ class NodeRestarter:
         self,
         nodes: Mapping[str, LiveNode],
         starter: NodeStarter,
-        services: SystemServices,
+        services: SystemHandle,
         timeout_sec: float,
     ) -> None:
         self.lock = threading.Lock()

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.errors import StartError
-from composer.runtime.behaviours.error_texts import represent
+from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
 
 if TYPE_CHECKING:
     from composer.language.specs import NodeSpec
-    from composer.runtime.system_services import SystemServices
+    from composer.runtime.nodes.system_handle import SystemHandle
 
 _POLL_SEC = 0.05
 
@@ -27,7 +27,7 @@ class NodeStarter:
         nodes: Takes each node that is created, by its full name.
     """
 
-    def __init__(self, nodes: dict[str, LiveNode], services: SystemServices) -> None:
+    def __init__(self, nodes: dict[str, LiveNode], services: SystemHandle) -> None:
         self._nodes = nodes
         self._services = services
 
@@ -61,7 +61,7 @@ class NodeStarter:
         failures: list[BaseException] = []
         call = node.hook('on_start', hook, failures.append)
         done = threading.Event()
-        task = self._services.executor.create_task(call.as_callback(), node.face)
+        task = self._services.executor.create_task(call.as_callback(), node.behaviour_node)
         task.add_done_callback(lambda _task: done.set())
         while not done.wait(_POLL_SEC) and not self._services.stop.is_set:
             pass

@@ -9,7 +9,7 @@ pytest.importorskip('rclpy')
 from rclpy.task import Future
 
 from composer.errors import SystemStoppingError
-from composer.runtime.behaviours.waiting import CoroutineWaits, StopSignal, ThreadWaits
+from composer.runtime.behaviours.waits import CoroutineWaits, StopSignal, ThreadWaits
 
 pytestmark = pytest.mark.ros
 
