@@ -23,9 +23,9 @@ from composer.names import (
     suggest,
     with_article,
 )
+from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import read_parameter_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
-    from composer.ros_parameters.parameter_files import ParameterEntry, ParameterFile
+    from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.cycles import find_cycles
 from composer.python_source.modules import FunctionKind, ModuleSource
-from composer.python_source.returns import always_answers
+from composer.python_source.return_values import always_answers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
