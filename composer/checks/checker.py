@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
-    from composer.rules.record import Need
+    from composer.rules import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
 SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'

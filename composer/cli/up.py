@@ -75,7 +75,7 @@ def _run(
     ros_arguments: Sequence[str],
     log_levels: Sequence[str],
 ) -> int:
-    from composer.runtime.behaviours.functions import project_on_path
+    from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.run import run_system
 
     provide_declared(system, lambda line: click.echo(line, err=True))

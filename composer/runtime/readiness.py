@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.processes.live_process import LiveProcess
     from composer.processes.supervisor import Processes
-    from composer.runtime.behaviours.waiting import StopSignal
+    from composer.runtime.behaviours.waits import StopSignal
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
 

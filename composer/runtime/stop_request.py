@@ -6,7 +6,7 @@ import queue
 from contextlib import suppress
 
 from composer.errors import ExitCode
-from composer.runtime.behaviours.waiting import StopSignal
+from composer.runtime.behaviours.waits import StopSignal
 
 _LONGEST_DEAF_SEC = 0.5
 

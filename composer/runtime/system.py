@@ -7,28 +7,27 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode
 from composer.processes.supervisor import Processes
-from composer.runtime.behaviours.error_handling import Supervisor
-from composer.runtime.behaviours.failures import ServiceFailures
 from composer.runtime.health.diagnostics_publisher import HealthPublisher
 from composer.runtime.health.hangs import HangWatch
 from composer.runtime.health.statistics import HealthBoard
 from composer.runtime.health.unmatched import GraphWatch
 from composer.runtime.logs import system_logger
-from composer.runtime.nodes.restart import NodeRestarter
-from composer.runtime.nodes.start import NodeStarter
-from composer.runtime.nodes.stop import stop_nodes
+from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.ownership import release, reserve
 from composer.runtime.readiness import Readiness, describe_parts, list_waiters
+from composer.runtime.restart import ErrorPolicy, NodeRestarter
 from composer.runtime.ros_context import create_ros_context
+from composer.runtime.start import NodeStarter
+from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.system_services import SystemServices
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.health.unmatched import Endpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
 
@@ -68,8 +67,8 @@ class System:
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._watch = HangWatch(lambda: list(self._nodes.values()), _limits(spec))
-        self._graph_watch = GraphWatch(lambda: list(self._nodes.values()))
-        self._supervisor = Supervisor(self._restart, self._stop_request.make)
+        self._graph_watch = GraphWatch(self._endpoints)
+        self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._services = self._share(positions, functions, ros_arguments)
         self._starter = NodeStarter(self._nodes, self._services)
         self._restarter = NodeRestarter(
@@ -89,15 +88,15 @@ class System:
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str],
-    ) -> SystemServices:
+    ) -> SystemHandle:
         spec = self._spec
-        return SystemServices(
+        return SystemHandle(
             context=self._context,
             positions=positions,
             profiles=spec.qos,
             functions=functions,
             ros_arguments=ros_arguments,
-            act_on_error=self._supervisor.act,
+            act_on_error=self._error_policy.act,
             shutdown=self._stop_request.make,
             executor=self._executor,
             stop=self._stop_request.signal,
@@ -168,7 +167,7 @@ class System:
             The exit code, and whether all behaviours have ended. If they have not, their threads
             still run, and only the end of the process ends them.
         """
-        self._supervisor.stop()
+        self._error_policy.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
         # An `on_stop` may have needed them.
@@ -231,6 +230,9 @@ class System:
             for call in node.ledger.running()
             if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
+
+    def _endpoints(self) -> list[Endpoint]:
+        return [end for node in list(self._nodes.values()) for end in node.endpoints]
 
     def _on_lost(self) -> None:
         if not self.stop_requested:
