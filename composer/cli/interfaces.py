@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.ament import ament_prefixes
 from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import describe_declared, provide_declared
 from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import (
@@ -68,7 +69,7 @@ def show(name: str) -> int:
     Raises:
         UnknownInterfaceError: There is no such interface.
     """
-    description = describe_interface(name, default_prefixes())
+    description = describe_interface(name, ament_prefixes())
     if description is None:
         message = f"no installed package has an interface '{name}'"
         raise UnknownInterfaceError(message, help=_advise(name))
