@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.error_texts import format_error, place_of, summarize
 
 if TYPE_CHECKING:
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
 
 # At most one line about the same entity in this time.
 _QUIET_SEC = 1.0
-
-_FIRST_BACKOFF_SEC = 0.1
-_LONGEST_BACKOFF_SEC = 30.0
-# A node that lived this long has recovered: the next restart is prompt again.
-_RECOVERED_SEC = 60.0
 
 
 @dataclass(slots=True)
@@ -98,24 +94,6 @@ def _say_count(owner: str, place: str, count: _ErrorCount) -> str:
     times = 'once more' if count.unsaid == 1 else f'{count.unsaid} more times'
     count.unsaid = 0
     return f'{owner} ({place}) raised {times}, last: {count.last_error}'
-
-
-@dataclass(slots=True)
-class Backoff:
-    """How long to wait before the next restart of a node: from 0.1 s, doubled, to 30 s."""
-
-    _delay_sec: float = _FIRST_BACKOFF_SEC
-    _last_restart: float = float('-inf')
-
-    def next_delay_sec(self) -> float:
-        """Return the delay before the restart that is due now."""
-        now = monotonic()
-        if now - self._last_restart > _RECOVERED_SEC:
-            self._delay_sec = _FIRST_BACKOFF_SEC
-        delay = self._delay_sec
-        self._delay_sec = min(delay * 2, _LONGEST_BACKOFF_SEC)
-        self._last_restart = now + delay
-        return delay
 
 
 class Supervisor:

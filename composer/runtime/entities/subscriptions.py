@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.entities.qos_profiles import create_qos_profile
-from composer.runtime.health.unmatched import Endpoint
+from composer.runtime.health.unmatched import TopicEndpoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +34,7 @@ def create_subscriptions(node: LiveNode) -> None:
             call.as_callback(),
             profile,
             callback_group=node.group(spec.group),
-            event_callbacks=Endpoint(node, spec, profile).subscription_events(),
+            event_callbacks=TopicEndpoint(node, spec, profile).subscription_events(),
         )
         node.follow(owner, subscription)
 

@@ -20,7 +20,7 @@ from rclpy.qos import (
 )
 
 from composer.language.specs import PublisherSpec
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -44,7 +44,7 @@ _CONFLICTS = {
 }
 
 
-class Endpoint:
+class TopicEndpoint:
     """A publisher or subscription of a node, and whom it cannot talk to.
 
     Attributes:
@@ -148,7 +148,7 @@ class Endpoint:
         )
 
 
-class GraphWatch(Watch):
+class GraphWatcher(Watcher):
     """The thread that looks who meets.
 
     Args:

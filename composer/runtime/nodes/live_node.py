@@ -26,7 +26,7 @@ from composer.runtime.nodes.callback_groups import (
 )
 from composer.runtime.nodes.node import Node, Publish
 from composer.runtime.nodes.ros_node import ComposedRosNode
-from composer.runtime.ownership import release, reserve
+from composer.runtime.reserved_methods import release, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from composer.runtime.entities.action_clients import ActionClient
     from composer.runtime.entities.service_clients import ServiceClient
     from composer.runtime.health.statistics import EntityHealth
-    from composer.runtime.health.unmatched import Endpoint
+    from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.system_services import SystemServices
     from composer.yaml_text.positions import DataPath
 
@@ -93,7 +93,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
-    endpoints: list[Endpoint] = field(default_factory=list)
+    endpoints: list[TopicEndpoint] = field(default_factory=list)
     at_stop: list[AtStop] = field(default_factory=list)
     limits: dict[str, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
