@@ -21,7 +21,7 @@ from composer.errors import (
     ServiceNotAvailableError,
     SystemStoppingError,
 )
-from composer.runtime.nodes.node import Node
+from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
     'ActionNotAvailableError',

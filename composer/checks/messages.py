@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.interfaces.descriptions import MessageDescription
-from composer.interfaces.payload_faults import find_payload_faults
+from composer.interfaces.payload_checks import find_payload_faults
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -116,10 +116,10 @@ def check_rule(
 
 def _find_rule(name: str) -> None:
     from composer.names import suggest
-    from composer.rules import RULES
+    from composer.rules import list_rule_names
 
-    if name not in RULES:
-        near = suggest(name, RULES)
+    if name not in list_rule_names():
+        near = suggest(name, list_rule_names())
         message = f"no rule is called '{name}'"
         advice = f"did you mean '{near}'?" if near else "'composer explain' lists them"
         raise UsageError(message, help=advice)

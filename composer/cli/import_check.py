@@ -7,9 +7,9 @@ import sys
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
-from composer.checks.behaviours.functions import check_behaviour_call
+from composer.checks.behaviours.behaviour_functions import check_behaviour_call
 from composer.language.bindings import Binding, node_bindings
-from composer.runtime.behaviours import functions as behaviours
+from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

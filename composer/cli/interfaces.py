@@ -10,14 +10,14 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.declared import describe_declared, provide_declared
+from composer.interfaces.declared_packages import describe_declared, provide_declared
+from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import (
     ActionDescription,
     InterfaceDescription,
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.documentation import describe_interface
 from composer.language.pipeline import load_system
 from composer.names import did_you_mean, suggest
 

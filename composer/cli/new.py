@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
-from composer.schema.schema_file import SCHEMA_NAME, schema_path
+from composer.schema import SCHEMA_NAME, schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

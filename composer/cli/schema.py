@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from composer.errors import ExitCode
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 
 def print_schema(*, path_only: bool) -> int:

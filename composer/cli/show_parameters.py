@@ -15,9 +15,9 @@ from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.paths import resolve_path
 from composer.language.pipeline import load_system
+from composer.ros_parameters.file_reader import read_parameter_file
+from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import read_parameter_file
-from composer.ros_parameters.writer import render_parameter_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

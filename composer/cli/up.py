@@ -14,7 +14,7 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared import provide_declared
+from composer.interfaces.declared_packages import provide_declared
 from composer.language.arguments import describe_arguments
 from composer.language.pipeline import LoadedSystem, load_system
 from composer.python_source.module_finder import project_search_path
@@ -75,7 +75,7 @@ def _run(
     ros_arguments: Sequence[str],
     log_levels: Sequence[str],
 ) -> int:
-    from composer.runtime.behaviours.functions import project_on_path
+    from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.run import run_system
 
     provide_declared(system, lambda line: click.echo(line, err=True))

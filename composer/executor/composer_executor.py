@@ -11,9 +11,9 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
 from rclpy.task import Future, Task
 
-from composer.executor.alarms import Delay
-from composer.executor.engine import COURTESY_SEC, Engine
+from composer.executor.deadlines import Delay
 from composer.executor.missed import Missed
+from composer.executor.spinner import COURTESY_SEC, Engine
 from composer.executor.tasks import Resume, TaskRun
 
 _MOST_THREADS = 256

@@ -3,8 +3,8 @@
 from time import monotonic
 from typing import Any
 
-from composer.executor.alarms import Delay
-from composer.executor.crew import PATIENCE_SEC, Worker
+from composer.executor.deadlines import Delay
+from composer.executor.worker_threads import PATIENCE_SEC, Worker
 
 
 class Leader:

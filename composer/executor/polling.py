@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from threading import get_ident
 
-from composer.executor.alarms import Alarms
-from composer.executor.signals import SignalBoard
+from composer.executor.deadlines import Alarms
+from composer.executor.event_poller import SignalBoard
 
 
 class Polling:

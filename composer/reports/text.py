@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.diagnostics import Severity
 from composer.reports.report import count_severities
+from composer.rules import Severity
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span

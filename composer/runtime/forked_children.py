@@ -13,7 +13,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from composer.executor.forks import end_child
+from composer.executor.after_fork import end_child
 from composer.runtime.forced_exit import flush_output
 
 if TYPE_CHECKING:

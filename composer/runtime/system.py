@@ -7,20 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode
 from composer.processes.supervisor import ProcessSupervisor
-from composer.runtime.behaviours.error_handling import Supervisor
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
-from composer.runtime.nodes.restart import NodeRestarter
-from composer.runtime.nodes.start import NodeStarter
-from composer.runtime.nodes.stop import stop_nodes
+from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
+from composer.runtime.restart import ErrorPolicy, NodeRestarter
 from composer.runtime.ros_context import create_ros_context
+from composer.runtime.start import NodeStarter
+from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.system_services import ServiceFailures, SystemServices
 from composer.runtime.wait_for import WaitingStarter, describe_parts, list_waiters
 
 if TYPE_CHECKING:
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import SystemSpec
     from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
 
@@ -67,8 +67,8 @@ class System:
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
-        self._graph_watcher = GraphWatcher(lambda: list(self._nodes.values()))
-        self._supervisor = Supervisor(self._restart, self._stop_request.make)
+        self._graph_watcher = GraphWatcher(self._endpoints)
+        self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._services = self._share(positions, functions, ros_arguments)
         self._starter = NodeStarter(self._nodes, self._services)
         self._restarter = NodeRestarter(
@@ -89,15 +89,15 @@ class System:
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str],
-    ) -> SystemServices:
+    ) -> SystemHandle:
         spec = self._spec
-        return SystemServices(
+        return SystemHandle(
             context=self._context,
             positions=positions,
             profiles=spec.qos,
             functions=functions,
             ros_arguments=ros_arguments,
-            act_on_error=self._supervisor.act,
+            act_on_error=self._error_policy.act,
             shutdown=self._stop_request.make,
             executor=self._executor,
             stop=self._stop_request,
@@ -169,7 +169,7 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
-        self._supervisor.stop()
+        self._error_policy.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
         # Processes end after the nodes: an `on_stop` may need them.
@@ -232,6 +232,9 @@ class System:
             for call in node.ledger.running()
             if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
+
+    def _endpoints(self) -> list[TopicEndpoint]:
+        return [end for node in list(self._nodes.values()) for end in node.endpoints]
 
     def _on_lost(self) -> None:
         if not self.stop_requested:

@@ -12,7 +12,7 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
-from composer.runtime.behaviours.error_texts import format_fault
+from composer.runtime.behaviours.tracebacks import format_fault
 from composer.runtime.reserved_methods import release
 
 if TYPE_CHECKING:

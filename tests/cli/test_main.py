@@ -16,7 +16,7 @@ ROOT = Path(composer.__file__).parents[1]
 GREETER = ROOT / 'configs' / 'greeter.yaml'
 VALID = ROOT / 'tests' / 'data' / 'valid'
 INVALID = ROOT / 'tests' / 'data' / 'invalid'
-EXAMPLES = ROOT / 'composer' / 'examples'
+EXAMPLES = ROOT / 'composer' / 'rules'
 
 # A `sitecustomize` with which nothing of ROS can be imported, as if it were not installed.
 WITHOUT_ROS = """

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from composer.cli.main import run
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = {

@@ -4,9 +4,9 @@ import textwrap
 
 import pytest
 
-from composer.diagnostics import Severity
 from composer.errors import UsageError
 from composer.language.pipeline import load_system
+from composer.rules import Severity
 
 BASE = """
     version: 1

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import composer
-from composer.diagnostics import Diagnostic, Related, Severity, SourceFile, Span
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span
 from composer.reports import FORMATS, render_report
 from composer.reports.report import CheckedFile, Report, relative_path
 from composer.reports.text import render_files
@@ -27,9 +27,7 @@ ERROR = Diagnostic(
     help='write rover',
     related=(Related('here too', Span(SOURCE, 1, 1, 7)),),
 )
-WARNING = Diagnostic(
-    'unused-ignore', 'remove it', SOURCE.name, Span(SOURCE, 2, 7, 0), Severity.WARNING
-)
+WARNING = Diagnostic('unused-ignore', 'remove it', SOURCE.name, Span(SOURCE, 2, 7, 0))
 PLACELESS = Diagnostic('unreadable-file', 'cannot read the file', 'lander.yaml')
 REPORT = Report(
     (

@@ -7,17 +7,17 @@ themselves only note when they began.
 from __future__ import annotations
 
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.calls import RunningCall
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from composer.runtime.behaviours.calls import CallLedger
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.behaviours.error_reports import ErrorReporter
 
 _LOOKS_PER_LIMIT = 4
 _SHORTEST_PAUSE_SEC = 0.01
@@ -86,6 +86,23 @@ class HangLimit:
             self._warn(f'{self._owner} ({self._place}) {what} after {ran_sec:.1f} s')
 
 
+class WatchedNode(Protocol):
+    """What is looked at of a node.
+
+    Attributes:
+        limits: By the entities in words.
+    """
+
+    @property
+    def ledger(self) -> CallLedger: ...  # noqa: D102
+
+    @property
+    def limits(self) -> Mapping[str, HangLimit]: ...  # noqa: D102
+
+    @property
+    def errors(self) -> ErrorReporter: ...  # noqa: D102
+
+
 class HangWatcher(Watcher):
     """The thread that looks at what runs.
 
@@ -95,7 +112,7 @@ class HangWatcher(Watcher):
     """
 
     def __init__(
-        self, nodes: Callable[[], Iterable[LiveNode]], limits_sec: Iterable[float | None]
+        self, nodes: Callable[[], Iterable[WatchedNode]], limits_sec: Iterable[float | None]
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
         pause_sec = max(shortest / _LOOKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)

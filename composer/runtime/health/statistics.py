@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.executor import Missed
-from composer.runtime.behaviours.error_texts import summarize
+from composer.runtime.behaviours.tracebacks import summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from composer.runtime.behaviours.error_texts import format_fault
+from composer.runtime.behaviours.tracebacks import format_fault
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from operator import is_
 from typing import Any, Final, TypeAlias
 
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.values import (
+from composer.interfaces.field_values import (
     OCTET_KINDS,
     FieldError,
     Reader,

@@ -11,7 +11,7 @@ field. The same holds inside: wherever a message is wanted, all three will do. I
   wants (an `int` in a `float64` field, a tuple for a list) is replaced in place: rclpy 7 checks
   no fields unless `ROS_PYTHON_CHECK_FIELDS=1`, and publishes such an `int` as garbage.
 
-Which values fit which field is the business of `composer.interfaces.values`, for arrays of
+Which values fit which field is the business of `composer.interfaces.field_values`, for arrays of
 `composer.runtime.messages.arrays`. Both stop at the first fault.
 """
 
@@ -20,17 +20,17 @@ from functools import cache
 from typing import Any, Final
 
 from composer.errors import ComposerError
+from composer.interfaces.class_fields import describe_class
 from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.slots import describe_class
-from composer.interfaces.values import (
+from composer.interfaces.field_errors import format_fault, is_message_class
+from composer.interfaces.field_values import (
     FieldError,
     Reader,
     no_message,
     scalar_reader,
     unknown_field,
 )
-from composer.interfaces.wording import format_fault, is_message_class
 from composer.runtime.messages.arrays import array_reader
 
 # The types of most bare values, told at once from messages and mappings.

@@ -67,7 +67,7 @@ USED = {'msg/Wheel.msg': 'float64 radius 0.5\nstd_msgs/Header header\n'}
 PROVIDE = """
 import sys
 from pathlib import Path
-from composer.interfaces.packages import provide_packages
+from composer.interfaces.build.provision import provide_packages
 names = sys.argv[1].split(',')
 provided = provide_packages(dict(zip(names, map(Path, sys.argv[2:]))), print)
 """

@@ -149,7 +149,7 @@ def test_the_board_knows_the_oldest_call_of_each_entity():
 
 def measured_call(function, times, failed=lambda owner, error: None):
     return BehaviourCall(
-        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, times=times
+        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, add_time=times.add
     )
 
 

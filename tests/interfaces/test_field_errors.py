@@ -1,0 +1,43 @@
+import pytest
+
+from composer.interfaces.field_errors import describe_value, format_fault, format_path
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [
+        (None, 'None'),
+        (5, 'int 5'),
+        (True, 'bool True'),
+        ('fast', "str 'fast'"),
+        ({'x': 1}, "dict {'x': 1}"),
+    ],
+)
+def test_a_value_is_described_by_type_and_content(value: object, text: str) -> None:
+    assert describe_value(value) == text
+
+
+def test_an_integer_that_python_refuses_to_print_is_described_by_its_size() -> None:
+    assert describe_value(10**5000) == 'an integer of 16610 bits'
+
+
+def test_a_long_value_is_shortened() -> None:
+    assert len(describe_value('x' * 10_000)) < 100
+    assert len(describe_value(list(range(10_000)))) < 100
+
+
+def test_an_array_is_described_without_its_content() -> None:
+    np = pytest.importorskip('numpy')
+    assert describe_value(np.zeros((2, 3))) == 'ndarray of float64, shape (2, 3)'
+    assert describe_value(np.int8(5)) == 'int8 np.int8(5)'
+
+
+def test_a_path_is_written_as_code() -> None:
+    assert format_path(()) == ''
+    assert format_path(('pose', 'position', 'x')) == 'pose.position.x'
+    assert format_path(('points', 3, 'y')) == 'points[3].y'
+
+
+def test_a_fault_names_message_and_field() -> None:
+    assert format_fault('a/msg/B', ('c', 0), 'wrong') == 'a/msg/B: c[0]: wrong'
+    assert format_fault('a/msg/B', (), 'a/msg/B has no field') == 'a/msg/B has no field'
