@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.diagnostics import Diagnostic
 from composer.errors import ComposerError
 from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.dependencies import (
     check_definitions,
     order_packages,
@@ -17,7 +18,6 @@ from composer.interfaces.definitions.dependencies import (
 )
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 from composer.interfaces.importing import make_importable
-from composer.interfaces.prefixes import find_package_prefix
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
@@ -98,7 +98,7 @@ def provide_packages(
         ModuleTakenError: another Python module has a package's name.
     """
     packages = load_packages(folders)
-    provider = _Provider(default_prefixes(), progress)
+    provider = _Provider(ament_prefixes(), progress)
     return [provider.provide(definitions) for definitions in packages]
 
 
@@ -112,7 +112,7 @@ class _Provider:
         self._keys: dict[str, str] = {}
 
     def provide(self, definitions: PackageDefinitions) -> ProvidedPackage:
-        installed = find_package_prefix(definitions.package, self._prefixes)
+        installed = find_package(definitions.package, self._prefixes, INTERFACE_INDEX)
         if installed is not None:
             # Imported here, as the builder below: a cached start must not pay for it.
             from composer.interfaces.definitions.differences import require_same
