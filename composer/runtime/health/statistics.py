@@ -188,7 +188,7 @@ class EntityHealth:
             self._all_missed = self._past + missed
 
 
-class HealthBoard:
+class HealthRegistry:
     """The health of all entities of a system that have something to do."""
 
     def __init__(self) -> None:
