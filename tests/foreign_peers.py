@@ -14,7 +14,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer, GoalResponse
 from rclpy.parameter import Parameter
 
-from composer.interfaces.packages import provide_packages
+from composer.interfaces.build.provision import provide_packages
 
 DEADLINE_SEC = 40.0
 FOLDER = Path(__file__).resolve().parent.parent / 'interfaces'

@@ -6,11 +6,10 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.checks.behaviours.annotations import check_annotations
-from composer.checks.behaviours.functions import check_behaviour_sources
-from composer.checks.behaviours.node_uses import UseReader
+from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
 from composer.checks.behaviours.transforms import check_transforms
-from composer.checks.behaviours.uses import check_uses
+from composer.checks.behaviours.unknown_and_unused import check_uses
+from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.typos import check_slips
 from composer.checks.connections.waits import check_waits
 from composer.checks.connections.wiring import check_wiring
@@ -29,8 +28,9 @@ from composer.checks.processes import (
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared import describe_declared
+from composer.interfaces.declared_packages import describe_declared
 from composer.language.pipeline import LoadedSystem, load_system
+from composer.python_source.behaviour_uses import UseReader
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
-    from composer.rules.record import Need
+    from composer.rules import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
 SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'

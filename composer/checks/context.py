@@ -10,11 +10,11 @@ from composer.diagnostics import Related, diagnostic_at
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from composer.checks.behaviours.node_uses import UseReader
     from composer.diagnostics import Diagnostic, Remarks, Span
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.pipeline import LoadedSystem
     from composer.language.specs import EndSpec, SystemSpec
+    from composer.python_source.behaviour_uses import UseReader
     from composer.python_source.module_finder import ModuleFinder
     from composer.yaml_text.positions import DataPath
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import UsageError
+from composer.expressions import is_variable_name
 from composer.names import did_you_mean
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -21,10 +22,6 @@ _SEPARATOR = ':='
 # What a file is checked with where a required argument has no value.
 _SAMPLES: dict[str, Any] = {'bool': True, 'integer': 1, 'double': 1.0, 'string': 'sample'}
 ARGUMENT_TYPES = tuple(_SAMPLES)
-# What an expression reads as a word of its own.
-_RESERVED = frozenset(
-    ('and', 'else', 'if', 'in', 'is', 'not', 'or', 'self', 'true', 'false', 'none')
-) | {'True', 'False', 'None'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +96,7 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if not is_usable_name(argument.name):
+    if not is_variable_name(argument.name):
         yield (), f"'{argument.name}' cannot stand in an expression as a name"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
@@ -109,11 +106,6 @@ def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | i
             yield keys, fault
     if default is not None and choices and default not in choices:
         yield ('default',), f'the default {default!r} is none of the choices'
-
-
-def is_usable_name(name: str) -> bool:
-    """Return whether an expression can use a name."""
-    return name.isidentifier() and name not in _RESERVED
 
 
 def _find_value_fault(value: Any, type_name: str) -> str | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.executor import MissedCounts
-from composer.runtime.behaviours.error_texts import summarize
+from composer.runtime.behaviours.tracebacks import summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -188,7 +188,7 @@ class EntityHealth:
             self._all_missed = self._past + missed
 
 
-class HealthBoard:
+class HealthRegistry:
     """The health of all entities of a system that have something to do."""
 
     def __init__(self) -> None:

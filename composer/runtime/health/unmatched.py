@@ -20,16 +20,16 @@ from rclpy.qos import (
 )
 
 from composer.language.specs import PublisherSpec
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from rclpy.node import Node as RosNode
     from rclpy.qos import QoSProfile
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
     from composer.language.specs import SubscriptionSpec
-    from composer.runtime.nodes.live_node import LiveNode
 
 _PAUSE_SEC = 1.0
 # The graph may learn the name of an end a little later than the event tells of it.
@@ -44,24 +44,32 @@ _CONFLICTS = {
 }
 
 
-class Endpoint:
+class TopicEndpoint:
     """A publisher or subscription of a node, and whom it cannot talk to.
+
+    Args:
+        ros: Its node.
+        place: Where the file declares it, as `file:line`.
 
     Attributes:
         topic: Its name in the graph.
     """
 
     def __init__(
-        self, node: LiveNode, spec: PublisherSpec | SubscriptionSpec, profile: QoSProfile
+        self,
+        ros: RosNode,
+        spec: PublisherSpec | SubscriptionSpec,
+        profile: QoSProfile,
+        place: str,
     ) -> None:
-        self._node = node
+        self.ros = ros
+        self._place = place
         self._spec = spec
         self._profile = profile
         self._publishes = isinstance(spec, PublisherSpec)
         self._told: set[tuple[str, str]] = set()
         self._looks = 0
-        self.topic = node.ros.resolve_topic_name(spec.topic)
-        node.endpoints.append(self)
+        self.topic = ros.resolve_topic_name(spec.topic)
 
     def subscription_events(self) -> SubscriptionEventCallbacks:
         """Return what rclpy takes for a subscription."""
@@ -103,11 +111,10 @@ class Endpoint:
         self.expect()
 
     def _others(self) -> list[TopicEndpointInfo]:
-        ros = self._node.ros
         get = (
-            ros.get_subscriptions_info_by_topic
+            self.ros.get_subscriptions_info_by_topic
             if self._publishes
-            else ros.get_publishers_info_by_topic
+            else self.ros.get_publishers_info_by_topic
         )
         return list(get(self.topic))
 
@@ -117,9 +124,8 @@ class Endpoint:
             if self._publishes
             else ('subscription', 'gets nothing from')
         )
-        place = self._node.place(self._spec.path)
-        owner = f"{kind} '{self._spec.name}' ({place})"
-        self._node.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
+        owner = f"{kind} '{self._spec.name}' ({self._place})"
+        self.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
 
     def _reason(self, end: TopicEndpointInfo) -> str | None:
         """Return why nothing passes between this end and another, `None` if it does."""
@@ -148,16 +154,16 @@ class Endpoint:
         )
 
 
-class GraphWatch(Watch):
+class GraphWatcher(Watcher):
     """The thread that looks who meets.
 
     Args:
-        nodes: Returns the nodes that there are now.
+        endpoints: Returns the endpoints that there are now.
     """
 
-    def __init__(self, nodes: Callable[[], Iterable[LiveNode]]) -> None:
+    def __init__(self, endpoints: Callable[[], Iterable[TopicEndpoint]]) -> None:
         super().__init__('composer-graph', self._look_unless_destroyed, _PAUSE_SEC)
-        self._nodes = nodes
+        self._endpoints = endpoints
         self._seen: list[tuple[str, list[str]]] = []
 
     def _look_unless_destroyed(self) -> None:
@@ -166,22 +172,21 @@ class GraphWatch(Watch):
             self._look_at_graph()
 
     def _look_at_graph(self) -> None:
-        nodes = list(self._nodes())
-        mixed = self._newly_mixed_topics(nodes)
-        for node in nodes:
-            for end in node.endpoints:
-                if self._ended.is_set():
-                    return
-                if end.topic in mixed:
-                    end.expect()
-                if end.is_due:
-                    end.look()
+        endpoints = list(self._endpoints())
+        mixed = self._newly_mixed_topics(endpoints)
+        for end in endpoints:
+            if self._ended.is_set():
+                return
+            if end.topic in mixed:
+                end.expect()
+            if end.is_due:
+                end.look()
 
-    def _newly_mixed_topics(self, nodes: list[LiveNode]) -> set[str]:
+    def _newly_mixed_topics(self, endpoints: list[TopicEndpoint]) -> set[str]:
         """Return the topics with several types, if anything in the graph has changed."""
-        if not nodes:
+        if not endpoints:
             return set()
-        topics = nodes[0].ros.get_topic_names_and_types()
+        topics = endpoints[0].ros.get_topic_names_and_types()
         if topics == self._seen:
             return set()
         self._seen = topics

@@ -14,7 +14,7 @@ from composer.executor import MissedCounts
 from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, RunningCall
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.diagnostics_publisher import node_name
-from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthBoard
+from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry
 
 
 def times_of(durations):
@@ -123,7 +123,7 @@ def test_a_huge_error_that_ros_cannot_say_is_made_short_and_sayable():
 
 
 def test_counts_survive_that_the_node_is_built_anew():
-    board = HealthBoard()
+    board = HealthRegistry()
     old = board.entity('/a', "timer 'b'")
     counts = [MissedCounts(late_ticks=2)]
     old.follow(lambda: counts[-1])
@@ -138,7 +138,7 @@ def test_counts_survive_that_the_node_is_built_anew():
 
 
 def test_the_board_knows_the_oldest_call_of_each_entity():
-    board = HealthBoard()
+    board = HealthRegistry()
     for owner in ("timer 'b'", "timer 'c'"):
         board.entity('/a', owner)
     running = [('/a', RunningCall("timer 'b'", begun_ns, 1)) for begun_ns in (9, 4, 6)]
@@ -149,7 +149,7 @@ def test_the_board_knows_the_oldest_call_of_each_entity():
 
 def measured_call(function, times, failed=lambda owner, error: None):
     return BehaviourCall(
-        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, times=times
+        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, add_time=times.add
     )
 
 
