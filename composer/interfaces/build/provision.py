@@ -1,8 +1,11 @@
 """Provide the interface packages that a system names: installed, cached, or built now."""
 
+import importlib
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -17,7 +20,6 @@ from composer.interfaces.definitions.dependencies import (
     used_packages,
 )
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
-from composer.interfaces.importing import make_importable
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
@@ -39,6 +41,10 @@ def _format(diagnostic: Diagnostic) -> str:
     place = diagnostic.span or diagnostic.file
     text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
     return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
+
+
+class ModuleTakenError(ComposerError):
+    """Python already has another module of an interface package's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,3 +163,32 @@ class _Provider:
         )
         duration_sec = time.monotonic() - start
         self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
+
+
+def make_importable(package: str, prefix: Path) -> None:
+    """Have `import package` find the package in a prefix, now and in modules imported later.
+
+    Raises:
+        ModuleTakenError: another module of that name is found first.
+    """
+    folder = prefix / 'python'
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+        importlib.invalidate_caches()
+    origin = _find_origin(package)
+    if origin != folder / package / '__init__.py':
+        message = (
+            f'the interface package {package!r} cannot be imported: '
+            f'{origin or "another package"} has that name'
+        )
+        raise ModuleTakenError(
+            message,
+            help='rename one of them; if the definitions changed since the package was imported, '
+            'start again',
+        )
+
+
+def _find_origin(package: str) -> Path | None:
+    loaded = sys.modules.get(package)
+    spec = loaded.__spec__ if loaded else find_spec(package)
+    return Path(spec.origin) if spec and spec.origin else None
