@@ -126,7 +126,7 @@ class LiveNode:
         """Let the health of an entity in words tell what its ROS entity has missed."""
         health = self.health(owner)
         if health is not None:
-            health.follow(partial(self.services.executor.missed, self.ros, entity))
+            health.follow(partial(self.services.executor.missed_counts, self.ros, entity))
 
     @property
     def full_name(self) -> str:
