@@ -50,7 +50,7 @@ def reference_page(schema: dict[str, Any]) -> Iterator[str]:
     """
     yield '# Reference'
     yield ''
-    yield 'Every key of a system file. Generated from `schemas/composer.schema.json` by `make docs`.'
+    yield 'Every key of a file. Generated from `schemas/composer.schema.json` by `make docs`.'
     yield ''
     yield 'Any scalar can be an expression, in quotes: `"{{ name }}"`.'
     yield ''

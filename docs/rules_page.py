@@ -17,7 +17,7 @@ def rules_page() -> Iterator[str]:
     """Yield the lines of a page with every rule, what it means and why, and an example."""
     yield '# The rules'
     yield ''
-    yield 'Generated from `composer/rules/` by `make docs`. `composer explain RULE` shows the same.'
+    yield 'Generated from `composer/rules/` by `make docs`. `composer explain RULE` prints a rule.'
     yield ''
     families = load_families()
     for family in families:
