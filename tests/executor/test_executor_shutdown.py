@@ -152,9 +152,9 @@ def test_spin_ends_when_a_signal_ends_the_context_while_events_are_checked(
     check_events = wait_set_thread._check_events
 
     def check_in_vain() -> None:
-        if wait_set_thread._default_events.sources:
+        if wait_set_thread._seldom.sources:
             context.handle.shutdown()  # As rclpy's handler of signals does it.
-            wait_set_thread._default_events.due = 0.0
+            wait_set_thread._seldom.due = 0.0
         check_events()
 
     monkeypatch.setattr(wait_set_thread, '_check_events', check_in_vain)
