@@ -74,7 +74,7 @@ def test_diagnostics_tell_rate_age_and_fault(face, set_time):
         (
             b'\x01',
             '/node: scan',
-            '1 messages a second, 5 are expected',
+            '1 messages/s, at least 5 expected',
             {'rate (Hz)': '1', 'age (s)': '0.5'},
         ),
     ]

@@ -110,9 +110,9 @@ def test_transform_says_why_a_field_has_no_value(face, expression, reason):
     with pytest.raises(TransformError) as raised:
         transform(face, Float64(), {'linear.x': expression})
     text = str(raised.value)
-    assert text.startswith(f"'linear.x' has no value by '{expression}': ")
+    assert text.startswith(f"cannot evaluate '{expression}' for 'linear.x': ")
     assert reason in text
-    assert raised.value.help == 'in scope are message, data'
+    assert raised.value.help == 'expressions can use message, data'
 
 
 def test_transform_leaves_what_is_not_a_number_to_the_message(face):
