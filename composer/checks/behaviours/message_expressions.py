@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from jinja2 import StrictUndefined, TemplateError, nodes
+from jinja2 import TemplateError, nodes
 
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
-from composer.interfaces.field_values import unknown_field
+from composer.interfaces.field_errors import unknown_field
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def find_expression_faults(
         heard: The message; its fields are in scope, and it itself as `message`.
         catalogue: Describes nested messages; what it does not know is taken as right.
     """
-    sandbox = Sandbox(undefined=StrictUndefined)
+    sandbox = Sandbox()
     try:
         expression = sandbox.parse_expression(code)
     except TemplateError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Related, Severity
+from composer.diagnostics import Related
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
 from composer.names import did_you_mean, suggest
@@ -127,10 +127,10 @@ def _explain_name(
     use, behaviour = found.use, binding.behaviour
     section = _SECTIONS[use.kind]
     declares_not = f"node '{node.name}' declares no {use.kind} '{use.name}'"
-    rule, severity = _UNKNOWN[use.kind], Severity.ERROR
+    rule = _UNKNOWN[use.kind]
     message = f"{declares_not}, which '{behaviour.function}' uses"
     if use.is_optional:
-        rule, severity = 'missing-parameter', Severity.WARNING
+        rule = 'missing-parameter'
         message = f"{declares_not}, and '{behaviour.function}' gets None for it"
     return context.at_value(
         behaviour.path,
@@ -139,7 +139,6 @@ def _explain_name(
         part=behaviour.function,
         help=did_you_mean(use.name, getattr(node, section), 'it declares')
         or f"declare it under '{section}:'",
-        severity=severity,
         related=[Related(f"'{use.name}' is used here", found.place)],
     )
 
@@ -200,7 +199,6 @@ def _explain_unused(context: CheckContext, kind: UseKind, name: str, path: DataP
         rule,
         f"{kind} '{name}' is declared, and {why}",
         help='remove it, or use it in a behaviour',
-        severity=Severity.WARNING,
     )
 
 

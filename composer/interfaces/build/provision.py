@@ -1,44 +1,27 @@
 """Provide the interface packages that a system names: installed, cached, or built now."""
 
+import importlib
+import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from composer.diagnostics import Diagnostic
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.errors import ComposerError
 from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.definitions.dependencies import (
-    check_definitions,
-    order_packages,
+from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.packages import (
     used_packages,
 )
-from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
-from composer.interfaces.importing import make_importable
-from composer.interfaces.prefixes import find_package_prefix
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
 
-class DefinitionsError(ComposerError):
-    """Interface definitions are wrong.
-
-    Attributes:
-        diagnostics: all that is wrong with them.
-    """
-
-    def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
-        """List all findings."""
-        super().__init__('\n'.join(map(_format, diagnostics)))
-        self.diagnostics = tuple(diagnostics)
-
-
-def _format(diagnostic: Diagnostic) -> str:
-    place = diagnostic.span or diagnostic.file
-    text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
-    return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
+class ModuleTakenError(ComposerError):
+    """Python already has another module of an interface package's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,56 +32,31 @@ class ProvidedPackage:
         package: its name.
         prefix: where it is, for an `InterfaceCatalogue`.
         origin: whether it was `installed`, `cached` by an earlier start, or `built` now.
-        definitions: what the folder defines.
     """
 
     package: str
     prefix: Path
     origin: Origin
-    definitions: PackageDefinitions
-
-
-def load_packages(folders: Mapping[str, Path]) -> list[PackageDefinitions]:
-    """Read the definitions of packages, each in order after those that it uses.
-
-    Args:
-        folders: the folder of each package's definitions, by its name.
-
-    Raises:
-        ParserMissingError: `rosidl_adapter` is not installed.
-        DefinitionsError: they are wrong, alone or together.
-    """
-    packages = [load_definitions(package, folder) for package, folder in folders.items()]
-    diagnostics = check_definitions(packages, InterfaceCatalogue())
-    if diagnostics:
-        raise DefinitionsError(diagnostics)
-    return order_packages(packages)
 
 
 def provide_packages(
-    folders: Mapping[str, Path],
+    packages: Iterable[PackageDefinitions],
     progress: Callable[[str], None],
 ) -> list[ProvidedPackage]:
-    """Make interface packages importable, building those that are neither installed nor cached.
+    """Make interface packages importable, and build those that are neither installed nor cached.
 
     Args:
-        folders: the folder of each package's definitions, by its name.
-        progress: is told in a short line what takes long.
-
-    Returns:
-        one for each folder, each after those that it uses.
+        packages: definitions without errors, each package after those that it uses.
+        progress: gets a short line about each step that takes long.
 
     Raises:
-        ParserMissingError: `rosidl_adapter` is not installed.
-        DefinitionsError: the definitions are wrong.
         DefinitionsDifferError: a package is installed with other definitions.
         BuildToolsMissingError: the system lacks what building needs.
         BuildError: a generator or compiler failed.
         CacheError: the cache cannot be written.
         ModuleTakenError: another Python module has a package's name.
     """
-    packages = load_packages(folders)
-    provider = _Provider(default_prefixes(), progress)
+    provider = _Provider(ament_prefixes(), progress)
     return [provider.provide(definitions) for definitions in packages]
 
 
@@ -112,13 +70,13 @@ class _Provider:
         self._keys: dict[str, str] = {}
 
     def provide(self, definitions: PackageDefinitions) -> ProvidedPackage:
-        installed = find_package_prefix(definitions.package, self._prefixes)
+        installed = find_package(definitions.package, self._prefixes, INTERFACE_INDEX)
         if installed is not None:
             # Imported here, as the builder below: a cached start must not pay for it.
             from composer.interfaces.definitions.differences import require_same
 
             require_same(definitions, installed)
-            return ProvidedPackage(definitions.package, installed, 'installed', definitions)
+            return ProvidedPackage(definitions.package, installed, 'installed')
         return self._provide_built(definitions)
 
     def _provide_built(self, definitions: PackageDefinitions) -> ProvidedPackage:
@@ -140,7 +98,7 @@ class _Provider:
         )
         make_importable(package, place)
         self._places[package], self._keys[package] = place, key
-        return ProvidedPackage(package, place, origin, definitions)
+        return ProvidedPackage(package, place, origin)
 
     def _build(self, definitions: PackageDefinitions, folder: BuildFolder) -> None:
         from composer.interfaces.build.builder import Dependencies, build_package
@@ -157,3 +115,32 @@ class _Provider:
         )
         duration_sec = time.monotonic() - start
         self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
+
+
+def make_importable(package: str, prefix: Path) -> None:
+    """Have `import package` find the package in a prefix, now and in modules imported later.
+
+    Raises:
+        ModuleTakenError: another module of that name is found first.
+    """
+    folder = prefix / 'python'
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+        importlib.invalidate_caches()
+    origin = _find_origin(package)
+    if origin != folder / package / '__init__.py':
+        message = (
+            f'the interface package {package!r} cannot be imported: '
+            f'{origin or "another package"} has that name'
+        )
+        raise ModuleTakenError(
+            message,
+            help='rename one of them; if the definitions changed since the package was imported, '
+            'start again',
+        )
+
+
+def _find_origin(package: str) -> Path | None:
+    loaded = sys.modules.get(package)
+    spec = loaded.__spec__ if loaded else find_spec(package)
+    return Path(spec.origin) if spec and spec.origin else None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, Related, Severity, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions.filling import MAX_ENTRIES, SECTIONS
 from composer.language.defaults import push_defaults
 from composer.language.includes.include_arguments import give_arguments
@@ -166,7 +166,6 @@ def _find_unset(part: Instance, environment: Collection[str]) -> Iterator[Diagno
                 'ignored-environment',
                 f"'{name}' is not set: only the environment of the file that is started counts",
                 help="set it in that file, or for a process under 'env'",
-                severity=Severity.WARNING,
             )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from composer.executor.after_fork import end_child
 from composer.python_source.modules import FunctionKind
-from composer.runtime import forks
+from composer.runtime import forked_children
 from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.stacks import format_coroutine, format_thread
 
@@ -241,11 +241,11 @@ class BehaviourCall:
                 if may_begin is not None and not may_begin():
                     return FAILED
                 result = function(*arguments)
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 return deliver(result)
             except BaseException as error:  # noqa: BLE001 - it never takes another node down
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 failed(owner, error)
                 return FAILED
@@ -274,11 +274,11 @@ class BehaviourCall:
                     coroutine.close()
                     return FAILED
                 result = await coroutine
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 return self._deliver(result)
             except BaseException as error:
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 if _comes_from_outside(error):
                     # The executor drops the coroutine; to go on would be an error of Python's.
@@ -292,7 +292,7 @@ class BehaviourCall:
                     running.end(token)
 
         # A child goes on in the executor whenever its coroutine waits.
-        forks.coroutine_codes.add(await_behaviour.__code__)
+        forked_children.coroutine_codes.add(await_behaviour.__code__)
         return await_behaviour
 
 

@@ -8,7 +8,6 @@ waits for nodes, servers and messages that are not there yet.
 from __future__ import annotations
 
 import threading
-from contextlib import contextmanager
 from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -18,49 +17,13 @@ from rclpy.task import Future
 from composer.errors import SystemStoppingError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from composer.executor import ComposerExecutor
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.01
-
-
-class StopSignal:
-    """Whether the system is to stop, for those who wait.
-
-    Attributes:
-        is_set: Whether a stop was requested.
-    """
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self._listeners: dict[Callable[[], None], None] = {}
-
-    def set(self) -> None:
-        """Wake all who wait; a signal handler may call it, so it takes no lock."""
-        self.is_set = True
-        for wake in list(self._listeners):
-            wake()
-
-    @contextmanager
-    def waking(self, wake: Callable[[], None]) -> Iterator[bool]:
-        """Call `wake` if a stop is requested in this context.
-
-        Returns:
-            Whether that may still happen; for an earlier stop `wake` is not called.
-        """
-        if self.is_set:
-            yield False
-            return
-        self._listeners[wake] = None
-        if self.is_set:
-            # It was requested while the line above ran.
-            wake()
-        try:
-            yield True
-        finally:
-            del self._listeners[wake]
 
 
 def stopping_error() -> SystemStoppingError:
@@ -75,7 +38,7 @@ class Waits:
         executor: Runs the behaviours.
     """
 
-    def __init__(self, executor: ComposerExecutor, stop: StopSignal) -> None:
+    def __init__(self, executor: ComposerExecutor, stop: StopRequest) -> None:
         self.stop = stop
         self._executor = executor
         self._may_wait_at_stop = False

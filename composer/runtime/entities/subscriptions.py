@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import return_result
 from composer.runtime.entities.qos_profiles import create_qos_profile
-from composer.runtime.health.unmatched import Endpoint
+from composer.runtime.health.unmatched import TopicEndpoint
 
 if TYPE_CHECKING:
     from composer.language.specs import SubscriptionSpec
@@ -26,7 +26,7 @@ def create_subscription(node: LiveNode, spec: SubscriptionSpec) -> Any:
         may_begin=node.gate.allows_events,
     )
     profile = create_qos_profile(spec.qos, node.system.profiles)
-    endpoint = Endpoint(node.ros, spec, profile, node.place(spec.path))
+    endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
     node.endpoints.append(endpoint)
     subscription = node.ros.create_subscription(
         import_interface(spec.type),

@@ -28,7 +28,7 @@ from composer.runtime.nodes.callback_groups import (
 )
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
-from composer.runtime.ownership import release, reserve
+from composer.runtime.reserved_methods import release, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError
     from composer.runtime.health.statistics import EntityHealth
-    from composer.runtime.health.unmatched import Endpoint
+    from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.yaml_text.positions import DataPath
 
@@ -90,7 +90,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
-    endpoints: list[Endpoint] = field(default_factory=list)
+    endpoints: list[TopicEndpoint] = field(default_factory=list)
     suspended: list[Suspended] = field(default_factory=list)
     limits: dict[str, HangLimit] = field(default_factory=dict)
     running: RunningCalls = field(default_factory=RunningCalls)
@@ -237,7 +237,7 @@ class LiveNode:
         """Let the health of an entity, in words, tell what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
-            health.follow(partial(self.system.executor.missed, self.ros, entity))
+            health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""

@@ -1,0 +1,157 @@
+"""Tasks, coroutines and futures."""
+
+import asyncio
+import gc
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('test_msgs')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.task import Future
+from spinning import DEADLINE_SEC, spinning, wait_for
+
+# A thread watches over the time: a deadlock outside of Python hears no signal.
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(300, method='thread'),
+    pytest.mark.usefixtures('patient'),
+]
+
+
+def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -> None:
+    async def first() -> str:
+        return 'first'
+
+    one = executor.create_task(first)
+
+    async def second() -> str:
+        return await one + ' second'
+
+    two = executor.create_task(second)
+    executor.spin_once(timeout_sec=0)
+    executor.spin_once(timeout_sec=0)
+    assert one.done()
+    assert not two.done()
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
+    assert two.result() == 'first second'
+
+
+@pytest.mark.parametrize('asynchronous', [False, True])
+def test_a_task_runs_with_its_arguments(node: Any, executor: Any, asynchronous) -> None:
+    def function(a: int, b: int) -> int:
+        return a - b
+
+    async def coroutine(a: int, b: int) -> int:
+        return a - b
+
+    task = executor.create_task(coroutine if asynchronous else function, 5, b=3)
+    assert not task.done()
+    executor.spin_once(timeout_sec=0)
+    assert task.result() == 2
+
+
+def test_a_coroutine_that_yields_is_resumed_by_the_next_spin_once(
+    node: Any,
+    executor: Any,
+) -> None:
+    steps: list[int] = []
+
+    async def tick() -> None:
+        steps.append(1)
+        await asyncio.sleep(0)
+        steps.append(2)
+
+    timer = node.create_timer(0.01, tick)
+    executor.spin_once(timeout_sec=DEADLINE_SEC)
+    assert steps == [1]
+    timer.cancel()
+    executor.spin_once(timeout_sec=0)
+    assert steps == [1, 2]
+
+
+def test_a_suspended_callback_is_resumed_when_its_node_is_back(
+    context: Context,
+    executor: Any,
+) -> None:
+    waiting = True
+    steps: list[int] = []
+
+    class Wait:
+        def __await__(self) -> Iterator[None]:
+            while waiting:
+                yield
+
+    async def tick() -> None:
+        steps.append(1)
+        await Wait()
+        steps.append(2)
+
+    node = rclpy.create_node('node', context=context)
+    timer = node.create_timer(0.01, tick)
+    rclpy.spin_once(node, executor=executor, timeout_sec=DEADLINE_SEC)
+    timer.cancel()
+    waiting = False
+    executor.spin_once(timeout_sec=0)
+    assert steps == [1]
+    rclpy.spin_once(node, executor=executor, timeout_sec=0)
+    assert steps == [1, 2]
+
+
+def test_a_suspended_callback_of_a_destroyed_node_is_dropped(
+    node: Any,
+    context: Context,
+    executor: Any,
+) -> None:
+    awaited: Future = Future()
+    ended: list[int] = []
+
+    async def tick() -> None:
+        try:
+            await awaited
+        finally:
+            ended.append(1)
+
+    other = rclpy.create_node('other', context=context)
+    other.create_timer(0.01, tick)
+    rclpy.spin_once(other, executor=executor, timeout_sec=5)
+    awaited.set_result(None)
+    executor.spin_once(timeout_sec=0)
+    other.destroy_node()
+    assert not ended
+    executor.remove_node(node)
+    gc.collect()
+    assert ended == [1]
+
+
+def test_ten_thousand_tasks_from_many_threads_all_run(node: Any, executor: Any) -> None:
+    done: list[int] = []
+
+    async def work(number: int) -> None:
+        await asyncio.sleep(0)
+        done.append(number)
+
+    def create(start: int) -> None:
+        for number in range(start, start + 1000):
+            executor.create_task(work, number)
+
+    with spinning(executor):
+        threads = [threading.Thread(target=create, args=(i * 1000,)) for i in range(10)]
+        for thread in threads:
+            thread.start()
+        wait_for(lambda: len(done) == 10_000)
+    assert sorted(done) == list(range(10_000))
+
+
+def test_a_cancelled_task_does_not_run(node: Any, executor: Any) -> None:
+    ran: list[int] = []
+    task = executor.create_task(lambda: ran.append(1))
+    task.cancel()
+    executor.spin_once(timeout_sec=0)
+    assert task.cancelled()
+    assert not ran
