@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import StrictUndefined, TemplateAssertionError, nodes
 
 from composer.expressions import limits
-from composer.names import suggest
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -172,8 +172,8 @@ def _test(walk: _Walk, node: nodes.Test) -> Any:
 
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> str:
-    near = suggest(name, known)
-    hint = f" (did you mean '{near}'?)" if near else ''
+    advice = suggest(name, known)
+    hint = f' ({advice})' if advice else ''
     return f"there is no {what} '{name}'{hint}"
 
 

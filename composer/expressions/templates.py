@@ -23,7 +23,7 @@ from jinja2.exceptions import SecurityError
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
 from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
-from composer.names import did_you_mean, suggest
+from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -165,13 +165,13 @@ class Filler:
         ):
             name = found.group(1)
             scope = {*self._values, 'here', *self._sandbox.globals}
-            declared = self._values or suggest(name, scope)
-            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
+            declared = self._values or find_nearest(name, scope)
+            listed = 'in scope are' if declared else None
             return diagnostic_at(
                 _locate(name, span),
                 'undefined-name',
                 f"'{name}' is not defined",
-                help=help_text or "declare it as an argument, under 'args'",
+                help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
         return diagnostic_at(span, 'bad-expression', _describe(error))
 

@@ -23,7 +23,7 @@ from typing import Final, Literal, TypeAlias
 from composer.errors import ComposerError
 from composer.interfaces.descriptions import FieldType
 from composer.interfaces.field_errors import describe_value
-from composer.names import suggest
+from composer.spelling import suggest
 
 FieldRule: TypeAlias = Literal[
     'unknown-field',
@@ -134,12 +134,12 @@ def check_length(field_type: FieldType, length: int) -> None:
 def unknown_field(message_name: str, key: object, names: Iterable[str]) -> FieldError:
     """Make the error of a key that is no field of its message."""
     names = tuple(names)
-    nearest = suggest(key, names) if isinstance(key, str) else None
+    advice = suggest(key, names)
     fields = f'its fields are {", ".join(names)}' if names else 'it has no fields'
     return FieldError(
         f'{message_name} has no field {key!r}',
         rule='unknown-field',
-        help=f'did you mean {nearest!r}? {fields}' if nearest else fields,
+        help=f'{advice} {fields}' if advice else fields,
     )
 
 

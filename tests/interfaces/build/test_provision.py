@@ -214,10 +214,10 @@ def test_wrong_definitions_are_one_error_with_all_findings(
     assert [each.rule for each in caught.value.diagnostics] == ['unknown-type', 'unknown-package']
     assert str(caught.value) == (
         f"{folder}/msg/A.msg:1:1: error[unknown-type]: there is no type 'strng'\n"
-        '  help: did you mean string?\n'
+        "  help: did you mean 'string'?\n"
         f'{folder}/msg/B.msg:1:1: error[unknown-package]: '
         "there is no interface package 'std_mgs'\n"
-        '  help: did you mean std_msgs/Header?'
+        "  help: did you mean 'std_msgs/Header'?"
     )
 
 
