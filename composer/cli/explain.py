@@ -1,4 +1,4 @@
-"""`composer explain`: what a rule means, why it is there, and how to do it right."""
+"""`composer explain`: what a rule means, why it exists, and how to fix what it finds."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from composer.rules.examples import Example
 
 _NEEDS = {
-    'interfaces': 'It needs interface packages, which come with ROS 2.',
-    'import': '`composer check --import` can tell more than the source of the behaviour.',
+    'interfaces': 'Needs interface packages, which come with ROS 2.',
+    'import': '`composer check --import` finds more than the source of the behaviour shows.',
 }
 
 
@@ -40,11 +40,11 @@ def _list_all() -> Iterator[str]:
         for rule in family.rules:
             yield f'  {rule.name:<{widest}}  {rule.meaning}'
         yield ''
-    yield "'composer explain RULE' shows one with an example."
+    yield "'composer explain RULE' explains a rule, with an example."
 
 
 def _explain(rule: Rule) -> Iterator[str]:
-    heading = f'{rule.name}: {rule.severity.value}, of the family {rule.family}'
+    heading = f'{rule.name}: {rule.severity.value}, in the family {rule.family}'
     yield click.style(heading, bold=True)
     yield ''
     yield f'  {rule.meaning}'
@@ -52,7 +52,7 @@ def _explain(rule: Rule) -> Iterator[str]:
     if rule.needs:
         yield f'  {_NEEDS[rule.needs]}'
     if rule.ignorable:
-        yield f'  A comment in its line silences it: # composer: ignore[{rule.name}]'
+        yield f'  To silence it, add a comment to the line: # composer: ignore[{rule.name}]'
     if rule.source:
         yield f'  Source: {rule.source}'
     example = load_example(rule.name)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.ament import ament_prefixes
 from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import describe_declared, provide_declared
 from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import (
@@ -31,11 +32,11 @@ _KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 
 
 class UnknownInterfaceError(ComposerError):
-    """No installed package has an interface of that name."""
+    """No installed package has such an interface."""
 
 
 def build(path: Path) -> int:
-    """Build the packages that a file declares, if they are not installed or built already."""
+    """Build the packages that a file declares and that are not installed or built yet."""
     system = load_system(path)
     _, _, findings = describe_declared(system, InterfaceCatalogue())
     findings = [*system.diagnostics, *findings]
@@ -70,7 +71,7 @@ def show(name: str) -> int:
     Raises:
         UnknownInterfaceError: There is no such interface.
     """
-    description = describe_interface(name, default_prefixes())
+    description = describe_interface(name, ament_prefixes())
     if description is None:
         message = f"no installed package has an interface '{name}'"
         raise UnknownInterfaceError(message, help=_advise(name))
@@ -80,7 +81,7 @@ def show(name: str) -> int:
 
 
 def _advise(name: str) -> str | None:
-    """Return where to look for an interface that is not there."""
+    """Return the help for an interface that does not exist."""
     catalogue = InterfaceCatalogue()
     package, _, rest = name.partition('/')
     if package not in catalogue.packages():
@@ -88,12 +89,12 @@ def _advise(name: str) -> str | None:
         return suggest(name, names, otherwise="'composer interfaces list' shows all")
     listing = f"'composer interfaces list {package}'"
     if not rest:
-        return f"'{package}' is a package: {listing} shows what it has"
+        return f"'{package}' is a package: {listing} shows its interfaces"
     names = [known for kind in _KINDS for known in catalogue.names(kind, package)]
     by_last_part = {known.rpartition('/')[2]: known for known in names}
     last_part = find_nearest(rest.rpartition('/')[2], by_last_part)
     return did_you_mean(
-        last_part and by_last_part[last_part], otherwise=f'{listing} shows what it has'
+        last_part and by_last_part[last_part], otherwise=f'{listing} shows its interfaces'
     )
 
 
@@ -130,7 +131,7 @@ def _render_comment(comment: str) -> Iterator[str]:
 
 
 def _written(value: object) -> str:
-    """Write a value as a definition does."""
+    """Return a value as definitions write it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, tuple):

@@ -36,33 +36,33 @@ def up(
     words: Sequence[str] = (),
     ros_arguments: Sequence[str] = (),
     log_levels: Sequence[str] = (),
-    settings: Sequence[str] = (),
+    set_values: Sequence[str] = (),
 ) -> int:
     """Run a system until it ends; return the exit code.
 
     Args:
-        paths: The file, and layers over it.
+        paths: The file and its layers.
         words: Values for the arguments that the file declares.
         ros_arguments: As after `--ros-args` on a command line.
-        log_levels: `debug` for all loggers, `talker:=debug` for one.
-        settings: Changes of single values, as in `nodes.talker.log_level=debug`.
+        log_levels: `debug` for all nodes, `talker:=debug` for one.
+        set_values: Values to change, as in `nodes.talker.log_level=debug`.
 
     Raises:
         RosNotFoundError: There is no rclpy.
-        StartError: The system could not be brought up.
+        StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
+    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
     catalogue = InterfaceCatalogue()
     findings = check_system(system, catalogue)
     if _report(findings) or system.spec is None:
         return ExitCode.FAILED
     if importlib.util.find_spec('rclpy') is None:
-        message = 'there is no rclpy in this Python, so nothing can run'
+        message = 'cannot run without ROS 2: this Python has no rclpy'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
     from composer.runtime.environment import check_middleware, environment_set
 
-    # Before anything of ROS is imported, which reads it.
+    # ROS reads it when it is imported.
     with environment_set(system.spec.environment):
         check_middleware(system.spec.environment)
         return _run(system, system.spec, catalogue, ros_arguments, log_levels)
@@ -93,7 +93,7 @@ def _run(
 
 
 def describe_file_arguments(paths: Sequence[Path]) -> str:
-    """Return which arguments a file declares, as its help shows them."""
+    """Return the arguments that a file declares, as `--help` shows them."""
     system = load_system(paths[0], layers=paths[1:])
     if system.spec is None:
         return 'the file cannot be read'
@@ -103,16 +103,16 @@ def describe_file_arguments(paths: Sequence[Path]) -> str:
 def _import(
     system: LoadedSystem, catalogue: InterfaceCatalogue
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
-    """Import every behaviour; return the functions, and what is wrong that nobody ignores."""
+    """Import the behaviours; return the functions, and findings that are not silenced."""
     context, _ = create_context(system, catalogue)
     if context is None:
         return {}, []
     functions, findings = import_behaviours(context)
-    # Comments that silence nothing were reported before.
+    # The check has already reported comments that silence nothing.
     return functions, leave_out_silenced(findings, system.positions.source)
 
 
 def _report(findings: list[Diagnostic]) -> bool:
-    """Show findings; return whether they forbid a start."""
+    """Print findings; return whether any is an error."""
     show_findings(findings)
     return has_errors(findings)

@@ -1,10 +1,10 @@
-"""What a forked child makes of its parent's executors: they are shut down, and out of reach.
+"""What a forked child does with the executors of its parent: it shuts them down and lets them be.
 
 An epoll, an eventfd or a kernel timer is one thing in both processes: what the child reads, sets
-or unregisters there, the parent misses. So the child puts others of its own under the same numbers
-(`lay_over`). The parent's threads are not in the child, but the locks that they held are: these
-are made free. Nothing is destroyed, for that would be done by the middleware, whose threads and
-locks are in the same state.
+or unregisters, the parent misses. So the child puts new ones under the same numbers
+(`replace_descriptors`). The parent's threads are not in the child, but the locks that they held
+are: `reset_locks` frees them. Nothing is destroyed, because the middleware would have to do that,
+and its threads and locks are in the same state.
 
 A child that was forked in a callback ends when that callback does.
 """
@@ -12,17 +12,18 @@ A child that was forked in a callback ends when that callback does.
 import os
 import sys
 import traceback
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, NoReturn
 
 
-def lay_over(descriptors: Any, fresh: int) -> None:
-    """Let `descriptors` mean what `fresh` does."""
+def replace_descriptors(descriptors: Iterable[int], new: int) -> None:
+    """Make `descriptors` duplicates of `new`."""
     for descriptor in descriptors:
-        os.dup2(fresh, descriptor, inheritable=False)
+        os.dup2(new, descriptor, inheritable=False)
 
 
-def free_locks(owners: Any) -> None:
+def reset_locks(owners: Iterable[Any]) -> None:
     """Free the locks that are attributes of `owners`, whichever thread held them."""
     for owner in owners:
         for value in vars(owner).values():
@@ -32,13 +33,13 @@ def free_locks(owners: Any) -> None:
 
 
 def end_child(error: BaseException | None = None) -> NoReturn:
-    """End this process, the child, as Python would end a program.
+    """End this process, a forked child, as Python ends a program.
 
     Args:
-        error: What the callback raised that forked it.
+        error: What the callback that forked it raised.
     """
     code = 0
-    # What the child did may have left anything broken; it must end all the same.
+    # The child may have broken anything; it must end all the same.
     with suppress(Exception):
         code = _exit_code(error)
     for stream in (sys.stdout, sys.stderr):
@@ -48,7 +49,7 @@ def end_child(error: BaseException | None = None) -> NoReturn:
 
 
 def _exit_code(error: BaseException | None) -> int:
-    """Return the exit code after an error, and show what is to be shown of it."""
+    """Print `error` as Python does, and return the exit code that it leads to."""
     code = error.code if isinstance(error, SystemExit) else None
     if code is None and (error is None or isinstance(error, SystemExit)):
         return 0

@@ -1,9 +1,10 @@
-"""Deadlines: one heap, one kernel timer, and the clocks that can jump."""
+"""Deadlines of timers and delayed calls: one heap, one kernel timer, and clocks that can jump."""
 
 import heapq
 import itertools
 import threading
 from collections import deque
+from collections.abc import Callable
 from time import monotonic_ns
 from typing import Any, Protocol
 
@@ -17,10 +18,10 @@ _ANY_JUMP = JumpThreshold(
     min_backward=Duration(nanoseconds=-1),
     on_clock_change=True,
 )
-_LEAST_GARBAGE = 64
+_MIN_HEAP_LIMIT = 64
 
 
-class Alarm(Protocol):
+class Timed(Protocol):
     """Something that happens at `deadline_ns` (monotonic), if it is not None."""
 
     deadline_ns: int | None
@@ -29,110 +30,114 @@ class Alarm(Protocol):
         """Do what is due."""
 
 
-class ClockWatch:
-    """The alarms that follow one ROS clock, whose time may jump or be set by a simulation."""
+class JumpingClock:
+    """A ROS clock and what follows it; its time may jump or be set by a simulation."""
 
-    def __init__(self, clock: ROSClock, alarms: 'Alarms') -> None:
+    def __init__(self, clock: ROSClock, deadlines: 'Deadlines') -> None:
         self.clock = clock
         self.followers: set[Any] = set()
-        self._alarms = alarms
+        self._deadlines = deadlines
         self._handle = clock.create_jump_callback(_ANY_JUMP, post_callback=self._on_jump)
 
     def _on_jump(self, _: object) -> None:
-        self._alarms.jumped.append(self)
-        self._alarms.wake()
+        self._deadlines.jumped.append(self)
+        self._deadlines.wake()
 
     def unregister(self) -> None:
-        """Follow the clock no more."""
+        """Remove the jump callback."""
         self._handle.unregister()
 
 
-class Alarms:
-    """All deadlines of one executor."""
+class Deadlines:
+    """All deadlines of one executor.
 
-    rank = 0
+    Args:
+        wake: Makes a thread that waits call `rearm_after_jumps`.
+    """
 
-    def __init__(self, wake: Any) -> None:
+    def __init__(self, wake: Callable[[], None]) -> None:
         self.timer = TimerFd(blocking=False)
-        self.jumped: deque[ClockWatch] = deque()
+        self.jumped: deque[JumpingClock] = deque()
         self.wake = wake
         self._lock = threading.Lock()
-        self._heap: list[tuple[int, int, Alarm]] = []
+        self._heap: list[tuple[int, int, Timed]] = []
         self._numbers = itertools.count()
-        self._most = _LEAST_GARBAGE
-        self._watches: dict[int, ClockWatch] = {}
+        self._heap_limit = _MIN_HEAP_LIMIT
+        self._clocks: dict[int, JumpingClock] = {}
 
-    def set(self, alarm: Alarm, deadline_ns: int | None) -> None:
-        """Make `alarm` due at `deadline_ns` instead of what was set before; None: never."""
+    def set(self, timed: Timed, deadline_ns: int | None) -> None:
+        """Replace the deadline of `timed`; None for no deadline."""
         with self._lock:
-            alarm.deadline_ns = deadline_ns
+            timed.deadline_ns = deadline_ns
             if deadline_ns is None:
                 return
-            heapq.heappush(self._heap, (deadline_ns, next(self._numbers), alarm))
-            if len(self._heap) > self._most:
-                self._sweep()
-            if self._heap[0][2] is alarm:
-                self.timer.set_ns(deadline_ns)
+            heapq.heappush(self._heap, (deadline_ns, next(self._numbers), timed))
+            if len(self._heap) > self._heap_limit:
+                self._drop_replaced()
+            if self._heap[0][2] is timed:
+                self.timer.expire_at(deadline_ns)
 
-    def on_signal(self, _: int) -> None:
-        """Run what is due and set the timer for the next."""
+    def run_due(self) -> None:
+        """Call `on_deadline` of all that is due, and set the kernel timer for the next."""
         self.timer.read()
         due = []
         with self._lock:
             now = monotonic_ns()
             while self._heap and self._heap[0][0] <= now:
-                deadline_ns, _number, alarm = heapq.heappop(self._heap)
-                if alarm.deadline_ns == deadline_ns:
-                    alarm.deadline_ns = None
-                    due.append(alarm)
+                deadline_ns, _number, timed = heapq.heappop(self._heap)
+                if timed.deadline_ns == deadline_ns:
+                    timed.deadline_ns = None
+                    due.append(timed)
             if self._heap:
-                self.timer.set_ns(self._heap[0][0])
-        for alarm in due:
-            alarm.on_deadline()
+                self.timer.expire_at(self._heap[0][0])
+        for timed in due:
+            timed.on_deadline()
 
-    def follow(self, clock: Any, follower: Any) -> ClockWatch | None:
+    def follow(self, clock: Any, follower: Any) -> JumpingClock | None:
         """Have `follower.rearm()` called after jumps of `clock`; None if it cannot jump."""
         if not isinstance(clock, ROSClock):
             return None
         with self._lock:
-            watch = self._watches.get(id(clock))
-            if watch is None:
-                watch = self._watches[id(clock)] = ClockWatch(clock, self)
-            watch.followers.add(follower)
-            return watch
+            followed = self._clocks.get(id(clock))
+            if followed is None:
+                followed = self._clocks[id(clock)] = JumpingClock(clock, self)
+            followed.followers.add(follower)
+            return followed
 
-    def unfollow(self, watch: ClockWatch, follower: Any) -> None:
-        """End what `follow` began."""
+    def unfollow(self, followed: JumpingClock, follower: Any) -> None:
+        """Undo `follow`."""
         with self._lock:
-            watch.followers.discard(follower)
-            if watch.followers or self._watches.pop(id(watch.clock), None) is None:
+            followed.followers.discard(follower)
+            if followed.followers or self._clocks.pop(id(followed.clock), None) is None:
                 return
-        watch.unregister()
+        followed.unregister()
 
-    def follow_jumps(self) -> None:
-        """Rearm the followers of the clocks that have jumped."""
+    def rearm_after_jumps(self) -> None:
+        """Call `rearm` of the followers of the clocks that have jumped."""
         while self.jumped:
             for follower in tuple(self.jumped.popleft().followers):
                 follower.rearm()
 
-    def _sweep(self) -> None:
+    def _drop_replaced(self) -> None:
         self._heap = [entry for entry in self._heap if entry[2].deadline_ns == entry[0]]
         heapq.heapify(self._heap)
-        self._most = max(_LEAST_GARBAGE, 2 * len(self._heap))
+        self._heap_limit = max(_MIN_HEAP_LIMIT, 2 * len(self._heap))
 
 
-class Delay:
-    """Calls a function once, some time from now."""
+class DelayedCall:
+    """Calls a function once, after a delay."""
 
-    def __init__(self, alarms: Alarms, delay_sec: float, function: Any) -> None:
+    def __init__(
+        self, deadlines: Deadlines, delay_sec: float, function: Callable[[], Any]
+    ) -> None:
         self.deadline_ns: int | None = None
-        self._alarms = alarms
+        self._deadlines = deadlines
         self._function = function
-        alarms.set(self, monotonic_ns() + int(delay_sec * 1e9))
+        deadlines.set(self, monotonic_ns() + int(delay_sec * 1e9))
 
     def cancel(self) -> None:
-        """Call it no more, if that is yet to come."""
-        self._alarms.set(self, None)
+        """Do not call it, if that is still to come."""
+        self._deadlines.set(self, None)
 
     def on_deadline(self) -> None:
         """Call the function."""

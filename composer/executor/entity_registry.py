@@ -1,4 +1,4 @@
-"""Which entities there are: the nodes' lists compared with what is listened to."""
+"""Which entities the executor listens to: compares the nodes' lists with its sources."""
 
 import threading
 from contextlib import suppress
@@ -9,52 +9,64 @@ from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.entity_sources import TimerSource
-from composer.executor.event_poller import Signal
-from composer.executor.event_source import (
+from composer.executor.entity_sources import (
     ClientSource,
-    Desk,
     ServiceSource,
-    Source,
     SubscriptionSource,
+    TimerSource,
 )
-from composer.executor.wait_set_thread import Lane
+from composer.executor.event_poller import EventFd
+from composer.executor.event_source import EventSource, ExecutorParts
+from composer.executor.wait_set_thread import WaitSetThread
 from composer.executor.waitable_sources import (
     ActionSource,
     GuardConditionSource,
-    PolledSource,
     WaitableSource,
+    WaitSetSource,
 )
 
-_SERVICES_PER_SIGNAL = 8
-_REST_SHARE = 4
+_SERVICES_PER_EVENT_FD = 8
+_REST_FACTOR = 4
 
 
 class _NodeEntities:
-    """What was last seen of one node."""
+    """What a node had when it was last compared."""
 
     def __init__(self) -> None:
         self.lists: tuple[tuple[Any, ...], ...] = ()
-        self.sources: dict[Any, Source] = {}
+        self.sources: dict[Any, EventSource] = {}
 
 
-class Registry:
-    """The sources of all nodes. Comparing 1,000 nodes takes some milliseconds, so it may wait."""
+class EntityRegistry:
+    """The sources of all nodes.
 
-    def __init__(self, desk: Desk, lane: Lane) -> None:
-        self._desk = desk
-        self._lane = lane
+    Attributes:
+        is_stale: Whether entities may have come or gone since the last `refresh`.
+    """
+
+    def __init__(self, parts: ExecutorParts, wait_set_thread: WaitSetThread) -> None:
+        self._parts = parts
+        self._wait_set_thread = wait_set_thread
         self._lock = threading.RLock()
         self._nodes: dict[Any, _NodeEntities] = {}
         self._rest_until = 0.0
         self.is_stale = False
 
     def rest_sec(self) -> float:
-        """How long the next comparison should wait, so that comparing stays a small part."""
+        """Return how long the next `refresh` should wait, to use a small share of the time.
+
+        To compare 1,000 nodes takes some milliseconds.
+        """
         return max(0.0, self._rest_until - monotonic())
 
-    def refresh(self, nodes: list[Any]) -> None:
-        """Listen to all entities of `nodes` and to nothing else."""
+    def refresh_if_stale(self) -> None:
+        """`refresh` if entities may have come or gone."""
+        if self.is_stale:
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Listen to all entities of the executor's nodes, and to nothing else."""
+        nodes = self._parts.executor.get_nodes()
         with self._lock:
             self.is_stale = False
             begin = monotonic()
@@ -64,26 +76,26 @@ class Registry:
             for node in nodes:
                 changed |= self._refresh_node(node)
             end = monotonic()
-            self._rest_until = end + _REST_SHARE * (end - begin)
+            self._rest_until = end + _REST_FACTOR * (end - begin)
         if changed:
-            self._lane.look_soon()
+            self._wait_set_thread.check_events_soon()
 
-    def source_of(self, node: Any, entity: Any) -> Source | None:
-        """Return the source of an entity of `node`, None if it is not listened to."""
+    def source_of(self, node: Any, entity: Any) -> EventSource | None:
+        """Return the source of an entity of `node`, None if the executor does not listen to it."""
         entities = self._nodes.get(node)
         return None if entities is None else entities.sources.get(entity)
 
-    def leave_to_parent(self) -> None:
-        """Have no sources; the parent listens to the entities."""
-        self._nodes = {}
-
     def drop(self, node: Any) -> None:
-        """Listen no more to the entities of `node`."""
+        """Stop listening to the entities of `node`."""
         with self._lock:
             entities = self._nodes.pop(node, None)
             if entities is not None:
                 for source in entities.sources.values():
                     self._close(source)
+
+    def reset_after_fork(self) -> None:
+        """Forget the sources: the parent process listens to the entities."""
+        self._nodes = {}
 
     def _refresh_node(self, node: Any) -> bool:
         seen = self._nodes.setdefault(node, _NodeEntities())
@@ -98,50 +110,51 @@ class Registry:
         if lists == seen.lists:
             return False
         seen.lists = lists
-        kinds = (
+        classes = (
             TimerSource,
             SubscriptionSource,
             GuardConditionSource,
             ClientSource,
             ServiceSource,
         )
-        wanted: dict[Any, type[Source]] = {
-            entity: kind
-            for kind, entities in zip(kinds, lists, strict=False)
+        wanted: dict[Any, type[EventSource]] = {
+            entity: source_class
+            for source_class, entities in zip(classes, lists, strict=False)
             for entity in entities
         }
-        wanted.update((waitable, _waitable_kind(waitable)) for waitable in lists[-1])
+        wanted.update((waitable, _class_for(waitable)) for waitable in lists[-1])
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
-        shared: list[Signal] = []
-        for entity, kind in wanted.items():
+        shared: list[EventFd] = []
+        for entity, source_class in wanted.items():
             if entity not in seen.sources:
                 with suppress(InvalidHandle):
-                    seen.sources[entity] = self._opened(kind(entity, node, self._desk), shared)
+                    source = source_class(entity, node, self._parts)
+                    self._open(source, shared)
+                    seen.sources[entity] = source
         return True
 
-    def _opened(self, source: Source, shared: list[Signal]) -> Source:
-        """Open `source`; up to eight services, which are called seldom, share a signal."""
-        if isinstance(source, PolledSource):
+    def _open(self, source: EventSource, shared: list[EventFd]) -> None:
+        """Open `source`; up to eight services, which are called seldom, share an eventfd."""
+        if isinstance(source, WaitSetSource):
             source.open()
-            self._lane.add(source)
+            self._wait_set_thread.add(source)
         elif not isinstance(source, ServiceSource):
             source.open()
-        elif shared and len(shared[-1].listeners) < _SERVICES_PER_SIGNAL:
+        elif shared and len(shared[-1].listeners) < _SERVICES_PER_EVENT_FD:
             source.open(shared[-1])
         else:
             source.open()
-            if source.signal is not None:
-                shared.append(source.signal)
-        return source
+            if source.event_fd is not None:
+                shared.append(source.event_fd)
 
-    def _close(self, source: Source) -> None:
-        if isinstance(source, PolledSource):
-            self._lane.remove(source)
+    def _close(self, source: EventSource) -> None:
+        if isinstance(source, WaitSetSource):
+            self._wait_set_thread.remove(source)
         source.close()
 
 
-def _waitable_kind(waitable: Any) -> type[Source]:
+def _class_for(waitable: Any) -> type[EventSource]:
     if isinstance(waitable, ActionServer | ActionClient):
         return ActionSource
     return WaitableSource

@@ -1,10 +1,10 @@
-"""How long a computing callback may keep the interpreter from the others.
+"""How long a computing callback may keep the GIL from the others.
 
-A thread that wants the interpreter (the GIL) beside a computing one gets it after the switch
-interval, 5 ms in CPython. A timer's tick costs exactly one such wait here: from the return of the
-leader's epoll to the end of the callback nothing lets go of the GIL. So the interval is the
-latency of whatever happens beside a computing callback, and two waits in a row, as when that
-callback ends just then, make a 100 Hz timer lose a tick.
+A thread that wants the GIL beside a computing one gets it after the interpreter's switch interval,
+5 ms in CPython. A timer's tick costs exactly one such wait here: from the return of the leader's
+epoll to the end of the callback nothing releases the GIL. So the interval is the latency of all
+that happens beside a computing callback; and two waits in a row, as when that callback ends just
+then, make a 100 Hz timer lose a tick.
 
 Measured (two cores, 100 Hz timer beside a callback that always computes, lateness in ms):
 
@@ -27,28 +27,28 @@ import threading
 INTERVAL_SEC = 0.001
 
 
-class PromptSwitching:
+class ShortSwitchInterval:
     """Shortens the interpreter's switch interval while any executor of the process spins.
 
-    An interval that is shorter already, or that somebody sets meanwhile, is left alone.
+    An interval that is shorter already, or that somebody sets meanwhile, is not changed.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._users = 0
         self._before_sec = 0.0
-        os.register_at_fork(after_in_child=self._forget_lock)
+        os.register_at_fork(after_in_child=self._reset_lock)
 
-    def enter(self) -> None:
-        """Shorten the interval until `leave`."""
+    def add_user(self) -> None:
+        """Shorten the interval until `remove_user`."""
         with self._lock:
             self._users += 1
             if self._users == 1 and sys.getswitchinterval() > INTERVAL_SEC:
                 self._before_sec = sys.getswitchinterval()
                 sys.setswitchinterval(INTERVAL_SEC)
 
-    def leave(self) -> None:
-        """End what `enter` began; the last one puts the interval back."""
+    def remove_user(self) -> None:
+        """Undo `add_user`; the last one restores the interval."""
         with self._lock:
             self._users -= 1
             if self._users or not self._before_sec:
@@ -57,8 +57,8 @@ class PromptSwitching:
                 sys.setswitchinterval(self._before_sec)
             self._before_sec = 0.0
 
-    def _forget_lock(self) -> None:
+    def _reset_lock(self) -> None:
         self._lock = threading.Lock()  # Another thread may have held it, and is not in the child.
 
 
-prompt_switching = PromptSwitching()
+short_switch_interval = ShortSwitchInterval()

@@ -1,24 +1,21 @@
-"""Actions, guard conditions and other waitables as sources."""
+"""Actions, guard conditions and other waitables as event sources."""
 
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.executor import c_bindings
-from composer.executor.event_poller import UNKNOWN
-from composer.executor.event_source import NOTHING, Source
-
-if TYPE_CHECKING:
-    from composer.executor.deadlines import ClockWatch
-    from composer.executor.event_poller import Signal
+from composer.executor.event_poller import UNKNOWN_COUNT, EventFd
+from composer.executor.event_source import NOTHING, EventSource
 
 
-class _WaitablePart:
-    """A timer inside a waitable, by its address."""
+class _ActionTimer:
+    """A timer inside an action, by its address."""
 
     def __init__(self, pointer: int, source: 'ActionSource') -> None:
         self.deadline_ns: int | None = None
@@ -26,80 +23,79 @@ class _WaitablePart:
         self._source = source
 
     def on_deadline(self) -> None:
-        self._source.on_signal(1)
+        self._source.on_events(1)
 
     def rearm(self) -> None:
-        desk = self._source.desk
+        deadlines = self._source.parts.deadlines
         try:
-            with self._source.held():
+            with self._source.hold_entity():
                 until_ns = c_bindings.time_until_next_call(self._pointer)
         except InvalidHandle:
             return
         if until_ns is None:
-            desk.alarms.set(self, None)
+            deadlines.set(self, None)
         else:
-            desk.alarms.set(self, monotonic_ns() + max(0, until_ns))
+            deadlines.set(self, monotonic_ns() + max(0, until_ns))
 
 
-class ActionSource(Source):
+class ActionSource(EventSource):
     """An action server or client: a waitable made of services, clients, subscriptions, a timer.
 
-    Any of its parts announcing something leads to a look with a wait set of its own.
+    An event of any part leads to a check of all of them with a wait set of its own.
     """
 
     rank = 4
-    __slots__ = ('_looking', '_parts', '_timers', '_wait_set', '_watched_clock')
+    __slots__ = ('_checking', '_clock', '_parts', '_timers', '_wait_set')
 
-    def held(self) -> Any:
+    def hold_entity(self) -> Any:
         """Return a context in which the entity is not destroyed."""
         handle = getattr(self.entity, '_handle', None)
         return self.entity._client_handle if handle is None else handle  # noqa: SLF001
 
-    def open(self, shared: 'Signal | None' = None) -> None:
+    def open(self, shared: EventFd | None = None) -> None:
         """See the base class."""
-        self._looking = threading.Lock()
-        self._timers: list[_WaitablePart] = []
-        self._watched_clock: ClockWatch | None = None
-        with self.held():
-            self._wait_set = wait_set_for(self.entity, self.desk.executor.context)
-            self._parts = c_bindings.parts_of(self._wait_set)
-            self.signal = self.desk.board.attach(self, shared)
+        self._checking = threading.Lock()
+        self._timers: list[_ActionTimer] = []
+        self._clock = None
+        with self.hold_entity():
+            self._wait_set = _create_wait_set_of(self.entity, self.parts.executor.context)
+            self._parts = c_bindings.list_parts(self._wait_set)
+            self.event_fd = self.parts.poller.attach(self, shared)
             for watch, pointer in self._parts:
-                watch(pointer, self.signal.fd)
+                watch(pointer, self.event_fd.fd)
                 if watch is c_bindings.watch_timer_reset:
-                    self._timers.append(_WaitablePart(pointer, self))
+                    self._timers.append(_ActionTimer(pointer, self))
         if self._timers:
-            self._watched_clock = self.desk.alarms.follow(self.entity._node.get_clock(), self)  # noqa: SLF001
-        self.on_signal(1)
+            self._clock = self.parts.deadlines.follow(self.entity._node.get_clock(), self)  # noqa: SLF001
+        self.on_events(1)
 
     def close(self) -> None:
         """See the base class."""
         self.alive = False
         for timer in self._timers:
-            self.desk.alarms.set(timer, None)
-        if self._watched_clock is not None:
-            self.desk.alarms.unfollow(self._watched_clock, self)
-        with suppress(InvalidHandle, c_bindings.ExecutorError), self.held():
+            self.parts.deadlines.set(timer, None)
+        if self._clock is not None:
+            self.parts.deadlines.unfollow(self._clock, self)
+        with suppress(InvalidHandle, c_bindings.ExecutorError), self.hold_entity():
             for watch, pointer in self._parts:
                 watch(pointer, None)
-        if self.signal is not None:
-            self.desk.board.detach(self, self.signal)
+        self._detach()
 
-    def on_signal(self, count: int) -> None:  # noqa: ARG002
+    def on_events(self, count: int) -> None:  # noqa: ARG002
         """See the base class."""
-        self.desk.schedule.announce(self, UNKNOWN)
+        self.parts.scheduler.add_events(self, UNKNOWN_COUNT)
 
     def rearm(self) -> None:
-        """Look again, for the clock has jumped."""
-        self.on_signal(1)
+        """Check all parts, for the clock has jumped."""
+        self.on_events(1)
 
     def run(self) -> Any:
         """See the base class."""
-        stamp = self.stamp
+        revision = self.revision
         data = None
         try:
-            with self._looking, self.held():
-                ready = look(self.entity, self._wait_set)
+            with self._checking, self.hold_entity():
+                ready = is_ready(self.entity, self._wait_set)
                 if ready:
                     data = self.entity.take_data()
         except InvalidHandle:
@@ -107,46 +103,53 @@ class ActionSource(Source):
         if not ready:
             for timer in self._timers:
                 timer.rearm()
-            self.desk.schedule.drained(self, stamp)
+            self.parts.scheduler.set_empty(self, revision)
             return NOTHING
         return self._execute(data)
 
     async def _execute(self, data: Any) -> None:
         with ExitStack() as stack:
             try:
-                stack.enter_context(self.held())  # rclpy uses it after the user's callbacks.
+                # rclpy uses it after the user's callbacks.
+                stack.enter_context(self.hold_entity())
             except InvalidHandle:
                 return
-            await execute_waitable(self.entity, data, self.desk.executor)
+            await _execute_waitable(self.entity, data, self.parts.executor)
 
 
-class PolledSource(Source):
-    """What only a wait set can see; the lane watches it and announces it.
+class WaitSetSource(EventSource):
+    """An entity whose events only a wait set can see; the wait set thread queues it.
 
-    The entity's `_executor_event` is True from the announcement until it is taken, as in rclpy.
+    The entity's `_executor_event` is True from then until it is taken, as in rclpy.
+
+    Attributes:
+        on_taken: Called when the entity can be waited for again, if it is waited for.
     """
 
-    __slots__ = ()
+    on_taken: Callable[[], None] | None
+    __slots__ = ('on_taken',)
 
-    def open(self, shared: 'Signal | None' = None) -> None:  # noqa: ARG002
-        """Nothing is pending yet; the lane does the rest."""
+    def open(self, shared: EventFd | None = None) -> None:  # noqa: ARG002
+        """See the base class; the wait set thread does the rest."""
+        self.on_taken = None
         self.entity._executor_event = False  # noqa: SLF001
 
     def close(self) -> None:
         """See the base class."""
         self.alive = False
 
-    def announce(self) -> None:
-        """Be ready."""
+    def set_ready(self) -> None:
+        """Queue the source, because its entity is ready."""
         self.entity._executor_event = True  # noqa: SLF001
-        self.desk.schedule.announce_once(self)
+        self.parts.scheduler.set_ready(self)
 
     def _forget_event(self) -> None:
         self.entity._executor_event = False  # noqa: SLF001
-        self.desk.look_again(self)
+        if self.on_taken is not None:
+            self.on_taken()
 
 
-class GuardConditionSource(PolledSource):
+class GuardConditionSource(WaitSetSource):
     """A guard condition."""
 
     __slots__ = ()
@@ -166,7 +169,7 @@ class GuardConditionSource(PolledSource):
         return result if result is not None and self._is_async(callback) else None
 
 
-class WaitableSource(PolledSource):
+class WaitableSource(WaitSetSource):
     """A waitable of any kind, ready because its `is_ready` said so."""
 
     __slots__ = ()
@@ -179,29 +182,28 @@ class WaitableSource(PolledSource):
             return NOTHING
         finally:
             self._forget_event()
-        return execute_waitable(self.entity, data, self.desk.executor)
+        return _execute_waitable(self.entity, data, self.parts.executor)
 
 
-def wait_set_for(waitable: Any, context: Any) -> Any:
-    """Return a wait set of the right size to which `waitable` has added itself."""
-    count = waitable.get_num_entities()
+def create_wait_set(sizes: tuple[int, ...], context: Any) -> Any:
+    """Return a wait set for so many entities of each kind, in the order of `sizes_of`."""
     with context.handle:
-        wait_set = _rclpy.WaitSet(
-            count.num_subscriptions,
-            count.num_guard_conditions,
-            count.num_timers,
-            count.num_clients,
-            count.num_services,
-            count.num_events,
-            context.handle,
-        )
-    with wait_set:
-        wait_set.clear_entities()
-        waitable.add_to_wait_set(wait_set)
-    return wait_set
+        return _rclpy.WaitSet(*sizes, context.handle)
 
 
-def look(waitable: Any, wait_set: Any) -> bool:
+def sizes_of(count: Any) -> tuple[int, ...]:
+    """Return the sizes of a wait set for the entities that `count`, a NumberOfEntities, counts."""
+    return (
+        count.num_subscriptions,
+        count.num_guard_conditions,
+        count.num_timers,
+        count.num_clients,
+        count.num_services,
+        count.num_events,
+    )
+
+
+def is_ready(waitable: Any, wait_set: Any) -> bool:
     """Ask the middleware and `waitable` itself whether it is ready now."""
     with wait_set:
         wait_set.clear_entities()
@@ -210,7 +212,15 @@ def look(waitable: Any, wait_set: Any) -> bool:
         return bool(waitable.is_ready(wait_set))
 
 
-def execute_waitable(waitable: Any, data: Any, executor: Any) -> Any:
+def _create_wait_set_of(waitable: Any, context: Any) -> Any:
+    wait_set = create_wait_set(sizes_of(waitable.get_num_entities()), context)
+    with wait_set:
+        wait_set.clear_entities()
+        waitable.add_to_wait_set(wait_set)
+    return wait_set
+
+
+def _execute_waitable(waitable: Any, data: Any, executor: Any) -> Any:
     """Return the coroutine that handles `data`."""
     for future in list(waitable._futures):  # noqa: SLF001
         future._set_executor(executor)  # noqa: SLF001

@@ -9,13 +9,13 @@ from typing import Any, Final
 from rosidl_parser import definition as idl
 
 from composer.errors import ComposerError
+from composer.interfaces.classes import interface_name
 from composer.interfaces.descriptions import (
     ArrayKind,
     FieldDescription,
     FieldType,
     MessageDescription,
 )
-from composer.interfaces.field_errors import interface_name
 from composer.interfaces.type_descriptions import EMPTY_MESSAGE_FIELD
 
 # The IDL names of the types whose .msg name differs (see rosidl_adapter).

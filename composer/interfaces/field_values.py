@@ -16,22 +16,13 @@ rclpy does not check fields by default, and its C code trusts what it gets: an `
 field is published as garbage. So a value that comes back from a rule is safe to publish.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
-from typing import Final, Literal, TypeAlias
+from typing import Final, TypeAlias
 
-from composer.errors import ComposerError
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.field_errors import describe_value
-from composer.spelling import suggest
+from composer.interfaces.field_errors import FieldError, describe_value, wrong_type
 
-FieldRule: TypeAlias = Literal[
-    'unknown-field',
-    'field-type',
-    'field-range',
-    'field-length',
-    'field-text',
-]
 Reader: TypeAlias = Callable[[object], object]
 
 INTEGER_RANGES: Final = {
@@ -50,33 +41,6 @@ INTEGER_RANGES: Final = {
 FLOAT32_MAX: Final = (2 - 2**-23) * 2.0**127
 BYTES: Final = tuple(bytes([number]) for number in range(256))
 OCTET_KINDS: Final = frozenset({'byte', 'char', 'uint8'})
-
-
-class FieldError(ComposerError):
-    """A value that its field cannot hold.
-
-    Attributes:
-        rule: which rule it breaks.
-        path: names and indices that lead to the value, outermost first; `within` adds to it while
-            the error rises.
-    """
-
-    def __init__(
-        self,
-        message: str,
-        *,
-        rule: FieldRule,
-        help: str | None = None,  # noqa: A002
-    ) -> None:
-        """Say what was expected, what was found, and which rule that breaks."""
-        super().__init__(message, help=help)
-        self.rule = rule
-        self.path: tuple[str | int, ...] = ()
-
-    def within(self, key: str | int) -> 'FieldError':
-        """Note that the value lies under this name or index."""
-        self.path = (key, *self.path)
-        return self
 
 
 def scalar_reader(field_type: FieldType) -> Reader:
@@ -114,7 +78,7 @@ def read_items(field_type: FieldType, value: object) -> Sequence[object]:
     elif isinstance(value, Sequence) and not isinstance(value, str | memoryview):
         return value
     scalar = isinstance(value, str | int | float)
-    raise _wrong_type(field_type, value, 'write it as a list' if scalar else None)
+    raise wrong_type(field_type, value, 'write it as a list' if scalar else None)
 
 
 def check_length(field_type: FieldType, length: int) -> None:
@@ -131,33 +95,6 @@ def check_length(field_type: FieldType, length: int) -> None:
     raise FieldError(message, rule='field-length')
 
 
-def unknown_field(message_name: str, key: object, names: Iterable[str]) -> FieldError:
-    """Make the error of a key that is no field of its message."""
-    names = tuple(names)
-    advice = suggest(key, names)
-    fields = f'its fields are {", ".join(names)}' if names else 'it has no fields'
-    return FieldError(
-        f'{message_name} has no field {key!r}',
-        rule='unknown-field',
-        help=f'{advice} {fields}' if advice else fields,
-    )
-
-
-def no_message(message_name: str, value: object, names: Iterable[str]) -> FieldError:
-    """Make the error of a value that cannot be read as a message of a type."""
-    fields = ', '.join(names)
-    return FieldError(
-        f'expected {message_name}, got {describe_value(value)}',
-        rule='field-type',
-        help=f'give its fields by name: {fields}' if fields else 'it has no fields: write {}',
-    )
-
-
-def _wrong_type(expected: FieldType, value: object, advice: str | None = None) -> FieldError:
-    message = f'expected {expected}, got {describe_value(value)}'
-    return FieldError(message, rule='field-type', help=advice)
-
-
 def _plain(value: object) -> object:
     """Get the Python value that a NumPy scalar holds, without importing NumPy."""
     if type(value).__module__ == 'numpy' and getattr(value, 'shape', None) == ():
@@ -172,7 +109,7 @@ def _read_bool(value: object) -> object:
     if isinstance(plain, bool):
         return plain
     advice = 'write true or false' if isinstance(value, str | int) else None
-    raise _wrong_type(FieldType('bool'), value, advice)
+    raise wrong_type(FieldType('bool'), value, advice)
 
 
 def _read_integer(expected: FieldType, value: object) -> int:
@@ -184,7 +121,7 @@ def _read_integer(expected: FieldType, value: object) -> int:
         advice = f'write {int(plain)}'
     elif isinstance(value, str) and value.strip().lstrip('+-').isdecimal():
         advice = f'write {value.strip()} without quotes'
-    raise _wrong_type(expected, value, advice)
+    raise wrong_type(expected, value, advice)
 
 
 def _integer_reader(kind: str) -> Callable[[object], int]:
@@ -221,7 +158,7 @@ def _read_float(expected: FieldType, value: object) -> float:
     advice = None
     if isinstance(value, str) and _is_number(value):
         advice = f'write {value.strip()} without quotes'
-    raise _wrong_type(expected, value, advice)
+    raise wrong_type(expected, value, advice)
 
 
 def _is_number(text: str) -> bool:
@@ -255,7 +192,7 @@ def _string_reader(expected: FieldType) -> Reader:
     def read(value: object) -> object:
         if not isinstance(value, str):
             scalar = isinstance(value, bool | int | float)
-            raise _wrong_type(expected, value, 'put it in quotes' if scalar else None)
+            raise wrong_type(expected, value, 'put it in quotes' if scalar else None)
         if not wide and '\0' in value:
             message = f'expected {expected}, got text with a NUL character'
             advice = 'ROS would cut the text off there'

@@ -15,7 +15,7 @@ from composer.language.includes.includer import Includer
 from composer.language.instances import PARTS, ArgumentValues, read_instance, sample_values
 from composer.language.layers import merge_documents
 from composer.language.parsing.system_parser import parse_system
-from composer.language.set_option import apply_settings
+from composer.language.set_option import apply_set_values
 from composer.yaml_text.reader import Document, parse_document, read_document
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def load_system(
     words: Sequence[str] | None = None,
     *,
     layers: Sequence[Path] = (),
-    settings: Sequence[str] = (),
+    set_values: Sequence[str] = (),
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -81,14 +81,14 @@ def load_system(
         words: The arguments of the command line; `None` to read the file with its defaults, and
             with samples where there are none.
         layers: Files that change the first one, each over those before it.
-        settings: Changes of single values, as in `nodes.talker.log_level=debug`.
+        set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
     """
     documents = [read_document(each) for each in (path, *layers)]
-    return _load(apply_settings(merge_documents(documents), settings), path, words)
+    return _load(apply_set_values(merge_documents(documents), set_values), path, words)
 
 
 def load_system_text(

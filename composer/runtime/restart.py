@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
-from time import monotonic
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.processes.backoff import Backoff
 from composer.runtime.logs import system_logger
 from composer.runtime.stop import stop_node
 
@@ -20,28 +19,6 @@ if TYPE_CHECKING:
     from composer.runtime.start import NodeStarter
 
 _GONE_SEC = 2.0
-_FIRST_BACKOFF_SEC = 0.1
-_LONGEST_BACKOFF_SEC = 30.0
-# A node that ran this long has recovered: the next restart is prompt again.
-_RECOVERED_SEC = 60.0
-
-
-@dataclass(slots=True)
-class Backoff:
-    """How long to wait before the next restart of a node: from 0.1 s, doubled, to 30 s."""
-
-    _delay_sec: float = _FIRST_BACKOFF_SEC
-    _last_restart: float = float('-inf')
-
-    def next_delay_sec(self) -> float:
-        """Return the delay before the restart that is due now."""
-        now = monotonic()
-        if now - self._last_restart > _RECOVERED_SEC:
-            self._delay_sec = _FIRST_BACKOFF_SEC
-        delay = self._delay_sec
-        self._delay_sec = min(delay * 2, _LONGEST_BACKOFF_SEC)
-        self._last_restart = now + delay
-        return delay
 
 
 class ErrorPolicy:

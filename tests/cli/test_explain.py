@@ -24,7 +24,7 @@ def test_a_rule_is_explained_with_its_examples(run):
     assert (code, err) == (0, '')
     blocks = ['Bad:', 'With driving.py:', 'What Composer reports:', 'Good:']
     assert [line for line in out.splitlines() if line in blocks] == blocks
-    assert out.startswith('bad-argument: error, of the family behaviours\n\n')
+    assert out.startswith('bad-argument: error, in the family behaviours\n\n')
     assert '# composer: ignore[bad-argument]' in out
     assert 'https://docs.python.org/3/reference/expressions.html#calls' in out
     assert "help: did you mean 'heading'?" in out
@@ -51,7 +51,7 @@ def test_without_a_rule_all_are_listed_by_family(run):
 def test_an_unknown_rule_is_wrong_usage(run):
     code, out, err = run('explain', 'bad-nam')
     assert (code, out) == (2, '')
-    assert "no rule is called 'bad-nam'\n  help: did you mean 'bad-name'?" in err
+    assert "there is no rule 'bad-nam'\n  help: did you mean 'bad-name'?" in err
 
 
 def test_the_schema_is_printed(run):

@@ -15,13 +15,13 @@ def draw(tmp_path, monkeypatch):
     """Return a function that makes a picture of the text of a file."""
     monkeypatch.chdir(tmp_path)
 
-    def draw(text, *settings, name='robot', layer=None):
+    def draw(text, *set_values, name='robot', layer=None):
         path = tmp_path / f'{name}.yaml'
         path.write_text(textwrap.dedent(text).lstrip())
         layers = [tmp_path / 'site.yaml'] if layer else []
         for each in layers:
             each.write_text(layer)
-        system = load_system(path, layers=layers, settings=settings)
+        system = load_system(path, layers=layers, set_values=set_values)
         catalogue = InterfaceCatalogue()
         findings = check_system(system, catalogue)
         return build_picture(create_context(system, catalogue)[0], findings)

@@ -9,7 +9,7 @@ pytest.importorskip('rclpy')
 from rclpy.context import Context
 
 from composer.executor import ComposerExecutor
-from composer.executor.switch_interval import INTERVAL_SEC, PromptSwitching
+from composer.executor.switch_interval import INTERVAL_SEC, ShortSwitchInterval
 
 DEADLINE_SEC = 40.0
 
@@ -23,32 +23,32 @@ def interval_is_pythons_own():
 
 
 def test_the_interval_is_short_until_the_last_user_has_left():
-    switching = PromptSwitching()
-    switching.enter()
-    switching.enter()
-    switching.leave()
+    interval = ShortSwitchInterval()
+    interval.add_user()
+    interval.add_user()
+    interval.remove_user()
     assert sys.getswitchinterval() == INTERVAL_SEC
-    switching.leave()
+    interval.remove_user()
     assert sys.getswitchinterval() == 0.005
 
 
 def test_a_shorter_interval_is_left_alone():
     sys.setswitchinterval(0.0005)
-    switching = PromptSwitching()
-    switching.enter()
+    interval = ShortSwitchInterval()
+    interval.add_user()
     assert sys.getswitchinterval() == 0.0005
-    switching.leave()
+    interval.remove_user()
     assert sys.getswitchinterval() == 0.0005
 
 
 def test_an_interval_that_was_set_meanwhile_is_left_alone():
-    switching = PromptSwitching()
-    switching.enter()
+    interval = ShortSwitchInterval()
+    interval.add_user()
     sys.setswitchinterval(0.02)
-    switching.leave()
+    interval.remove_user()
     assert sys.getswitchinterval() == 0.02
-    switching.enter()
-    switching.leave()
+    interval.add_user()
+    interval.remove_user()
     assert sys.getswitchinterval() == 0.02
 
 

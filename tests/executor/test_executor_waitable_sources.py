@@ -23,7 +23,7 @@ from std_msgs.msg import Empty
 from test_msgs.action import Fibonacci
 
 from composer.executor import wait_set_thread
-from composer.executor.wait_set_thread import Lane
+from composer.executor.wait_set_thread import WaitSetThread
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [
@@ -52,8 +52,8 @@ def test_a_guard_condition_is_let_go_of_at_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Nothing else wakes the thread that waits for it.
-    monkeypatch.setattr(Lane, '_timeout', lambda _lane, most_sec: most_sec)
-    monkeypatch.setattr(wait_set_thread, '_ANSWER_SEC', 10 * DEADLINE_SEC)
+    monkeypatch.setattr(WaitSetThread, '_timeout_sec', lambda _thread, max_sec: max_sec)
+    monkeypatch.setattr(wait_set_thread, '_FLUSH_SEC', 10 * DEADLINE_SEC)
     ticks: list[int] = []
     node.create_timer(0.001, lambda: ticks.append(1))
     with spinning(executor):

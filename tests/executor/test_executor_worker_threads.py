@@ -11,30 +11,30 @@ pytest.importorskip('rclpy')
 
 from spinning import DEADLINE_SEC, spinning, wait_for
 
-from composer.executor.worker_threads import Crew
+from composer.executor.worker_threads import WorkerThreads
 
 pytestmark = pytest.mark.ros
 
 
-def test_a_crew_is_manned_by_threads_that_are_yet_to_begin(monkeypatch):
+def test_threads_that_have_still_to_begin_count(monkeypatch):
     begin = _thread.start_new_thread
     late = []
     monkeypatch.setattr(_thread, 'start_new_thread', lambda work, _: late.append(work))
-    crew = Crew(lambda worker: crew.leads(worker, lambda: False), pytest.fail)
-    crew.muster()
+    threads = WorkerThreads(lambda worker: threads.is_leader(worker, lambda: False), pytest.fail)
+    threads.start()
     monkeypatch.undo()
-    crew.dismiss(0.0)
-    assert crew.is_manned()
+    threads.end(0.0)
+    assert threads.has_threads()
     for work in late:
         begin(work, ())
-    wait_for(lambda: not crew.is_manned())
-    crew.muster()
-    assert not crew.is_manned()
+    wait_for(lambda: not threads.has_threads())
+    threads.start()
+    assert not threads.has_threads()
 
 
 def test_shutdown_leaves_a_waiting_spin_once_what_it_waits_with(node, executor):
-    board = executor._engine.polling.board
-    wait, waiting, errors = board.wait, threading.Event(), []
+    poller = executor._spinner.poller
+    wait, waiting, errors = poller._wait, threading.Event(), []
 
     def wait_twice(timeout_sec):
         waiting.set()
@@ -48,7 +48,7 @@ def test_shutdown_leaves_a_waiting_spin_once_what_it_waits_with(node, executor):
         except BaseException as error:  # noqa: BLE001
             errors.append(error)
 
-    board.wait = wait_twice
+    poller._wait = wait_twice
     thread = threading.Thread(target=spin)
     thread.start()
     assert waiting.wait(DEADLINE_SEC)
@@ -79,7 +79,7 @@ def test_the_executor_can_be_spun_on_whatever_is_thrown_into_its_threads(node, e
     for _ in range(10):
         before = len(ticks)
         wait_for(lambda before=before: len(ticks) > before + 3)
-        # Sleeping makes spares of those that nobody needs.
+        # While the leader sleeps, others take over; then they are idle.
         executor.create_task(time.sleep, 0.01)
         for one in threading.enumerate():
             if one.name.startswith('executor-'):
@@ -137,7 +137,7 @@ def test_a_tracer_that_raises_ends_no_thread(node, executor, monkeypatch):
 
     ran = []
     with spinning(executor) as errors:
-        wait_for(executor._engine.crew.is_manned)
+        wait_for(executor._spinner.workers.has_threads)
         monkeypatch.setattr(threading, '_trace_hook', fail)
         monkeypatch.setattr(threading, '_profile_hook', fail)
         for _ in range(10):

@@ -5,15 +5,13 @@ from math import inf, isnan, nan
 import pytest
 
 from composer.interfaces.descriptions import FieldType
+from composer.interfaces.field_errors import FieldError
 from composer.interfaces.field_values import (
     FLOAT32_MAX,
     INTEGER_RANGES,
-    FieldError,
     check_length,
-    no_message,
     read_items,
     scalar_reader,
-    unknown_field,
 )
 
 
@@ -273,31 +271,3 @@ def test_one_item_is_said_in_the_singular() -> None:
     with pytest.raises(FieldError) as caught:
         check_length(FieldType('int8', array='fixed', array_bound=3), 1)
     assert str(caught.value) == 'expected int8[3], got 1 item'
-
-
-def test_an_unknown_field_is_answered_with_the_nearest_and_all() -> None:
-    near = unknown_field('a/msg/B', 'liner', ['linear', 'angular'])
-    assert (near.rule, str(near), near.help) == (
-        'unknown-field',
-        "a/msg/B has no field 'liner'",
-        "did you mean 'linear'? its fields are linear, angular",
-    )
-    assert unknown_field('a/msg/B', 5, ['x', 'y']).help == 'its fields are x, y'
-    assert unknown_field('a/msg/B', 'x', []).help == 'it has no fields'
-
-
-def test_what_is_no_message_is_answered_with_its_fields() -> None:
-    error = no_message('a/msg/B', 5, ['x', 'y'])
-    assert (error.rule, str(error), error.help) == (
-        'field-type',
-        'expected a/msg/B, got int 5',
-        'give its fields by name: x, y',
-    )
-    assert no_message('a/msg/B', 5, []).help == 'it has no fields: write {}'
-
-
-def test_the_path_of_an_error_grows_from_the_inside() -> None:
-    error = unknown_field('a/msg/B', 'x', [])
-    assert error.path == ()
-    assert error.within(3).within('points') is error
-    assert error.path == ('points', 3)

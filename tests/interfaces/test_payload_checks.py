@@ -4,7 +4,7 @@ import pytest
 
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
-from composer.interfaces.payload_checks import FieldFault, find_payload_faults
+from composer.interfaces.payload_checks import FieldFinding, check_payload
 
 VECTOR = MessageDescription(
     'my_msgs/msg/Vector',
@@ -48,10 +48,10 @@ def test_right_data_has_no_faults(catalogue: InterfaceCatalogue) -> None:
         'level': 255,
         'limits': [-128, 127],
     }
-    assert list(find_payload_faults(THING, data, catalogue)) == []
-    assert list(find_payload_faults(THING, {}, catalogue)) == []
-    assert list(find_payload_faults(EMPTY, None, catalogue)) == []
-    assert list(find_payload_faults(EMPTY, {}, catalogue)) == []
+    assert list(check_payload(THING, data, catalogue)) == []
+    assert list(check_payload(THING, {}, catalogue)) == []
+    assert list(check_payload(EMPTY, None, catalogue)) == []
+    assert list(check_payload(EMPTY, {}, catalogue)) == []
 
 
 def test_every_fault_is_found_at_its_place_in_the_data(catalogue: InterfaceCatalogue) -> None:
@@ -62,62 +62,62 @@ def test_every_fault_is_found_at_its_place_in_the_data(catalogue: InterfaceCatal
         'level': 256,
         'limits': [1, 128, 2.0],
     }
-    assert list(find_payload_faults(THING, data, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(THING, data, catalogue)) == [
+        FieldFinding(
             ('name',),
             'my_msgs/msg/Thing: name.data: expected string, got int 5',
             'put it in quotes',
             'field-type',
         ),
-        FieldFault(
+        FieldFinding(
             ('path', 'points', 0, 'x'),
             "my_msgs/msg/Thing: path.points[0].x: expected float64, got str 'far'",
             None,
             'field-type',
         ),
-        FieldFault(
+        FieldFinding(
             ('path', 'points', 1),
             'my_msgs/msg/Thing: path.points[1]: expected my_msgs/msg/Vector, got int 3',
             'give its fields by name: x, y',
             'field-type',
         ),
-        FieldFault(
+        FieldFinding(
             ('path', 'points', 2, 'z'),
             "my_msgs/msg/Thing: path.points[2]: my_msgs/msg/Vector has no field 'z'",
             'its fields are x, y',
             'unknown-field',
         ),
-        FieldFault(
+        FieldFinding(
             ('path', 'points', 2, 'y'),
             'my_msgs/msg/Thing: path.points[2].y: expected float64, got bool True',
             None,
             'field-type',
         ),
-        FieldFault(
+        FieldFinding(
             ('levle',),
             "my_msgs/msg/Thing has no field 'levle'",
             "did you mean 'level'? its fields are name, path, level, limits, other",
             'unknown-field',
         ),
-        FieldFault(
+        FieldFinding(
             ('level',),
             'my_msgs/msg/Thing: level: expected uint8 (0 to 255), got int 256',
             None,
             'field-range',
         ),
-        FieldFault(
+        FieldFinding(
             ('limits',),
             'my_msgs/msg/Thing: limits: expected int8[2], got 3 items',
             None,
             'field-length',
         ),
-        FieldFault(
+        FieldFinding(
             ('limits', 1),
             'my_msgs/msg/Thing: limits[1]: expected int8 (-128 to 127), got int 128',
             None,
             'field-range',
         ),
-        FieldFault(
+        FieldFinding(
             ('limits', 2),
             'my_msgs/msg/Thing: limits[2]: expected int8, got float 2.0',
             'write 2',
@@ -127,16 +127,16 @@ def test_every_fault_is_found_at_its_place_in_the_data(catalogue: InterfaceCatal
 
 
 def test_bare_values_lie_where_the_message_does(catalogue: InterfaceCatalogue) -> None:
-    assert list(find_payload_faults(THING, {'path': [{'x': None}]}, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(THING, {'path': [{'x': None}]}, catalogue)) == [
+        FieldFinding(
             ('path', 0, 'x'),
             'my_msgs/msg/Thing: path.points[0].x: expected float64, got None',
             None,
             'field-type',
         ),
     ]
-    assert list(find_payload_faults(TEXT, None, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(TEXT, None, catalogue)) == [
+        FieldFinding(
             (),
             'my_msgs/msg/Text: data: expected string, got None',
             None,
@@ -146,8 +146,8 @@ def test_bare_values_lie_where_the_message_does(catalogue: InterfaceCatalogue) -
 
 
 def test_what_is_no_list_is_one_fault(catalogue: InterfaceCatalogue) -> None:
-    assert list(find_payload_faults(THING, {'limits': 3}, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(THING, {'limits': 3}, catalogue)) == [
+        FieldFinding(
             ('limits',),
             'my_msgs/msg/Thing: limits: expected int8[2], got int 3',
             'write it as a list',
@@ -157,16 +157,16 @@ def test_what_is_no_list_is_one_fault(catalogue: InterfaceCatalogue) -> None:
 
 
 def test_a_message_that_is_none_is_a_fault_of_the_message(catalogue: InterfaceCatalogue) -> None:
-    assert list(find_payload_faults(VECTOR, None, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(VECTOR, None, catalogue)) == [
+        FieldFinding(
             (),
             'expected my_msgs/msg/Vector, got None',
             'give its fields by name: x, y',
             'field-type',
         ),
     ]
-    assert list(find_payload_faults(EMPTY, 0, catalogue)) == [
-        FieldFault(
+    assert list(check_payload(EMPTY, 0, catalogue)) == [
+        FieldFinding(
             (),
             'expected my_msgs/msg/Empty, got int 0',
             'it has no fields: write {}',
@@ -178,4 +178,4 @@ def test_a_message_that_is_none_is_a_fault_of_the_message(catalogue: InterfaceCa
 def test_what_the_catalogue_does_not_describe_is_taken_as_right(
     catalogue: InterfaceCatalogue,
 ) -> None:
-    assert list(find_payload_faults(THING, {'other': {'anything': 1}}, catalogue)) == []
+    assert list(check_payload(THING, {'other': {'anything': 1}}, catalogue)) == []

@@ -14,7 +14,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_values import INTEGER_RANGES
-from composer.interfaces.payload_checks import find_payload_faults
+from composer.interfaces.payload_checks import check_payload
 from composer.runtime.messages.payloads import PayloadError, converter_for
 
 pytestmark = pytest.mark.ros
@@ -139,7 +139,7 @@ def test_both_give_the_same_verdict_in_the_same_words(name: str) -> None:
     @QUICK
     @given(messages(name, slips=True))
     def agree(data: object) -> None:
-        faults = list(find_payload_faults(description, data, CATALOGUE))
+        faults = list(check_payload(description, data, CATALOGUE))
         first = faults[0].message if faults else None
         assert conversion_fault(name, data) == first
         verdicts.add(first is None)
@@ -157,7 +157,7 @@ def test_right_data_pass_the_check_and_arrive(name: str) -> None:
     @QUICK
     @given(messages(name, slips=False))
     def arrive(data: object) -> None:
-        assert list(find_payload_faults(description, data, CATALOGUE)) == []
+        assert list(check_payload(description, data, CATALOGUE)) == []
         message = converter_for(message_class).convert(data)
         once = deserialize_message(serialize_message(message), message_class)
         # Checking what was received changes nothing, and sending it on loses nothing. The text

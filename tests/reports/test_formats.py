@@ -390,7 +390,7 @@ def test_a_junit_report_has_a_case_for_each_file():
         'fine.yaml',
     ]
     (failure,) = suite[0]
-    assert failure.get('message') == '1 fault and 1 warning in 1 file'
+    assert failure.get('message') == '1 error and 1 warning in 1 file'
     assert failure.get('type') == 'unused-ignore, bad-name'
     assert 'robots/rover.yaml:3:3: error[bad-name]: ' in failure.text
     assert len(suite[2]) == 0

@@ -13,7 +13,7 @@ from jinja2 import StrictUndefined, TemplateError, nodes
 
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
-from composer.interfaces.field_values import unknown_field
+from composer.interfaces.field_errors import unknown_field
 from composer.spelling import suggest
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.payload_checks import find_payload_faults
+from composer.interfaces.payload_checks import check_payload
 from composer.language.bindings import node_bindings
 from composer.python_source.annotations import Annotation, read_annotation
 from composer.python_source.modules import FunctionKind, ModuleSource
@@ -164,7 +164,7 @@ def _check_payload(
         )
     elif read.builtin in _SAMPLES and description is not None:
         sample = _SAMPLES[read.builtin]
-        fits = not any(find_payload_faults(description, sample, context.catalogue))
+        fits = not any(check_payload(description, sample, context.catalogue))
     else:
         return
     if not fits:

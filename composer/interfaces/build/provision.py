@@ -1,23 +1,25 @@
 """Provide the interface packages that a system names: installed, cached, or built now."""
 
+import importlib
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.diagnostics import Diagnostic
 from composer.errors import ComposerError
 from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.dependencies import (
     check_definitions,
     order_packages,
     used_packages,
 )
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
-from composer.interfaces.importing import make_importable
-from composer.interfaces.prefixes import find_package_prefix
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
@@ -39,6 +41,10 @@ def _format(diagnostic: Diagnostic) -> str:
     place = diagnostic.span or diagnostic.file
     text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
     return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
+
+
+class ModuleTakenError(ComposerError):
+    """Python already has another module of an interface package's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +104,7 @@ def provide_packages(
         ModuleTakenError: another Python module has a package's name.
     """
     packages = load_packages(folders)
-    provider = _Provider(default_prefixes(), progress)
+    provider = _Provider(ament_prefixes(), progress)
     return [provider.provide(definitions) for definitions in packages]
 
 
@@ -112,7 +118,7 @@ class _Provider:
         self._keys: dict[str, str] = {}
 
     def provide(self, definitions: PackageDefinitions) -> ProvidedPackage:
-        installed = find_package_prefix(definitions.package, self._prefixes)
+        installed = find_package(definitions.package, self._prefixes, INTERFACE_INDEX)
         if installed is not None:
             # Imported here, as the builder below: a cached start must not pay for it.
             from composer.interfaces.definitions.differences import require_same
@@ -157,3 +163,32 @@ class _Provider:
         )
         duration_sec = time.monotonic() - start
         self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
+
+
+def make_importable(package: str, prefix: Path) -> None:
+    """Have `import package` find the package in a prefix, now and in modules imported later.
+
+    Raises:
+        ModuleTakenError: another module of that name is found first.
+    """
+    folder = prefix / 'python'
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+        importlib.invalidate_caches()
+    origin = _find_origin(package)
+    if origin != folder / package / '__init__.py':
+        message = (
+            f'the interface package {package!r} cannot be imported: '
+            f'{origin or "another package"} has that name'
+        )
+        raise ModuleTakenError(
+            message,
+            help='rename one of them; if the definitions changed since the package was imported, '
+            'start again',
+        )
+
+
+def _find_origin(package: str) -> Path | None:
+    loaded = sys.modules.get(package)
+    spec = loaded.__spec__ if loaded else find_spec(package)
+    return Path(spec.origin) if spec and spec.origin else None

@@ -7,10 +7,10 @@ them have both.
 from collections.abc import Sequence
 from pathlib import Path
 
+from composer.ament import INTERFACE_INDEX, find_package
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.package_folder import load_definitions
 from composer.interfaces.descriptions import InterfaceDescription
-from composer.interfaces.prefixes import find_package_prefix
 
 
 def describe_interface(full_name: str, prefixes: Sequence[Path]) -> InterfaceDescription | None:
@@ -24,7 +24,7 @@ def describe_interface(full_name: str, prefixes: Sequence[Path]) -> InterfaceDes
         ParserMissingError: `rosidl_adapter` is not installed.
     """
     package = full_name.partition('/')[0]
-    prefix = find_package_prefix(package, prefixes)
+    prefix = find_package(package, prefixes, INTERFACE_INDEX)
     return None if prefix is None else describe_package(package, prefix).get(full_name)
 
 

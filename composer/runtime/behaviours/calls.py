@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.executor.after_fork import end_child
 from composer.python_source.modules import FunctionKind
-from composer.runtime import forks
+from composer.runtime import forked_children
 from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.stacks import format_coroutine, format_thread
 
@@ -237,11 +237,11 @@ class BehaviourCall:
                 if admits is not None and not admits():
                     return False
                 result = function(*arguments)
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 deliver(result)
             except BaseException as error:  # noqa: BLE001 - it never takes another node down
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 failed(owner, error)
                 return False
@@ -271,11 +271,11 @@ class BehaviourCall:
                     coroutine.close()
                     return
                 result = await coroutine
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 self._deliver(result)
             except BaseException as error:
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 if _comes_from_outside(error):
                     # The executor drops the coroutine; to go on would be an error of Python's.
@@ -288,7 +288,7 @@ class BehaviourCall:
                     ledger.end(token)
 
         # A child goes on in the executor whenever its coroutine waits.
-        forks.coroutine_codes.add(await_behaviour.__code__)
+        forked_children.coroutine_codes.add(await_behaviour.__code__)
         return await_behaviour
 
 

@@ -8,7 +8,6 @@ nothing except `on_stop` waits for somebody who is not there yet.
 from __future__ import annotations
 
 import threading
-from contextlib import contextmanager
 from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -18,49 +17,13 @@ from rclpy.task import Future
 from composer.errors import SystemStoppingError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from composer.executor import ComposerExecutor
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.01
-
-
-class StopSignal:
-    """Whether the system is to stop, for those who wait.
-
-    Attributes:
-        is_set: Whether a stop was requested.
-    """
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self._wakers: dict[Callable[[], None], None] = {}
-
-    def set(self) -> None:
-        """Wake all who wait; a signal handler may call it, so it takes no lock."""
-        self.is_set = True
-        for wake in list(self._wakers):
-            wake()
-
-    @contextmanager
-    def waking(self, wake: Callable[[], None]) -> Iterator[bool]:
-        """Let `wake` be called when a stop is requested.
-
-        Returns:
-            Whether that is yet to come; `wake` is not called for a stop of before.
-        """
-        if self.is_set:
-            yield False
-            return
-        self._wakers[wake] = None
-        if self.is_set:
-            # It came while the line above was on its way.
-            wake()
-        try:
-            yield True
-        finally:
-            del self._wakers[wake]
 
 
 def stopping_error() -> SystemStoppingError:
@@ -76,7 +39,7 @@ class ThreadWaits:
     """
 
     def __init__(
-        self, make_room: Callable[[], AbstractContextManager[None]], stop: StopSignal
+        self, make_room: Callable[[], AbstractContextManager[None]], stop: StopRequest
     ) -> None:
         self.make_room = make_room
         self.stop = stop

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.entities.qos_profiles import create_qos_profile
-from composer.runtime.health.unmatched import Endpoint
+from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def create_publishers(node: LiveNode) -> None:
 def _create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
     message_class = import_interface(spec.type)
     profile = create_qos_profile(spec.qos, node.services.profiles)
-    endpoint = Endpoint(node.ros, spec, profile, node.place(spec.path))
+    endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
     node.endpoints.append(endpoint)
     send = node.ros.create_publisher(
         message_class, spec.topic, profile, event_callbacks=endpoint.publisher_events()

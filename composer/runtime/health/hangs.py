@@ -9,8 +9,9 @@ from __future__ import annotations
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Protocol
 
+from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.calls import RunningCall
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -43,7 +44,7 @@ class HangLimit:
         self.after_sec = after_sec
         self._place = place
         self._warn = warn
-        self._quiet_sec = _QUIET_SEC
+        self._quiet = Backoff(_QUIET_SEC, _LONGEST_QUIET_SEC, recovered_sec=float('inf'))
         self._quiet_until = float('-inf')
         self._unsaid: set[int] = set()
         self._reported: dict[int, int] = {}
@@ -70,8 +71,7 @@ class HangLimit:
         self._unsaid.discard(token)
         others = f' ({len(self._unsaid)} others before it did so too)' if self._unsaid else ''
         self._unsaid.clear()
-        self._quiet_until = now_ns * 1e-9 + self._quiet_sec
-        self._quiet_sec = min(self._quiet_sec * 2, _LONGEST_QUIET_SEC)
+        self._quiet_until = now_ns * 1e-9 + self._quiet.next_delay_sec()
         self._reported[token] = call.since_ns
         self._warn(
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
@@ -103,7 +103,7 @@ class WatchedNode(Protocol):
     def errors(self) -> ErrorReporter: ...  # noqa: D102
 
 
-class HangWatch(Watch):
+class HangWatcher(Watcher):
     """The thread that looks at what runs.
 
     Args:

@@ -20,7 +20,7 @@ from rclpy.qos import (
 )
 
 from composer.language.specs import PublisherSpec
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -44,7 +44,7 @@ _CONFLICTS = {
 }
 
 
-class Endpoint:
+class TopicEndpoint:
     """A publisher or subscription of a node, and whom it cannot talk to.
 
     Args:
@@ -154,14 +154,14 @@ class Endpoint:
         )
 
 
-class GraphWatch(Watch):
+class GraphWatcher(Watcher):
     """The thread that looks who meets.
 
     Args:
         endpoints: Returns the endpoints that there are now.
     """
 
-    def __init__(self, endpoints: Callable[[], Iterable[Endpoint]]) -> None:
+    def __init__(self, endpoints: Callable[[], Iterable[TopicEndpoint]]) -> None:
         super().__init__('composer-graph', self._look_unless_destroyed, _PAUSE_SEC)
         self._endpoints = endpoints
         self._seen: list[tuple[str, list[str]]] = []
@@ -182,7 +182,7 @@ class GraphWatch(Watch):
             if end.is_due:
                 end.look()
 
-    def _newly_mixed_topics(self, endpoints: list[Endpoint]) -> set[str]:
+    def _newly_mixed_topics(self, endpoints: list[TopicEndpoint]) -> set[str]:
         """Return the topics with several types, if anything in the graph has changed."""
         if not endpoints:
             return set()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class Watch:
+class Watcher:
     """Calls a function at intervals, whatever it raises; the same fault is logged once.
 
     Args:

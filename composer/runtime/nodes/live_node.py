@@ -27,7 +27,7 @@ from composer.runtime.nodes.callback_groups import (
 )
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
-from composer.runtime.ownership import release, reserve
+from composer.runtime.reserved_methods import release, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError
     from composer.runtime.health.statistics import EntityHealth
-    from composer.runtime.health.unmatched import Endpoint
+    from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.yaml_text.positions import DataPath
 
@@ -90,7 +90,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
-    endpoints: list[Endpoint] = field(default_factory=list)
+    endpoints: list[TopicEndpoint] = field(default_factory=list)
     at_stop: list[AtStop] = field(default_factory=list)
     limits: dict[str, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
@@ -126,7 +126,7 @@ class LiveNode:
         """Let the health of an entity in words tell what its ROS entity has missed."""
         health = self.health(owner)
         if health is not None:
-            health.follow(partial(self.services.executor.missed, self.ros, entity))
+            health.follow(partial(self.services.executor.missed_counts, self.ros, entity))
 
     @property
     def full_name(self) -> str:

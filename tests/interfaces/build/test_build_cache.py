@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from building import WriteDefinitions
 
+from composer.ament import ament_prefixes
 from composer.interfaces.build import cache
 from composer.interfaces.build.build_cache import (
     BuildFolder,
@@ -14,7 +15,6 @@ from composer.interfaces.build.build_cache import (
     compute_key,
     provide_cached,
 )
-from composer.interfaces.catalogue import default_prefixes
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 
 
@@ -123,7 +123,7 @@ def test_equal_definitions_have_equal_keys_wherever_they_are(
     tmp_path: Path,
 ) -> None:
     moved = replace(definitions, folder=tmp_path)
-    prefixes = default_prefixes()
+    prefixes = ament_prefixes()
     assert compute_key(moved, prefixes, {}) == compute_key(definitions, prefixes, {})
 
 
@@ -140,7 +140,7 @@ def test_other_definitions_have_another_key(
     definitions: PackageDefinitions,
     changes: Mapping[str, object],
 ) -> None:
-    prefixes = default_prefixes()
+    prefixes = ament_prefixes()
     changed = replace(definitions, **changes)  # type: ignore[arg-type]
     assert compute_key(changed, prefixes, {}) != compute_key(definitions, prefixes, {})
 
@@ -152,7 +152,7 @@ def test_another_release_of_ros_or_of_a_used_package_makes_another_key(
     tmp_path: Path,
     package: str,
 ) -> None:
-    prefixes = [tmp_path, *default_prefixes()]
+    prefixes = [tmp_path, *ament_prefixes()]
     before = compute_key(definitions, prefixes, {})
     manifest = tmp_path / 'share' / package / 'package.xml'
     manifest.parent.mkdir(parents=True)
@@ -165,7 +165,7 @@ def test_python_numpy_builder_and_used_builds_make_another_key(
     definitions: PackageDefinitions,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    prefixes = default_prefixes()
+    prefixes = ament_prefixes()
     keys = {compute_key(definitions, prefixes, {}), compute_key(definitions, prefixes, {'a': '1'})}
     for name, value in (
         ('BUILDER_FORMAT', 99),

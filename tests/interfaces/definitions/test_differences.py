@@ -4,20 +4,19 @@ from pathlib import Path
 import pytest
 from building import WriteDefinitions
 
-from composer.interfaces.catalogue import default_prefixes
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.interfaces.definitions.differences import (
     DefinitionsDifferError,
     compare_definitions,
     require_same,
 )
 from composer.interfaces.definitions.package_folder import load_definitions
-from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
 
 pytestmark = pytest.mark.ros
 
 
 def installed_in(package: str) -> Path:
-    prefix = find_package_prefix(package, default_prefixes())
+    prefix = find_package(package, ament_prefixes(), INTERFACE_INDEX)
     assert prefix is not None
     return prefix
 

@@ -3,16 +3,15 @@ from pathlib import Path
 
 import pytest
 
-from composer.interfaces.catalogue import default_prefixes
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import MessageDescription
-from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
 
 pytestmark = pytest.mark.ros
 
 
 def test_an_installed_message_is_described_with_its_comments_and_constants() -> None:
-    header = describe_interface('std_msgs/msg/Header', default_prefixes())
+    header = describe_interface('std_msgs/msg/Header', ament_prefixes())
     assert isinstance(header, MessageDescription)
     assert header.comment.startswith('Standard metadata for higher-level stamped data types.')
     assert [(str(each.type), each.name, each.comment) for each in header.fields] == [
@@ -23,7 +22,7 @@ def test_an_installed_message_is_described_with_its_comments_and_constants() -> 
         ),
         ('string', 'frame_id', 'Transform frame with which this data is associated.'),
     ]
-    log = describe_interface('rcl_interfaces/msg/Log', default_prefixes())
+    log = describe_interface('rcl_interfaces/msg/Log', ament_prefixes())
     assert isinstance(log, MessageDescription)
     assert [(each.name, each.value) for each in log.constants[:2]] == [
         ('DEBUG', 10),
@@ -33,13 +32,13 @@ def test_an_installed_message_is_described_with_its_comments_and_constants() -> 
 
 @pytest.mark.parametrize('name', ['std_msgs/msg/Heeder', 'no_msgs/msg/Header'])
 def test_what_is_not_installed_has_no_description(name: str) -> None:
-    assert describe_interface(name, default_prefixes()) is None
+    assert describe_interface(name, ament_prefixes()) is None
 
 
 def test_a_package_without_definition_files_is_described_by_its_type_descriptions(
     tmp_path: Path,
 ) -> None:
-    prefix = find_package_prefix('std_msgs', default_prefixes())
+    prefix = find_package('std_msgs', ament_prefixes(), INTERFACE_INDEX)
     assert prefix is not None
     for relative in (f'{INTERFACE_INDEX}/std_msgs', 'share/std_msgs/msg/Header.json'):
         (tmp_path / relative).parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""`wait_for`: nodes and processes start when what they need is there.
+"""`wait_for`: nodes and processes that start when what they need is there.
 
-The graph is only asked while somebody waits, at most twenty times a second.
+The graph is only queried while something waits, at most twenty times a second.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from composer.errors import StartError
 from composer.names import expand_name, remap_name
-from composer.runtime.live_graph import LiveGraph, create_graph_node, describe_graph
+from composer.runtime.ros_graph import RosGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.language.specs import ConditionSpec, ProcessSpec
-    from composer.processes.live_process import LiveProcess
-    from composer.processes.supervisor import Processes
-    from composer.runtime.behaviours.waits import StopSignal
+    from composer.processes.external_process import ExternalProcess
+    from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.stop_request import StopRequest
     from composer.yaml_text.positions import SourceMap
 
 _POLL_SEC = 0.05
-_TROUBLES = {
+_REASONS = {
     'topic': 'nobody publishes it',
     'service': 'nobody serves it',
     'action': 'nobody serves it',
@@ -43,7 +43,7 @@ class Waiter:
 
     Attributes:
         label: As in `node 'arm'`.
-        resolve: Returns the full name of what a condition names.
+        resolve: Returns the full name for a condition.
         start: Starts it; returns when it has started.
     """
 
@@ -53,11 +53,11 @@ class Waiter:
     start: Callable[[], None]
 
 
-class Readiness:
-    """Starts those who wait, each as soon as what it waits for is there.
+class WaitingStarter:
+    """Starts each waiting node and process as soon as its conditions hold.
 
     Args:
-        nodes: The nodes of the system, by any names; those whose gates are closed do not count.
+        nodes: The nodes of the system; what is in those that have not started does not count.
         processes: The processes of the system, by their names.
     """
 
@@ -65,7 +65,7 @@ class Readiness:
         self,
         context: Context,
         nodes: Mapping[str, LiveNode],
-        processes: Mapping[str, LiveProcess],
+        processes: Mapping[str, ExternalProcess],
         positions: SourceMap,
     ) -> None:
         self._context = context
@@ -73,11 +73,11 @@ class Readiness:
         self._processes = processes
         self._positions = positions
 
-    def start_all(self, waiters: Iterable[Waiter], stop: StopSignal) -> None:
-        """Start all; a stop request ends the waiting.
+    def start_all(self, waiters: Iterable[Waiter], stop: StopRequest) -> None:
+        """Start all; a stop request ends the wait.
 
         Raises:
-            StartError: Something did not come in time.
+            StartError: A condition did not hold in time.
         """
         pending = list(waiters)
         if not pending:
@@ -96,10 +96,10 @@ class Readiness:
             node.destroy_node()
 
     def _start_ready(
-        self, pending: list[Waiter], node: RosNode, waited_sec: float, stop: StopSignal
+        self, pending: list[Waiter], node: RosNode, waited_sec: float, stop: StopRequest
     ) -> list[Waiter]:
-        """Start those who need not wait any more, and return them."""
-        graph = LiveGraph(node, self._hidden())
+        """Start those whose conditions hold, and return them."""
+        graph = RosGraph(node, self._hidden())
         ready = []
         for waiter in pending:
             missing = [each for each in waiter.conditions if not self._holds(waiter, each, graph)]
@@ -113,21 +113,21 @@ class Readiness:
                 waiter.start()
         return ready
 
-    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: LiveGraph) -> bool:
+    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph) -> bool:
         if condition.kind == 'process':
             return self._processes[condition.name].is_ready
         return graph.has(condition.kind, waiter.resolve(condition))
 
     def _is_hopeless(self, condition: ConditionSpec) -> bool:
-        """Return whether a process has ended badly, and is not started again."""
+        """Return whether it waits for a process that has ended for good."""
         return condition.kind == 'process' and self._processes[condition.name].is_done
 
     def _hidden(self) -> frozenset[str]:
-        """Return the nodes of the system that have not started."""
+        """Return the full names of the nodes that have not started."""
         closed = [node for node in list(self._nodes.values()) if not node.gate.is_open]
         return frozenset(node.full_name for node in closed)
 
-    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: LiveGraph) -> StartError:
+    def _error(self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph) -> StartError:
         span = self._positions.value(condition.path)
         who = f'{waiter.label} ({span.source.name}:{span.line})'
         waited = f'waited {condition.timeout_sec:g} s for the {condition.kind}'
@@ -141,7 +141,7 @@ class Readiness:
             for node in self._nodes.values()
             if node.full_name in graph.hidden and name in graph.names_of(node, condition.kind)
         ]
-        message = f"{who} {waited} '{name}': {_TROUBLES[condition.kind]}"
+        message = f"{who} {waited} '{name}': {_REASONS[condition.kind]}"
         if late:
             nodes = ' and '.join(f"'{each}'" for each in late)
             verb = 'has' if len(late) == 1 else 'have'
@@ -151,10 +151,10 @@ class Readiness:
 
 def list_waiters(
     nodes: Mapping[str, LiveNode],
-    processes: Processes,
+    processes: ProcessSupervisor,
     start_node: Callable[[LiveNode], None],
 ) -> list[Waiter]:
-    """Return the nodes and processes of a system that wait for something."""
+    """Return the nodes and processes of a system that have conditions."""
     waiting_processes = [each for each in processes.by_name.values() if each.spec.wait_for]
     waiting_nodes = [each for each in nodes.values() if each.spec.wait_for]
     return [
@@ -180,14 +180,14 @@ def list_waiters(
 
 
 def describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
-    """Return `2 nodes and 1 process`, without what there is none of."""
+    """Return `2 nodes and 1 process`; what there is none of is left out."""
     counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
     parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
     return ' and '.join(parts) or '0 nodes'
 
 
 def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:
-    """Return the full name of what a node waits for, as if the node used it."""
+    """Return the full name for a condition of a node, resolved as in the node itself."""
     if condition.kind == 'topic':
         return str(node.ros.resolve_topic_name(condition.name))
     if condition.kind == 'service':

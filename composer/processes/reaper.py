@@ -1,23 +1,24 @@
-"""The parent of all foreign processes of a system: a small process of its own.
+"""The parent of all external processes of a system: a small process of its own.
 
-It is run as a script and imports nothing of Composer: it has to start fast and to stay small. It
-starts, signals and awaits processes as it is asked to over a socket. When the socket closes or
-Composer dies, however that was, it kills all that has ever come out of what it started:
+It runs as a script and imports nothing of Composer, to start fast and stay small. It starts,
+signals and waits for processes as Composer asks over a socket. When the socket closes or Composer
+dies, however that happens, it kills every process that descends from those it started:
 
-- It is the subreaper of its descendants, so the children of a process that has ended become its
-  own, whatever sessions they have made.
-- The kernel kills each process that it started if the guardian itself dies (`PR_SET_PDEATHSIG`;
-  the guardian has one thread, and so is no prey of the rule that the thread counts).
-- A second guardian is its parent, and a subreaper, too: when the first one is killed, what is left
-  of its descendants becomes the second one's own, which kills it. It also ends the first one if
-  that does not do its work when Composer has gone.
-- All that was started has a mark in its environment, for Composer to find if both are killed.
+- It is the subreaper of its descendants: children whose parent has ended become its own, whatever
+  sessions they have made.
+- The kernel kills each process that it started if the reaper itself dies (`PR_SET_PDEATHSIG`
+  counts the death of the parent's thread; the reaper has only one).
+- A second reaper is its parent, and a subreaper, too: when the first one is killed, its remaining
+  descendants become children of the second one, which kills them. It also ends the first one if
+  that hangs after Composer has gone.
+- Every process that it starts has a mark in its environment, for Composer to find if both reapers
+  are killed.
 
-Requests and answers are one JSON object a line. Requests: `start` (a number of Composer's
-choice, `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number,
-`signal`, `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`),
-`ended` (`code`, negative for a signal), and `gone`, once nothing of its process group is left;
-`killed` comes before it if the timeout of a stop has passed.
+Requests and answers are one JSON object a line. Requests: `start` (a number that Composer chooses,
+`command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number, `signal`,
+`timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
+(`code`, negative for a signal), and `gone`, once nothing of its process group is left; `killed`
+comes before it if the timeout of a stop has passed.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
 
@@ -36,19 +37,19 @@ from typing import Any
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
-_PATIENCE_SEC = 5.0
+_KILL_SEC = 5.0
 _POLL_SEC = 0.02
 _CHUNK = 1 << 16
 _NEVER = float('inf')
 _EXEC_FAILED = 127
-# What Composer and Python ignore or handle is nothing to programs that are started.
+# Programs start with the default actions, whatever Composer and Python ignore or handle.
 _DEFAULT_SIGNALS = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}
 
 _prctl = ctypes.CDLL(None).prctl
 
 
-class _Guarded:
-    """A process, and how it is being stopped."""
+class _ProcessGroup:
+    """A process that was started, with the group that it leads."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -57,32 +58,32 @@ class _Guarded:
         self.kill_at = _NEVER
 
     def signal(self, number: int) -> bool:
-        """Signal its process group; return whether there is still somebody in it."""
+        """Signal the group; return whether any process is left in it."""
         try:
             os.killpg(self.pid, number)
         except ProcessLookupError:
             return False
         except PermissionError:
-            pass  # somebody is there, who has become another user
+            pass  # it runs as another user by now
         return True
 
 
-class Guardian:
-    """Does what Composer asks for, until the connection to it ends.
+class Reaper:
+    """Starts and stops processes as Composer asks, until the connection ends.
 
     Args:
-        composer: The process to watch.
+        composer: The process ID of Composer.
     """
 
     def __init__(self, connection: socket.socket, composer: int) -> None:
         self._connection = connection
         self._composer = composer
-        self._guarded: dict[int, _Guarded] = {}
+        self._groups: dict[int, _ProcessGroup] = {}
         self._received = b''
         self._descriptors: list[int] = []
 
     def run(self) -> None:
-        """Serve until the end of Composer, or of the connection."""
+        """Serve until Composer or the connection ends."""
         try:
             ended = os.pidfd_open(self._composer)
         except ProcessLookupError:
@@ -94,19 +95,19 @@ class Guardian:
         for descriptor in (ended, wake_up, self._connection.fileno()):
             poll.register(descriptor, select.POLLIN)
         while True:
-            stopping = any(each.kill_at < _NEVER for each in self._guarded.values())
+            stopping = any(each.kill_at < _NEVER for each in self._groups.values())
             ready = {each for each, _ in poll.poll(_POLL_SEC * 1000 if stopping else None)}
             if ended in ready:
                 return
             if wake_up in ready:
                 os.read(wake_up, _CHUNK)
             self._reap()
-            self._look_after_all()
+            self._check_groups()
             if self._connection.fileno() in ready and not self._receive():
                 return
 
     def _receive(self) -> bool:
-        """Serve what was asked for; return whether Composer is still connected."""
+        """Serve the requests that have come; return whether Composer is still connected."""
         try:
             data, descriptors, _, _ = socket.recv_fds(self._connection, _CHUNK, 16)
         except ConnectionError:
@@ -125,40 +126,40 @@ class Guardian:
 
     def _answer(self, kind: str, number: int, **details: Any) -> None:
         line = json.dumps({'kind': kind, 'number': number, **details}).encode() + b'\n'
-        # Composer may have gone, which shows elsewhere.
+        # If Composer has gone, `run` notices.
         with contextlib.suppress(OSError):
             self._connection.sendall(line)
 
     def _start(self, request: dict[str, Any], output: int) -> None:
         report, report_end = os.pipe2(os.O_CLOEXEC)
-        guardian = os.getpid()
+        reaper = os.getpid()
         pid = os.fork()
         if pid == 0:
-            _become(request, output, report_end, guardian)
+            _execute(request, output, report_end, reaper)
         os.close(output)
         os.close(report_end)
-        with os.fdopen(report, 'rb') as told:
-            failure = told.read()
+        with os.fdopen(report, 'rb') as reader:
+            failure = reader.read()
         if failure:
             os.waitpid(pid, 0)
             self._answer('failed', request['number'], **json.loads(failure))
             return
-        self._guarded[request['number']] = _Guarded(pid)
+        self._groups[request['number']] = _ProcessGroup(pid)
         self._answer('started', request['number'], pid=pid)
 
     def _stop(self, request: dict[str, Any]) -> None:
-        process = self._guarded.get(request['number'])
-        if process is None:
+        group = self._groups.get(request['number'])
+        if group is None:
             self._answer('gone', request['number'])
             return
-        process.kill_at = time.monotonic() + request['timeout']
-        process.signal(request['signal'])
-        # One that is stopped hears it when it goes on.
-        process.signal(signal.SIGCONT)
-        self._look_after_all()
+        group.kill_at = time.monotonic() + request['timeout']
+        group.signal(request['signal'])
+        # A stopped process handles the signal when it continues.
+        group.signal(signal.SIGCONT)
+        self._check_groups()
 
     def _reap(self) -> None:
-        """Take note of all children that have ended."""
+        """Collect all children that have ended."""
         while True:
             try:
                 pid, status = os.waitpid(-1, os.WNOHANG)
@@ -166,33 +167,33 @@ class Guardian:
                 return
             if pid == 0:
                 return
-            for number, process in list(self._guarded.items()):
-                if process.pid == pid and not process.has_ended:
-                    process.has_ended = True
+            for number, group in list(self._groups.items()):
+                if group.pid == pid and not group.has_ended:
+                    group.has_ended = True
                     code = os.waitstatus_to_exitcode(status)
                     self._answer('ended', number, code=code)
 
-    def _look_after_all(self) -> None:
-        """Say who is gone, and kill who should be by now."""
-        for number, process in list(self._guarded.items()):
-            # The number of a group is not given away while somebody is in it.
-            if process.has_ended and not process.signal(0):
-                del self._guarded[number]
+    def _check_groups(self) -> None:
+        """Report the groups that are gone, and kill those that have run out of time."""
+        for number, group in list(self._groups.items()):
+            # The kernel does not reuse the ID of a group while a process is in it.
+            if group.has_ended and not group.signal(0):
+                del self._groups[number]
                 self._answer('gone', number)
-            elif time.monotonic() >= process.kill_at:
-                if not process.is_killed:
+            elif time.monotonic() >= group.kill_at:
+                if not group.is_killed:
                     self._answer('killed', number)
-                process.is_killed = True
-                process.signal(signal.SIGKILL)
+                group.is_killed = True
+                group.signal(signal.SIGKILL)
 
 
-def _become(request: dict[str, Any], output: int, report: int, guardian: int) -> None:
-    """Turn a forked child into the program that was asked for; does not return."""
+def _execute(request: dict[str, Any], output: int, report: int, reaper: int) -> None:
+    """Replace a forked child by the requested program; does not return."""
     doing = 'prepare'
     try:
         os.setsid()
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != guardian:
+        if os.getppid() != reaper:
             os._exit(_EXEC_FAILED)
         signal.set_wakeup_fd(-1)
         for each in _DEFAULT_SIGNALS:
@@ -206,18 +207,18 @@ def _become(request: dict[str, Any], output: int, report: int, guardian: int) ->
             os.chdir(request['cwd'])
         doing = 'program'
         os.execvpe(request['command'][0], request['command'], request['env'])  # noqa: S606 - no shell on purpose
-    except BaseException as error:  # noqa: BLE001 - nothing of the guardian may go on here
+    except BaseException as error:  # noqa: BLE001 - the child must not go on as a reaper
         number = error.errno if isinstance(error, OSError) else 0
         os.write(report, json.dumps({'doing': doing, 'errno': number}).encode())
     os._exit(_EXEC_FAILED)
 
 
 def find_marked(mark: str) -> set[int]:
-    """Return the processes that have a variable in their environment, apart from this one."""
+    """Return the other processes that have this mark in their environment."""
     wanted = f'{mark}=1'.encode()
     found = set()
     for pid in _all_processes():
-        # It may have ended, or belong to somebody else.
+        # It may have ended, or belong to another user.
         with contextlib.suppress(OSError):
             if wanted in Path(f'/proc/{pid}/environ').read_bytes().split(b'\0'):
                 found.add(pid)
@@ -225,7 +226,7 @@ def find_marked(mark: str) -> set[int]:
 
 
 def find_descendants(ancestor: int) -> set[int]:
-    """Return all children of a process, theirs, and so on, that have not ended."""
+    """Return all living descendants of a process."""
     children: dict[int, list[int]] = {}
     for pid in _all_processes():
         with contextlib.suppress(OSError):
@@ -246,12 +247,12 @@ def _all_processes() -> list[int]:
 
 
 def kill_marked(mark: str) -> None:
-    """Kill all processes with a mark, until there are none."""
+    """Kill all processes with this mark, until none is left."""
     _kill_all(lambda: find_marked(mark))
 
 
 def _kill_all(find: Callable[[], set[int]]) -> None:
-    deadline = time.monotonic() + _PATIENCE_SEC
+    deadline = time.monotonic() + _KILL_SEC
     while time.monotonic() < deadline:
         found = find()
         if not found:
@@ -263,7 +264,7 @@ def _kill_all(find: Callable[[], set[int]]) -> None:
 
 
 def _remove(folder: str) -> None:
-    """Remove a folder of files; Composer may have done so itself."""
+    """Remove a folder of files, unless Composer has done so."""
     with contextlib.suppress(OSError):
         for entry in os.scandir(folder):
             os.unlink(entry)  # noqa: PTH108 - fast
@@ -271,44 +272,44 @@ def _remove(folder: str) -> None:
 
 
 def _clean_up(mark: str, folder: str) -> None:
-    """Kill all descendants, and remove what is temporary."""
+    """Kill all descendants, and remove the temporary files."""
     myself = os.getpid()
     _kill_all(lambda: find_descendants(myself) | find_marked(mark))
     _remove(folder)
 
 
-def _watch(guardian: int, composer: int) -> None:
-    """Be the second guardian: wait for the end of the first one, and see to it."""
+def _supervise(reaper: int, composer: int) -> None:
+    """As the second reaper, wait until the first one has ended, or end it."""
     ended = select.poll()
-    ended.register(os.pidfd_open(guardian), select.POLLIN)
+    ended.register(os.pidfd_open(reaper), select.POLLIN)
     with contextlib.suppress(ProcessLookupError):
         either = select.poll()
-        for pid in (guardian, composer):
+        for pid in (reaper, composer):
             either.register(os.pidfd_open(pid), select.POLLIN)
         either.poll()
-    # What the first one has to do then takes it no longer than its patience.
-    if not ended.poll(2 * _PATIENCE_SEC * 1000):
-        os.kill(guardian, signal.SIGKILL)
-    os.waitpid(guardian, 0)
+    # The first one gives up killing after `_KILL_SEC`.
+    if not ended.poll(2 * _KILL_SEC * 1000):
+        os.kill(reaper, signal.SIGKILL)
+    os.waitpid(reaper, 0)
 
 
 def main() -> None:
-    """Guard; the arguments: connection, process to watch, mark, and folder to remove at last."""
+    """Serve; the arguments: connection, ID of Composer, mark, and folder to remove at the end."""
     descriptor, composer, mark, folder = int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:5]
-    # Composer decides when it is over; what goes to a whole group of processes comes here too.
+    # Composer decides when to end; a signal to its whole process group comes here, too.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     os.set_inheritable(descriptor, False)
-    guardian = os.fork()
+    reaper = os.fork()
     try:
-        if guardian == 0:
+        if reaper == 0:
             os.setsid()
             _prctl(_PR_SET_CHILD_SUBREAPER, 1)
-            Guardian(socket.socket(fileno=descriptor), composer).run()
+            Reaper(socket.socket(fileno=descriptor), composer).run()
         else:
             os.close(descriptor)
-            _watch(guardian, composer)
+            _supervise(reaper, composer)
     finally:
         _clean_up(mark, folder)
 

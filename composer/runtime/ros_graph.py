@@ -1,4 +1,4 @@
-"""The graph of ROS as it is now: what is there, without what has not started yet."""
+"""The ROS graph as it is now, without the nodes that have not started."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 _NODE_NAME = '_composer_waiting'
-# An action is there when the service is that takes its goals
+# An action exists if the service for its goals does
 # (https://design.ros2.org/articles/actions.html).
 _GOALS = '/_action/send_goal'
-# What nearly every node has, and hardly anybody waits for.
+# Nearly every node has them, and hardly anybody waits for them.
 _COMMON_TOPICS = ('/rosout', '/parameter_events', '/diagnostics')
 _COMMON_SERVICES = (
     '/describe_parameters',
@@ -44,8 +44,8 @@ _INTRODUCTIONS = {
 }
 
 
-class LiveGraph:
-    """What is there now, without what nodes bring that have not started.
+class RosGraph:
+    """The ROS graph without the nodes of the system that have not started, and their entities.
 
     Attributes:
         hidden: The full names of these nodes.
@@ -56,23 +56,23 @@ class LiveGraph:
         self.hidden = hidden
 
     def has(self, kind: ConditionKind, name: str) -> bool:
-        """Return whether something of a kind is there, by its full name."""
+        """Return whether there is a topic, service, action or node of this full name."""
         if kind == 'topic':
             return self._is_published(name)
         if kind == 'node':
             return name in self._nodes
         service = name + _GOALS if kind == 'action' else name
-        # This list is fast, but has those services, too, that only have clients.
+        # This list is fast, but includes services that only have clients.
         listed = any(name == service for name, _ in self._node.get_service_names_and_types())
         return listed and service in self._served
 
     def names(self, kind: ConditionKind) -> Collection[str]:
-        """Return the full names of all that is there of a kind."""
+        """Return all full names of a kind."""
         found: Collection[str] = getattr(self, f'_{kind}s')
         return found
 
     def names_of(self, node: LiveNode, kind: ConditionKind) -> Collection[str]:
-        """Return what a node brings, started or not."""
+        """Return the full names of what a node provides, whether it has started or not."""
         if kind == 'node':
             return [node.full_name]
         where = node.ros.get_name(), node.ros.get_namespace()
@@ -123,7 +123,7 @@ class LiveGraph:
         )
 
     def _services_of(self, name: str, namespace: str) -> list[str]:
-        # A node may leave between two questions.
+        # A node may end between two queries.
         with suppress(NodeNameNonExistentError):
             services = self._node.get_service_names_and_types_by_node(name, namespace)
             return [service for service, _ in services]
@@ -131,7 +131,7 @@ class LiveGraph:
 
 
 def create_graph_node(context: Context) -> RosNode:
-    """Return a node to ask; those of the system may be built anew at any time."""
+    """Return a node that can query the graph; those of the system may be restarted at any time."""
     return RosNode(
         _NODE_NAME,
         context=context,
@@ -148,8 +148,8 @@ def _select(kind: ConditionKind, services: Iterable[str]) -> list[str]:
     return [name for name in services if '/_' not in name]
 
 
-def describe_graph(kind: ConditionKind, name: str, graph: LiveGraph) -> str:
-    """Return what was there instead of a name."""
+def describe_graph(kind: ConditionKind, name: str, graph: RosGraph) -> str:
+    """Return the nearest names in the graph as a help text."""
     names = [
         each
         for each in graph.names(kind)

@@ -1,7 +1,5 @@
-"""Subscriptions, and nodes and entities that come and go."""
+"""Nodes and entities that come and go."""
 
-import asyncio
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -12,87 +10,13 @@ pytest.importorskip('test_msgs')
 
 import rclpy
 from rclpy.context import Context
-from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
+from spinning import spinning, wait_for, wait_until_quiet
 from std_msgs.msg import Empty, Int32
 
 from composer.executor import ComposerExecutor
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
-
-
-def test_messages_keep_their_order_and_none_is_lost(node: Any, executor: Any) -> None:
-    got: list[int] = []
-    node.create_subscription(Int32, 'count', lambda m: got.append(m.data), 5000)
-    publisher = node.create_publisher(Int32, 'count', 5000)
-    with spinning(executor):
-        for number in range(3000):
-            publisher.publish(Int32(data=number))
-        wait_for(lambda: len(got) == 3000)
-    assert got == list(range(3000))
-
-
-def test_messages_published_before_spin_arrive(node: Any, executor: Any) -> None:
-    got: list[int] = []
-    node.create_subscription(Int32, 'count', lambda m: got.append(m.data), 10)
-    publisher = node.create_publisher(Int32, 'count', 10)
-    for number in range(5):
-        publisher.publish(Int32(data=number))
-    with spinning(executor):
-        wait_for(lambda: len(got) == 5)
-
-
-def test_a_slow_subscription_drops_as_its_depth_says(node: Any, executor: Any) -> None:
-    got: list[int] = []
-    began = threading.Event()
-    let_go = threading.Event()
-
-    def take(message: Int32) -> None:
-        got.append(message.data)
-        began.set()
-        let_go.wait(DEADLINE_SEC)
-
-    node.create_subscription(Int32, 'count', take, 3)
-    publisher = node.create_publisher(Int32, 'count', 100)
-    with spinning(executor):
-        publisher.publish(Int32(data=0))
-        assert began.wait(DEADLINE_SEC)
-        for number in range(1, 100):
-            publisher.publish(Int32(data=number))
-        let_go.set()
-        wait_for(lambda: got[-1] == 99)
-    assert got == [0, 97, 98, 99]
-
-
-def test_an_async_subscription_gets_every_message(node: Any, executor: Any) -> None:
-    got: list[int] = []
-
-    async def take(message: Int32) -> None:
-        await asyncio.sleep(0)
-        got.append(message.data)
-
-    node.create_subscription(Int32, 'count', take, 100)
-    publisher = node.create_publisher(Int32, 'count', 100)
-    with spinning(executor):
-        for number in range(50):
-            publisher.publish(Int32(data=number))
-        wait_for(lambda: len(got) == 50)
-    assert got == list(range(50))
-
-
-def test_a_subscription_can_ask_for_message_info_and_raw_bytes(node: Any, executor: Any) -> None:
-    got: list[Any] = []
-
-    def take(message: Any, info: Any) -> None:
-        got.append((message, info))
-
-    node.create_subscription(Int32, 'count', take, 10, raw=True)
-    publisher = node.create_publisher(Int32, 'count', 10)
-    with spinning(executor):
-        publisher.publish(Int32(data=1))
-        wait_for(lambda: got)
-    assert isinstance(got[0][0], bytes)
-    assert got[0][1]['publication_sequence_number'] == 1
 
 
 def test_a_subscription_may_destroy_itself_in_its_callback(node: Any, executor: Any) -> None:

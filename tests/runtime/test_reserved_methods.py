@@ -115,12 +115,12 @@ nodes:
 def test_a_behaviour_cannot_end_what_belongs_to_the_system(compose, behaviour, error):
     child = compose(SYSTEM.format(behaviour=behaviour), CODE)
     child.wait_for_line(
-        f"[ERROR] [bad]: timer 'fail' (system.yaml:8) raised NotYoursError: {error}"
+        f"[ERROR] [bad]: timer 'fail' (system.yaml:8) raised ReservedMethodError: {error}"
     )
     child.wait_for_line('help: to end the system call node.shutdown()')
     alive = len(child.matching('[good]: alive'))
     child.wait_for_line('[good]: alive', times=alive + 10)
-    child.wait_for_line(' more times, last: NotYoursError')
+    child.wait_for_line(' more times, last: ReservedMethodError')
     assert child.stop() == 0
 
     assert len(child.matching('Traceback')) == 1
@@ -153,6 +153,6 @@ def test_a_system_whose_ros_was_shut_down_says_so_and_ends(compose):
     child = compose(SYSTEM.format(behaviour='shutdown_for_sure'), CODE)
 
     assert child.wait() == 1
-    assert child.matching('[ERROR] [composer]: ROS was shut down under the system, which ends now')
+    assert child.matching('[ERROR] [composer]: the ROS context was shut down, so the system ends')
     assert child.matching('[good]: alive')
     assert not child.matching('Traceback')

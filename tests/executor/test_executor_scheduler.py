@@ -48,11 +48,6 @@ def test_an_exclusive_group_runs_one_callback_at_a_time(node: Any, executor: Any
     assert _overlap(node, executor, [group, group, group]) == 1
 
 
-def test_two_exclusive_groups_run_beside_each_other(node: Any, executor: Any) -> None:
-    groups = [MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()]
-    assert _overlap(node, executor, groups) == 2
-
-
 def test_a_reentrant_group_runs_a_callback_beside_itself(node: Any, executor: Any) -> None:
     assert _overlap(node, executor, [ReentrantCallbackGroup()]) > 1
 

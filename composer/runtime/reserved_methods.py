@@ -1,7 +1,7 @@
-"""What belongs to the whole system is not ended by a behaviour of one node.
+"""Methods of rclpy that behaviours may not call, because they would end parts of the system.
 
-A behaviour reaches the rclpy node, its executor and its context; each has methods that would end
-what others need, or what the system itself ends when it stops.
+A behaviour can reach the rclpy node, its executor and its context. Each has methods that end what
+other nodes need, or what only the system itself may end.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 _HELP = 'to end the system call node.shutdown()'
 
 
-class NotYoursError(ComposerError):
-    """A behaviour ends something that belongs to the whole system."""
+class ReservedMethodError(ComposerError):
+    """A behaviour calls a method that only the system may call."""
 
 
 def reserve(thing: Any, name: str, *methods: str) -> None:
-    """Have methods of an object refused until `release`.
+    """Let methods of an object raise `ReservedMethodError` until `release`.
 
     Args:
-        name: What it is, in words, as in `the node`.
+        name: The object in words, as in `the node`.
     """
     for method in methods:
         setattr(thing, method, _refusal(name, method))
 
 
 def release(thing: Any) -> None:
-    """Let the methods do again what their class says."""
+    """Give an object its own methods back."""
     for method, value in list(vars(thing).items()):
         if getattr(value, 'is_refusal', False):
             delattr(thing, method)
@@ -40,7 +40,7 @@ def release(thing: Any) -> None:
 def _refusal(name: str, method: str) -> Callable[..., NoReturn]:
     def refuse(*_arguments: Any, **_options: Any) -> NoReturn:
         message = f'{name} belongs to the system, so a behaviour cannot call {method}()'
-        raise NotYoursError(message, help=_HELP)
+        raise ReservedMethodError(message, help=_HELP)
 
     refuse.is_refusal = True  # type: ignore[attr-defined]
     return refuse
