@@ -105,7 +105,7 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
             package = entity.type.partition('/')[0]
-            unreadable = package in context.unreadable or any(
+            unreadable = package in context.interfaces.unreadable or any(
                 context.was_dropped(path) for path in (('interfaces',), ('interfaces', package))
             )
             stands_in = context.was_dropped((*entity.path, 'type'))

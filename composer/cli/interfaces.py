@@ -11,7 +11,7 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared_packages import describe_declared, provide_declared
+from composer.interfaces.declared_packages import load_declared, provide_declared
 from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import (
     ActionDescription,
@@ -38,12 +38,12 @@ class UnknownInterfaceError(ComposerError):
 def build(path: Path) -> int:
     """Build the packages that a file declares and that are not installed or built yet."""
     system = load_system(path)
-    _, _, findings = describe_declared(system, InterfaceCatalogue())
-    findings = [*system.diagnostics, *findings]
+    declared = load_declared(system, InterfaceCatalogue())
+    findings = [*system.diagnostics, *declared.findings]
     show_findings(findings)
     if has_errors(findings):
         return ExitCode.FAILED
-    packages = provide_declared(system, lambda line: click.echo(line, err=True))
+    packages = provide_declared(declared, lambda line: click.echo(line, err=True))
     for package in packages:
         click.echo(f'{package}: ready')
     if not packages:

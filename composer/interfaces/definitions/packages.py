@@ -1,11 +1,17 @@
-"""Do the messages that definitions use exist, and does none of them contain itself?"""
+"""The definitions of several packages: read, checked against each other, and put in order."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions.package_folder import PackageDefinitions, TypeReference
+from composer.interfaces.definitions.package_folder import (
+    PackageDefinitions,
+    TypeReference,
+    load_definitions,
+)
 from composer.interfaces.definitions.statement_rules import list_primitive_types, translate_type
 from composer.interfaces.descriptions import ActionDescription, ServiceDescription
 from composer.spelling import did_you_mean, find_nearest
@@ -16,6 +22,45 @@ ACTION_PACKAGES = SERVICE_PACKAGES | {'action_msgs', 'unique_identifier_msgs'}
 
 # Where a message is looked for whose package was forgotten.
 _COMMON = ('builtin_interfaces', 'std_msgs', 'geometry_msgs', 'sensor_msgs', 'nav_msgs')
+
+
+class DefinitionsError(ComposerError):
+    """Interface definitions have errors.
+
+    Attributes:
+        diagnostics: all of them.
+    """
+
+    def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
+        """List all findings."""
+        super().__init__('\n'.join(map(_format, diagnostics)))
+        self.diagnostics = tuple(diagnostics)
+
+
+def _format(diagnostic: Diagnostic) -> str:
+    place = diagnostic.span or diagnostic.file
+    text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
+    return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
+
+
+def load_packages(
+    folders: Mapping[str, Path], catalogue: InterfaceCatalogue
+) -> list[PackageDefinitions]:
+    """Read the definitions of packages, each in order after those that it uses.
+
+    Args:
+        folders: the folder of each package's definitions, by its name.
+        catalogue: what is installed.
+
+    Raises:
+        ParserMissingError: `rosidl_adapter` is not installed.
+        DefinitionsError: they have errors, alone or together.
+    """
+    packages = [load_definitions(package, folder) for package, folder in folders.items()]
+    diagnostics = check_definitions(packages, catalogue)
+    if diagnostics:
+        raise DefinitionsError(diagnostics)
+    return order_packages(packages)
 
 
 def used_packages(definitions: PackageDefinitions) -> frozenset[str]:
