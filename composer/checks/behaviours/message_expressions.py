@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from jinja2 import StrictUndefined, TemplateError, nodes
+from jinja2 import TemplateError, nodes
 
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
@@ -48,7 +48,7 @@ def find_expression_faults(
         heard: The message; its fields are in scope, and it itself as `message`.
         catalogue: Describes nested messages; what it does not know is taken as right.
     """
-    sandbox = Sandbox(undefined=StrictUndefined)
+    sandbox = Sandbox()
     try:
         expression = sandbox.parse_expression(code)
     except TemplateError as error:
