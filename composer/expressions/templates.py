@@ -25,7 +25,7 @@ from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
-from composer.names import did_you_mean, suggest
+from composer.spelling import find_nearest, suggest
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
@@ -164,13 +164,13 @@ class TemplateEvaluator:
         ):
             name = found.group(1)
             scope = {*self._values, 'here', *self._sandbox.globals}
-            declared = self._values or suggest(name, scope)
-            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
+            declared = self._values or find_nearest(name, scope)
+            listed = 'in scope are' if declared else None
             return diagnostic_at(
                 locate_name(name, span),
                 'undefined-name',
                 f"'{name}' is not defined",
-                help=help_text or "declare it as an argument, under 'args'",
+                help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
