@@ -15,7 +15,7 @@ from composer.entity_kinds import (
 )
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
-from composer.names import did_you_mean, suggest
+from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,8 +126,12 @@ def _explain_name(
         rule,
         message,
         part=behaviour.function,
-        help=did_you_mean(use.name, getattr(node, kind.section), 'it declares')
-        or f"declare it under '{kind.section}:'",
+        help=suggest(
+            use.name,
+            getattr(node, kind.section),
+            'it declares',
+            f"declare it under '{kind.section}:'",
+        ),
         related=[Related(f"'{use.name}' is used here", found.place)],
     )
 
@@ -163,7 +167,7 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
     for kind, name in used:
         declared = getattr(node, KIND_OF_NOUN[kind].section)
         if name and name not in declared and not _is_of_ros(kind, name):
-            near = suggest(name, declared)
+            near = find_nearest(name, declared)
             yield from ((kind, each) for each in (declared if near is None else (near,)))
 
 
