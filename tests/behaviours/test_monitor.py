@@ -54,7 +54,7 @@ def test_topics_of_one_node_are_watched_apart(face, set_time):
     set_time(100.0)
     scans, images = (watch(face, name, minimum_rate=1.0) for name in ('scan', 'image'))
     assert (next(scans), next(images)) == (None, None)
-    count(face.for_entity(), None, 'image')
+    count(face.with_own_state(), None, 'image')
     set_time(101.0)
     assert (next(scans), next(images)) == (False, True)
 

@@ -54,7 +54,7 @@ def test_drop_drops_the_first_of_each_few_messages(face):
 
 
 def test_two_uses_of_a_behaviour_in_one_node_count_for_themselves(face):
-    first, second = face.for_entity(), face.for_entity()
+    first, second = face.with_own_state(), face.with_own_state()
     assert drop(first, Int32(), count=1, of=2) is None
     assert drop(second, Int32(), count=1, of=2) is None
     assert drop(first, Int32(), count=1, of=2) is not None
