@@ -30,7 +30,7 @@ from composer.checks.references import check_publish, check_qos, check_types
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import describe_declared
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
+    from composer.language.loaded_system import LoadedSystem
     from composer.rules.record import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'

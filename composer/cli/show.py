@@ -13,13 +13,14 @@ from composer.cli.show_comments import append_comments, find_kept_comments
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.language.arguments import describe_arguments
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 # What is settled when a system is shown.
@@ -69,7 +70,7 @@ def final_data(system: LoadedSystem) -> dict[str, Any]:
     """Return a system as data that `composer up` accepts, wherever they are written to."""
     data = {
         key: value
-        for key, value in system.data.items()
+        for key, value in system.entries.items()
         if key not in _SETTLED and not key.startswith('x-') and (value != {} or key == 'nodes')
     }
     return _with_absolute_paths(data)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.language.pipeline import LoadedSystem
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import NodeSpec
 
 _SIM_TIME = 'use_sim_time'

@@ -16,7 +16,7 @@ from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared import provide_declared
 from composer.language.arguments import describe_arguments
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
 
 _NO_ROS_HELP = (

@@ -21,14 +21,14 @@ from jinja2 import (
 from jinja2.exceptions import SecurityError
 
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
-from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
 from composer.names import did_you_mean, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
-    from composer.yaml_text.positions import DataPath, SourceMap
+    from composer.yaml_text.document import Document
+    from composer.yaml_text.positions import DataPath
 
 _OPEN = '{{'
 _CLOSE = '}}'
@@ -44,6 +44,7 @@ class Filler:
     """Evaluates the expressions of one document.
 
     Args:
+        document: Findings, and what else is learnt about the values, go there.
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
@@ -51,14 +52,13 @@ class Filler:
 
     def __init__(
         self,
+        document: Document,
         values: Mapping[str, Any],
-        positions: SourceMap,
         samples: Collection[str] = (),
         origins: Mapping[str, str] | None = None,
-        filled: FilledDocument | None = None,
     ) -> None:
-        self.filled = filled or FilledDocument({})
-        self.positions = positions
+        self.document = document
+        self.positions = document.positions
         self._origins = origins or {}
         self._values = values
         self._samples = frozenset(samples)
@@ -67,13 +67,8 @@ class Filler:
     def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Filler:
         """Return a filler with one more name in scope, for the same document."""
         samples = self._samples | {name} if is_sample else self._samples - {name}
-        inner = Filler(
-            {**self._values, name: value},
-            self.positions,
-            samples,
-            {**self._origins, name: origin},
-            self.filled,
-        )
+        values, origins = {**self._values, name: value}, {**self._origins, name: origin}
+        inner = Filler(self.document, values, samples, origins)
         inner._sandbox = self._sandbox
         return inner
 
@@ -109,7 +104,7 @@ class Filler:
 
     def is_sampled(self, path: DataPath) -> bool:
         """Return whether the value at a path hangs on samples."""
-        return path in self.filled.sampled
+        return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
         span = self.positions.key(path) if is_key else self.positions.value(path)
@@ -117,17 +112,17 @@ class Filler:
         try:
             expressions = list(_find_expressions(text, self._sandbox))
             names = self._names_in(text, expressions)
-            self.filled.notes[path] = self._note(names)
+            self.document.notes[path] = self._note(names)
             sampled = not self._samples.isdisjoint(names)
             if sampled:
-                self.filled.sampled_spans.append(span)
-                self.filled.sampled += [] if is_key else [path]
+                self.document.sampled.append(span)
+                self.document.sampled_paths |= set() if is_key else {path}
             return self._compute(text, expressions, span)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
-            self.filled.failed.append(path)
+            self.document.dropped.add(path)
             # With the real value it may succeed.
             if not sampled or isinstance(error, UndefinedError):
-                self.filled.faults.append(self._explain(error, span))
+                self.document.diagnostics.append(self._explain(error, span))
             return text
 
     def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
@@ -177,7 +172,7 @@ class Filler:
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
         """Say that two keys of one mapping come out the same."""
-        self.filled.faults.append(
+        self.document.diagnostics.append(
             diagnostic_at(
                 self.positions.key(path),
                 'duplicate-key',
