@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import StrictUndefined
 
 from composer.errors import ComposerError
-from composer.expressions.bounds import Budget
+from composer.expressions.limits import Budget
 from composer.expressions.sandbox import Sandbox
 
 if TYPE_CHECKING:

@@ -136,7 +136,7 @@ def measuring_overhead() -> dict[str, float]:
             CallLedger(),
             deliver=lambda _: None,
             failed=lambda _owner, _error: None,
-            times=times,
+            add_time=None if times is None else times.add,
         ).as_callback()
 
         def run() -> float:

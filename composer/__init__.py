@@ -1,9 +1,9 @@
 """Composer: one YAML file → a running ROS 2 system.
 
 Attributes:
-    Node: What a behaviour sees of its node.
-    load: Reads a file as far as it can be read.
-    check: Returns all that is wrong with a file.
+    Node: The node that a behaviour is called with.
+    load: Loads a file as far as it can be read.
+    check: Returns the errors and warnings of a file.
     up: Runs the system that a file declares; returns the exit code.
 """
 
@@ -21,7 +21,7 @@ from composer.errors import (
     ServiceNotAvailableError,
     SystemStoppingError,
 )
-from composer.runtime.nodes.node import Node
+from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
     'ActionNotAvailableError',

@@ -1,7 +1,7 @@
-"""Which ROS packages are installed, and where: the prefixes of ament.
+"""Find installed ROS packages: which there are, and in which prefix.
 
-A prefix is a folder with `share/`, `lib/` and `include/`. A sourced ROS names its own in
-`AMENT_PREFIX_PATH`; wheels of ROS lie in the prefix of Python.
+A prefix is a folder with `share/`, `lib/` and `include/`. A sourced ROS lists its prefixes in
+`AMENT_PREFIX_PATH`; wheels of ROS packages install into `sys.prefix`.
 Source: https://github.com/ament/ament_cmake/blob/master/ament_cmake_core/doc/resource_index.md
 """
 
@@ -9,44 +9,59 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-_PACKAGE_INDEX = Path('share/ament_index/resource_index/packages')
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# Folders of a prefix with a file for each package, and for each package with interfaces.
+PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
+INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
 
 
 def ament_prefixes() -> list[Path]:
-    """Return the prefixes, in the order in which they are searched."""
+    """Return the prefixes in the order in which they are searched: sourced ones first."""
     sourced = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     return list(dict.fromkeys([*(Path(entry) for entry in sourced if entry), Path(sys.prefix)]))
 
 
-def find_package(package: str) -> Path | None:
-    """Return the prefix that a package is installed in, or `None`."""
-    for prefix in ament_prefixes():
-        if (prefix / _PACKAGE_INDEX / package).is_file():
-            return prefix
-    return None
+def find_package(package: str, prefixes: Iterable[Path], index: str) -> Path | None:
+    """Return the first of the prefixes whose index lists a package, or `None`."""
+    return next((each for each in prefixes if (each / index / package).is_file()), None)
+
+
+def find_path(relative: str, prefixes: Iterable[Path]) -> Path | None:
+    """Return a file or folder in the first prefix that has it, or `None`."""
+    candidates = (prefix / relative for prefix in prefixes)
+    return next((path for path in candidates if path.exists()), None)
 
 
 def find_share(package: str) -> Path | None:
-    """Return the share folder of a package, or `None`."""
-    prefix = find_package(package)
+    """Return the share folder of an installed package, or `None`."""
+    prefix = find_package(package, ament_prefixes(), PACKAGE_INDEX)
     return prefix / 'share' / package if prefix else None
 
 
 def list_packages() -> list[str]:
-    """Return the names of all installed packages."""
-    names: set[str] = set()
-    for prefix in ament_prefixes():
-        index = prefix / _PACKAGE_INDEX
-        if index.is_dir():
-            names |= {entry.name for entry in index.iterdir()}
-    return sorted(names)
+    """Return the names of all installed packages, sorted."""
+    return sorted(locate_packages(ament_prefixes(), PACKAGE_INDEX))
+
+
+def locate_packages(prefixes: Iterable[Path], index: str) -> dict[str, Path]:
+    """Return the packages that the index of each prefix lists, with their first prefix."""
+    located: dict[str, Path] = {}
+    for prefix in prefixes:
+        with suppress(OSError):
+            for entry in (prefix / index).iterdir():
+                located.setdefault(entry.name, prefix)
+    return located
 
 
 def list_executables(package: str) -> list[Path]:
     """Return the programs that a package has installed for `ros2 run`."""
-    prefix = find_package(package)
+    prefix = find_package(package, ament_prefixes(), PACKAGE_INDEX)
     folder = prefix / 'lib' / package if prefix else None
     if folder is None or not folder.is_dir():
         return []

@@ -1,6 +1,7 @@
-"""The public functions; each imports what it needs when it is called.
+"""The public functions.
 
-Behaviours import `composer` for its `Node` alone, and must not pay for the rest.
+Each imports what it needs when it is called: behaviours import `composer` only for `Node`, and
+must not pay for the rest.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def load(path: str | Path) -> LoadedSystem:
-    """Read a file as far as it can be read; what is wrong with it is in its `diagnostics`."""
+    """Load a file as far as it can be read; its errors and warnings are in `diagnostics`."""
     from composer.language.pipeline import load_system
 
     return load_system(Path(path))
 
 
 def check(path: str | Path) -> list[Diagnostic]:
-    """Return all that is wrong with a file, from top to bottom."""
+    """Return the errors and warnings of a file, from top to bottom."""
     from composer.checks.checker import check_system
     from composer.interfaces.catalogue import InterfaceCatalogue
 
@@ -37,23 +38,23 @@ def up(
     log_levels: Sequence[str] = (),
     *,
     layers: Sequence[str | Path] = (),
-    settings: Sequence[str] = (),
+    set_values: Sequence[str] = (),
 ) -> int:
     """Run the system that a file declares until it is stopped; return the exit code.
 
     Args:
         words: Values for the arguments that the file declares, as in `['a:=1']`.
         ros_arguments: As after `--ros-args` on a command line.
-        log_levels: `debug` for all loggers, `talker:=debug` for one.
-        layers: Files that change the first one, each over those before it.
-        settings: Changes of single values, as in `['nodes.talker.log_level=debug']`.
+        log_levels: As with `--log-level`: `debug` for all nodes, `talker:=debug` for one.
+        layers: Files that change the first one, applied in order.
+        set_values: Values to change, as with `--set`: `['nodes.talker.log_level=debug']`.
 
     Raises:
         RosNotFoundError: There is no rclpy.
-        StartError: The system could not be brought up.
+        StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
     from composer.cli.up import up as run
 
     paths = [Path(each) for each in (path, *layers)]
-    return run(paths, words, ros_arguments, log_levels, settings)
+    return run(paths, words, ros_arguments, log_levels, set_values)

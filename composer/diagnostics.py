@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
+
+from composer.rules import Severity, load_rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -15,13 +16,6 @@ if TYPE_CHECKING:
 # Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
 MAX_FINDINGS = 1000
 _LONGEST = 2000
-
-
-class Severity(Enum):
-    """How much a finding weighs: an error stops `composer up`, a warning does not."""
-
-    ERROR = 'error'
-    WARNING = 'warning'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,13 +108,17 @@ class Diagnostic:
     message: str
     file: str
     span: Span | None = None
-    severity: Severity = Severity.ERROR
     help: str | None = None
     related: tuple[Related, ...] = field(default=())
 
     def with_related(self, related: Iterable[Related]) -> Diagnostic:
         """Return the same finding with more places that take part in it."""
         return replace(self, related=(*self.related, *related))
+
+    @property
+    def severity(self) -> Severity:
+        """The severity of its rule."""
+        return load_rule(self.rule).severity
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
@@ -133,7 +131,6 @@ class Remarks(TypedDict, total=False):
     """What a finding says beside its message; see `Diagnostic`."""
 
     help: str | None
-    severity: Severity
     related: Iterable[Related]
 
 
@@ -148,7 +145,6 @@ def diagnostic_at(span: Span, rule: str, message: str, **remarks: Unpack[Remarks
         _printable(message),
         span.source.name,
         span,
-        remarks.get('severity', Severity.ERROR),
         advice and _printable(advice),
         tuple(remarks.get('related', ())),
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from reference_page import reference_page
 from rules_page import rules_page
 
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 FOLDER = Path(__file__).parent
 

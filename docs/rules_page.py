@@ -1,29 +1,29 @@
-"""The table of rules → a page that says what each means and why."""
+"""The data of the rules → a page that says what each means and why."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Severity
-from composer.rules import FAMILIES
-from composer.rules.examples import read_example
+from composer.rules import Severity, load_families
+from composer.rules.examples import load_example
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.rules.record import Family, Rule
+    from composer.rules import Family, Rule
 
 
 def rules_page() -> Iterator[str]:
     """Yield the lines of a page with every rule, what it means and why, and an example."""
     yield '# The rules'
     yield ''
-    yield 'Made from the table of rules by `make docs`. `composer explain RULE` shows the same.'
+    yield 'Made from `composer/rules/` by `make docs`. `composer explain RULE` shows the same.'
     yield ''
-    for family in FAMILIES:
+    families = load_families()
+    for family in families:
         links = ', '.join(f'[{rule.name}](#{rule.name})' for rule in family.rules)
         yield f'- **{family.name}**, {family.title}: {links}'
-    for family in FAMILIES:
+    for family in families:
         yield from _family(family)
 
 
@@ -45,7 +45,7 @@ def _family(family: Family) -> Iterator[str]:
 def _remarks(rule: Rule) -> Iterator[str]:
     if rule.needs == 'interfaces':
         yield 'It needs interface packages, which come with ROS 2.'
-    if rule.is_ignorable:
+    if rule.ignorable:
         yield f'`# composer: ignore[{rule.name}]` in the line silences it.'
     if rule.source:
         yield ''
@@ -53,14 +53,14 @@ def _remarks(rule: Rule) -> Iterator[str]:
 
 
 def _rule_example(rule: Rule) -> Iterator[str]:
-    example = read_example(rule.name)
+    example = load_example(rule.name)
     if example is None:
         return
-    yield from _block('Not so:', example.bad, 'yaml')
+    yield from _block('Bad:', example.bad, 'yaml')
     for path, text in example.others.items():
         yield from _block(f'With `{path}`:', text, 'python' if path.endswith('.py') else '')
-    yield from _block('What is said of it:', example.said, 'text')
-    yield from _block('But so:', example.good, 'yaml')
+    yield from _block('What Composer reports:', example.report, 'text')
+    yield from _block('Good:', example.good, 'yaml')
 
 
 def _block(title: str, text: str, language: str) -> Iterator[str]:

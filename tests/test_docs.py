@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 
 import composer
 from composer.cli import main as cli
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 ROOT = Path(composer.__file__).parents[1]
 SCHEMA = json.loads(schema_path().read_text())

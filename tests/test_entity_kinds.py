@@ -5,7 +5,7 @@ import json
 import pytest
 
 from composer.entity_kinds import ENTITY_KINDS, NODE_BEHAVIOURS, TYPE_FOLDERS
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 DEFINITIONS = json.loads(schema_path().read_text())['$defs']
 SECTIONS = {

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Severity, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.names import did_you_mean
+from composer.rules import list_rule_names, load_rule
 from composer.yaml_text.comments import read_ignore_comments
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
-    from composer.rules.record import Need
+    from composer.rules import Need
     from composer.yaml_text.comments import IgnoreComment
 
 _YAML = ('.yaml', '.yml')
@@ -51,20 +52,13 @@ def _read_comments(findings: list[Diagnostic], source: SourceFile) -> list[Ignor
 
 
 def _is_silenced(finding: Diagnostic, comments: list[IgnoreComment]) -> bool:
-    if not comments:
-        return False
-    # The rules' texts are needed by few files.
-    from composer.rules import RULES
-
-    rule = RULES.get(finding.rule)
     return (
-        rule is not None
-        and rule.is_ignorable
-        and any(
+        any(
             named.text == finding.rule and _is_beside(finding, named)
             for comment in comments
             for named in comment.rules
         )
+        and load_rule(finding.rule).ignorable
     )
 
 
@@ -76,8 +70,6 @@ def _is_beside(finding: Diagnostic, comment: Span) -> bool:
 def _check(
     comment: IgnoreComment, findings: list[Diagnostic], unchecked: Collection[Need] | None
 ) -> Iterator[Diagnostic]:
-    from composer.rules import RULES
-
     if not comment.rules:
         yield _warn(
             comment.span,
@@ -86,20 +78,19 @@ def _check(
             'write ignore[rule], with the rule that the finding shows',
         )
     for named in comment.rules:
-        rule = RULES.get(named.text)
         here = [f for f in findings if f.rule == named.text and _is_beside(f, named)]
-        if rule is None:
-            help_text = did_you_mean(named.text, RULES, '')
+        if named.text not in list_rule_names():
+            help_text = did_you_mean(named.text, list_rule_names(), '')
             near = help_text if help_text and help_text.startswith('did') else None
             message = f"no rule is called '{named.text}'"
             yield _warn(named, 'unknown-rule', message, near or "'composer explain' lists them")
-        elif here and not rule.is_ignorable:
+        elif here and not load_rule(named.text).ignorable:
             message = f"no comment silences '{named.text}': nothing can run before it is mended"
             yield _warn(named, 'unused-ignore', message, 'mend it and remove the comment')
-        elif not here and unchecked is not None and rule.needs not in unchecked:
+        elif not here and unchecked is not None and load_rule(named.text).needs not in unchecked:
             message = f"there is no '{named.text}' in this line to ignore"
             yield _warn(named, 'unused-ignore', message, 'remove it')
 
 
 def _warn(span: Span, rule: str, message: str, help_text: str) -> Diagnostic:
-    return diagnostic_at(span, rule, message, help=help_text, severity=Severity.WARNING)
+    return diagnostic_at(span, rule, message, help=help_text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.interfaces.descriptions import MessageDescription
-from composer.interfaces.payload_faults import find_payload_faults
+from composer.interfaces.payload_checks import check_payload
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,6 +25,6 @@ def check_messages(context: CheckContext) -> Iterator[Diagnostic]:
             description = context.catalogue.describe(publisher.type)
             if not isinstance(description, MessageDescription):
                 continue
-            for fault in find_payload_faults(description, timer.message, context.catalogue):
-                at = context.at_key if fault.rule == 'unknown-field' else context.at_value
-                yield at((*path, *fault.path), fault.rule, fault.message, help=fault.help)
+            for finding in check_payload(description, timer.message, context.catalogue):
+                at = context.at_key if finding.rule == 'unknown-field' else context.at_value
+                yield at((*path, *finding.path), finding.rule, finding.message, help=finding.help)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from composer.ament import list_packages
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
-from composer.diagnostics import Related, Severity, diagnostic_at
+from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import (
@@ -23,9 +23,9 @@ from composer.names import (
     suggest,
     with_article,
 )
+from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import read_parameter_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
-    from composer.ros_parameters.parameter_files import ParameterEntry, ParameterFile
+    from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,6 @@ def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic
                 'unmatched-node-name',
                 f"'{pattern}' is the name of no node that uses this file, and ROS ignores it",
                 help=did_you_mean(pattern, names, 'it is used by'),
-                severity=Severity.WARNING,
             )
 
 
@@ -204,7 +203,6 @@ def _explain_undeclared(entry: ParameterEntry, takers: list[_User]) -> Diagnosti
         f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
         help=did_you_mean(entry.name, declared, 'declared are')
         or "declare it under 'parameters:' of the node",
-        severity=Severity.WARNING,
     )
 
 
@@ -225,7 +223,6 @@ def _find_overridden(
         'overridden-parameter',
         f"'{entry.name}' never has this value: that of {lost_to.value_span.place} wins",
         help=_help_for_overridden(entry, lost_to),
-        severity=Severity.WARNING,
         related=[Related('this one wins', lost_to.value_span)],
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Severity
 from composer.names import suggest
 from composer.ros_parameters.parameter_types import find_type_fault, find_type_faults
 
@@ -49,7 +48,6 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
                 f"node '{node.name}' has no parameter services: 'on_parameters' hears only of "
                 'changes that its own behaviours make',
                 help="write 'parameter_services: true' in the node, or remove 'on_parameters'",
-                severity=Severity.WARNING,
             )
 
 

@@ -72,9 +72,9 @@ def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_key(profile.path, 'bad-name', message)
     declared: dict[DataPath, QosSpec] = {profile.path: profile for profile in profiles.values()}
     for node in context.spec.nodes.values():
-        for kind, entity in node.ends():
-            if kind.has_qos:
-                qos: QosSpec = getattr(entity, 'qos')
+        for _, entity in node.ends():
+            qos: QosSpec | None = getattr(entity, 'qos', None)
+            if qos is not None:
                 declared[qos.path] = qos
     reported: set[DataPath] = set()
     for spec in declared.values():
@@ -108,7 +108,7 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for _, entity in node.ends():
             package = entity.type.partition('/')[0]
-            unreadable = package in context.unreadable or any(
+            unreadable = package in context.interfaces.unreadable or any(
                 context.was_dropped(path) for path in (('interfaces',), ('interfaces', package))
             )
             stands_in = context.was_dropped((*entity.path, 'type'))

@@ -1,1 +1,1 @@
-"""The command line: one file for each command."""
+"""The command line: `main` runs it, `commands` declares it, and each command has its own file."""

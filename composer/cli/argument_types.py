@@ -1,4 +1,4 @@
-"""What the words of a command line may be: files, values of arguments, rules, levels."""
+"""Parse and check the parameters of commands: files, arguments, rules, log levels."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ if TYPE_CHECKING:
 
 _Command = TypeVar('_Command', bound='Callable[..., Any]')
 
-# A number below zero is a value; `split_words` refuses what else begins like an option.
+# Negative numbers are values; `split_words` refuses everything else that starts with a dash.
 NUMBERS_ARE_VALUES = {'ignore_unknown_options': True}
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
-# A minus before a digit or a dot belongs to a number.
+# A dash before a digit or a dot starts a number.
 _OPTION = re.compile(r'-[^\W\d]|--')
 
 
 def takes_system(command: _Command) -> _Command:
-    """Let a command take a file with layers and arguments as `words`, `--set` as `settings`."""
-    setting = click.option(
+    """Add the file, layers and arguments (`words`) and `--set` (`set_values`) to a command."""
+    set_option = click.option(
         '--set',
-        'settings',
+        'set_values',
         multiple=True,
         metavar='PATH=VALUE',
         help='Change a value, as in nodes.talker.log_level=debug; null removes it. '
-        'May be repeated.',
+        'Can be repeated.',
     )
     metavar = 'FILE [LAYER]... [NAME:=VALUE]...'
     words = click.argument('words', nargs=-1, type=click.UNPROCESSED, metavar=metavar)
-    return words(setting(command))
+    return words(set_option(command))
 
 
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
-    """Divide what the present command takes into files and the arguments that follow them.
+    """Split the words of the current command into files and the arguments that follow them.
 
-    The first word is a file, and so are those right after it that end in `.yaml` or `.yml`.
+    The first word is a file, and so are the words right after it that end in `.yaml` or `.yml`.
 
     Raises:
-        click.UsageError: There is no file, or an option that the command does not have.
+        click.UsageError: There is no file, or an unknown option.
         UsageError: The first word is empty.
     """
     context = click.get_current_context()
@@ -54,8 +54,8 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
     if not words[0]:
-        message = 'an empty word names no file'
-        raise UsageError(message, help='a variable of the shell may have no value')
+        message = 'the file name is empty'
+        raise UsageError(message, help='is a shell variable unset?')
     count = 1
     while count < len(words) and words[count].endswith(('.yaml', '.yml')):
         count += 1
@@ -63,18 +63,18 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
 
 
 def refuse_together(given: Mapping[str, bool]) -> None:
-    """Refuse two options that exclude each other.
+    """Check that at most one of several options was given.
 
     Args:
-        given: Whether each of them was given, by how it is written.
+        given: Whether each option was given, by the option as the user writes it.
 
     Raises:
-        UsageError: More than one of them was.
+        UsageError: More than one was given.
     """
     chosen = [option for option, is_given in given.items() if is_given]
     if len(chosen) > 1:
-        message = f'{" and ".join(chosen)} exclude each other'
-        raise UsageError(message, help='take one of them')
+        message = f'{" and ".join(chosen)} cannot be used together'
+        raise UsageError(message, help='choose one of them')
 
 
 def check_log_levels(
@@ -83,12 +83,12 @@ def check_log_levels(
     """Return the values of `--log-level`, as in `debug` and `talker:=debug`.
 
     Raises:
-        UsageError: One of them is no level.
+        UsageError: One of them is not a log level.
     """
     for value in values:
         if not _LOG_LEVEL.fullmatch(value):
-            message = f"'{value}' is no log level"
-            raise UsageError(message, help='debug, info, warn, error or fatal, or NODE:=LEVEL')
+            message = f"'{value}' is not a log level"
+            raise UsageError(message, help='use debug, info, warn, error or fatal, or NODE:=LEVEL')
     return values
 
 
@@ -98,7 +98,7 @@ def check_rules(
     """Return the names of rules.
 
     Raises:
-        UsageError: No rule is called so.
+        UsageError: There is no such rule.
     """
     for value in values:
         _find_rule(value)
@@ -116,17 +116,17 @@ def check_rule(
 
 def _find_rule(name: str) -> None:
     from composer.names import suggest
-    from composer.rules import RULES
+    from composer.rules import list_rule_names
 
-    if name not in RULES:
-        near = suggest(name, RULES)
-        message = f"no rule is called '{name}'"
+    if name not in list_rule_names():
+        near = suggest(name, list_rule_names())
+        message = f"there is no rule '{name}'"
         advice = f"did you mean '{near}'?" if near else "'composer explain' lists them"
         raise UsageError(message, help=advice)
 
 
 def _find_near(word: str, context: click.Context) -> list[str]:
-    """Return the option of a command that a word was most likely meant to be, if there is one."""
+    """Return the option of a command that a misspelt word most likely meant, if any."""
     from composer.names import suggest
 
     options = [option for each in context.command.get_params(context) for option in each.opts]

@@ -1,4 +1,4 @@
-"""`composer check`: say all that is wrong with files."""
+"""`composer check`: check files for errors."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ _STANDARD_INPUT = '-'
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions:
-    """How to check, and how to say what was found.
+    """The options of `composer check`.
 
     Attributes:
         format: One of `composer.reports.FORMATS`.
-        output: Where the report goes; `None` for standard output.
-        is_strict: Whether warnings count.
+        output: The file to write the report to; `None` for standard output.
+        is_strict: Whether warnings count as errors.
         ignored: Rules whose findings are left out.
-        expected: The rules that have to fire, exactly these; empty if none should.
-        is_quiet: Whether findings are all that is shown.
-        imports: Whether behaviours are imported.
-        skip_foreign: Whether named files that do not look like systems are passed over.
-        stdin_name: The path that standard input is checked as.
+        expected: If not empty, the check passes only if exactly these rules fire.
+        is_quiet: Whether to print only findings.
+        imports: Whether to import the behaviours.
+        skip_other_files: Whether to skip named files that do not look like systems.
+        stdin_name: The path that findings in standard input are reported under.
     """
 
     format: str = 'text'
@@ -52,12 +52,12 @@ class CheckOptions:
     expected: tuple[str, ...] = ()
     is_quiet: bool = False
     imports: bool = False
-    skip_foreign: bool = False
+    skip_other_files: bool = False
     stdin_name: str = '<stdin>'
 
 
 def check(words: Sequence[str], options: CheckOptions) -> int:
-    """Check files and say what was found; return the exit code.
+    """Check files and report what was found; return the exit code.
 
     Args:
         words: Files, folders, patterns, and `-` for standard input.
@@ -77,13 +77,13 @@ def check(words: Sequence[str], options: CheckOptions) -> int:
 def _refuse_contradictions(options: CheckOptions) -> None:
     both = set(options.ignored) & set(options.expected)
     if both:
-        message = f"'{min(both)}' cannot be ignored and expected"
-        raise UsageError(message, help='take --ignore or --expect for it')
+        message = f"'{min(both)}' cannot be both ignored and expected"
+        raise UsageError(message, help='use either --ignore or --expect')
 
 
 def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     catalogue = InterfaceCatalogue()
-    selection = select_files(words, skip_foreign=options.skip_foreign)
+    selection = select_files(words, skip_other_files=options.skip_other_files)
     imports = _import_check() if options.imports else None
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     for path in selection.paths:
@@ -109,7 +109,7 @@ def _load(path: Path, options: CheckOptions) -> LoadedSystem:
 
 
 def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:
-    """Return what this machine has not shown, in one line, if there is anything."""
+    """Return one line with what could not be checked without ROS 2, if anything."""
     unchecked = []
     if not catalogue.available:
         unchecked.append('interface types and the fields of messages')
@@ -119,7 +119,7 @@ def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) 
 
 
 def _show(report: Report, options: CheckOptions) -> None:
-    """Write the report; the terminal gets the findings as text if it goes elsewhere."""
+    """Write the report; if it goes to a file, also print the findings as text."""
     if options.output is not None:
         write_file(options.output, render_report(report, options.format), 'the report')
     if options.format == 'text' or options.output is not None:
@@ -137,13 +137,13 @@ def _show(report: Report, options: CheckOptions) -> None:
 
 
 def _compare(report: Report, options: CheckOptions) -> int:
-    """Hold what fired against what was expected to."""
+    """Compare the rules that fired with those expected; return the exit code."""
     fired = {finding.rule for finding in report.findings}
     expected = set(options.expected)
     for rule in sorted(expected - fired):
-        click.echo(f"'{rule}' was expected and did not fire", err=True)
+        click.echo(f"expected '{rule}', which found nothing", err=True)
     for rule in sorted(fired - expected):
-        click.echo(f"'{rule}' fired and was not expected", err=True)
+        click.echo(f"'{rule}' was not expected", err=True)
     if fired != expected:
         return ExitCode.FAILED
     if not options.is_quiet:

@@ -1,6 +1,6 @@
-"""The commands with their arguments and options, and what their `--help` says of them.
+"""Declare the commands: their arguments, options and help.
 
-What a command does is in its file in `composer/commands/`, which is imported when it is run.
+Each command is implemented in a file of its own, imported when the command runs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
 from composer.reports import FORMATS
 
-# Without one there is help, and exit code 2: it is not for choice.
+# Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
 
 
@@ -35,7 +35,7 @@ def _show_version(context: click.Context, _option: click.Parameter, value: objec
 
 
 def _help_without_command(context: click.Context) -> int:
-    """Show what commands there are, if none was given."""
+    """Print the help if no command was given."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help(), err=True)
     return ExitCode.USAGE
@@ -56,9 +56,9 @@ def _help_without_command(context: click.Context) -> int:
 )
 @click.pass_context
 def cli(context: click.Context) -> int:
-    """Run ROS 2 systems that are declared in YAML.
+    """Check and run ROS 2 systems declared in YAML.
 
-    Exit codes: 0 done, 1 the input or the run failed, 2 wrong usage, 3 a bug in Composer.
+    Exit codes: 0 success, 1 wrong input or a failed run, 2 wrong usage, 3 a bug in Composer.
     """
     return _help_without_command(context)
 
@@ -71,26 +71,26 @@ def cli(context: click.Context) -> int:
     multiple=True,
     metavar='[NODE:=]LEVEL',
     callback=check_log_levels,
-    help='debug, info, warn, error or fatal; of all nodes, or of one. Wins over the file. '
-    'May be repeated.',
+    help='Set the log level (debug, info, warn, error or fatal) of all nodes, or of one. '
+    'Overrides the file. Can be repeated.',
 )
 @click.option(
-    '--help', '-h', 'wants_help', is_flag=True, help='Show this, and the arguments of FILE.'
+    '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
 @click.pass_context
 def up_command(
     context: click.Context,
     words: tuple[str, ...],
-    settings: tuple[str, ...],
+    set_values: tuple[str, ...],
     log_levels: tuple[str, ...],
     *,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run its system until it is stopped.
 
-    LAYERs are files (.yaml, .yml) that change what those before them say. The file's own
-    arguments are given by name, NAME:=VALUE, or as values in their order. What follows --ros-args
-    (up to the end, or a --) goes to every node.
+    Each LAYER (.yaml or .yml) changes the files before it. Give the arguments that FILE declares
+    by name, NAME:=VALUE, or in their order, VALUE. ROS arguments follow --ros-args and go to every
+    node.
     """
     from composer.cli.up import describe_file_arguments, up
 
@@ -101,7 +101,7 @@ def up_command(
             click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
-    return up(paths, arguments, context.obj, log_levels, settings)
+    return up(paths, arguments, context.obj, log_levels, set_values)
 
 
 @cli.command('check')
@@ -111,21 +111,22 @@ def up_command(
     'format_name',
     type=click.Choice(list(FORMATS)),
     default='text',
-    help='The form of the report; text by default.',
+    show_default=True,
+    help='The format of the report.',
 )
 @click.option(
     '--output',
     type=click.Path(path_type=Path, dir_okay=False),
-    help='Write the report to this file, and show the findings as text.',
+    help='Write the report to this file, and print the findings as text.',
 )
-@click.option('--strict', is_flag=True, help='Let warnings count as faults.')
+@click.option('--strict', is_flag=True, help='Fail on warnings, too.')
 @click.option(
     '--ignore',
     'ignored',
     metavar='RULE',
     multiple=True,
     callback=check_rules,
-    help='Leave out what this rule finds. May be repeated.',
+    help='Leave out the findings of this rule. Can be repeated.',
 )
 @click.option(
     '--expect',
@@ -133,23 +134,25 @@ def up_command(
     metavar='RULE',
     multiple=True,
     callback=check_rules,
-    help='Pass only if this rule finds something, and no other does. May be repeated.',
+    help='Pass only if this rule finds something and no other rule does. Can be repeated.',
 )
 @click.option(
     '--import',
     'imports',
     is_flag=True,
-    help='Import the behaviours, and check the functions too. Runs the code of their modules.',
+    help='Import the behaviours and check the functions, too. Runs the code of their modules.',
 )
-@click.option('--quiet', '-q', is_flag=True, help='Show what is wrong and nothing else.')
+@click.option('--quiet', '-q', is_flag=True, help='Print only errors and warnings.')
 @click.option(
-    '--skip-foreign', is_flag=True, help='Pass over named files that do not look like systems.'
+    '--skip-other-files',
+    is_flag=True,
+    help='Skip named files that are not systems, such as other YAML.',
 )
 @click.option(
     '--stdin-filename',
     metavar='PATH',
     default='<stdin>',
-    help='The path of what comes from standard input, for an editor.',
+    help='The path to report for standard input, as editors need it.',
 )
 def check_command(  # noqa: PLR0913 - one for each option
     files: tuple[str, ...],
@@ -161,13 +164,13 @@ def check_command(  # noqa: PLR0913 - one for each option
     expected: tuple[str, ...],
     imports: bool,
     quiet: bool,
-    skip_foreign: bool,
+    skip_other_files: bool,
     stdin_filename: str,
 ) -> int:
-    """Say all that is wrong with FILES, without running anything.
+    """Check FILES for errors, without running anything.
 
-    It needs no ROS 2. A FILE may be a pattern in quotes, a folder (all systems in it are
-    checked), or - for standard input.
+    Works without ROS 2. A FILE can be a folder (to check all systems in it), a quoted pattern, or
+    - for standard input.
     """
     from composer.cli.check import CheckOptions, check
 
@@ -179,7 +182,7 @@ def check_command(  # noqa: PLR0913 - one for each option
         expected=expected,
         is_quiet=quiet,
         imports=imports,
-        skip_foreign=skip_foreign,
+        skip_other_files=skip_other_files,
         stdin_name=stdin_filename,
     )
     return check(files, options)
@@ -188,16 +191,16 @@ def check_command(  # noqa: PLR0913 - one for each option
 @cli.command('explain')
 @click.argument('rule', required=False, callback=check_rule)
 def explain_command(rule: str | None) -> int:
-    """Say what RULE means, with examples; without RULE, list all."""
+    """Explain RULE with an example, or list all rules."""
     from composer.cli.explain import explain
 
     return explain(rule)
 
 
 @cli.command('schema')
-@click.option('--path', 'path_only', is_flag=True, help='Print where the schema lies.')
+@click.option('--path', 'path_only', is_flag=True, help='Print the path of the schema file.')
 def schema_command(*, path_only: bool) -> int:
-    """Print the schema of the language (JSON Schema), for editors."""
+    """Print the JSON Schema of system files, for editors."""
     from composer.cli.schema import print_schema
 
     return print_schema(path_only=path_only)
@@ -210,31 +213,34 @@ def schema_command(*, path_only: bool) -> int:
     'output_format',
     type=click.Choice(['yaml', 'json']),
     default='yaml',
-    help='How it is written; yaml by default.',
+    show_default=True,
+    help='The output format.',
 )
-@click.option('--origin', is_flag=True, help='Say of each value where it comes from.')
-@click.option('--args', 'wants_arguments', is_flag=True, help='List the arguments of FILE.')
+@click.option('--origin', is_flag=True, help='Add to each value where it comes from.')
+@click.option(
+    '--args', 'wants_arguments', is_flag=True, help='List the arguments that FILE declares.'
+)
 @click.option(
     '--params',
     'wants_parameters',
     is_flag=True,
-    help="Write all parameters of all nodes, in ROS's own format.",
+    help='Print the parameters of all nodes as a ROS parameter file.',
 )
 def show_command(
     words: tuple[str, ...],
-    settings: tuple[str, ...],
+    set_values: tuple[str, ...],
     output_format: str,
     *,
     origin: bool,
     wants_arguments: bool,
     wants_parameters: bool,
 ) -> int:
-    """Print the final system, with nothing left to evaluate.
+    """Print the final system, with everything resolved.
 
-    LAYERs and NAME:=VALUE are as for `composer up`, which accepts what is printed.
+    Includes, layers, arguments and expressions are replaced by what they result in. The output
+    is a valid system itself. Takes LAYER and NAME:=VALUE as `composer up` does.
     """
-    from composer.cli.show import show, show_arguments
-    from composer.cli.show_parameters import show_parameters
+    from composer.cli.show import show, show_arguments, show_parameters
 
     refuse_together(
         {
@@ -246,10 +252,10 @@ def show_command(
     )
     paths, arguments = split_words(words)
     if wants_arguments:
-        return show_arguments(paths, settings)
+        return show_arguments(paths, set_values)
     if wants_parameters:
-        return show_parameters(paths, arguments, settings)
-    return show(paths, arguments, settings, output_format=output_format, origins=origin)
+        return show_parameters(paths, arguments, set_values)
+    return show(paths, arguments, set_values, output_format=output_format, origins=origin)
 
 
 @cli.command('graph', context_settings=NUMBERS_ARE_VALUES)
@@ -258,7 +264,7 @@ def show_command(
     '--format',
     'format_name',
     type=click.Choice(list(PICTURE_FORMATS)),
-    help='What to draw; by the ending of --output, or mermaid, if not given.',
+    help='The format; by default that of the suffix of --output, else mermaid.',
 )
 @click.option(
     '--output',
@@ -267,29 +273,28 @@ def show_command(
 )
 def graph_command(
     words: tuple[str, ...],
-    settings: tuple[str, ...],
+    set_values: tuple[str, ...],
     *,
     format_name: str | None,
     output: Path | None,
 ) -> int:
-    """Draw who publishes, hears, serves and calls what.
+    """Draw the graph of nodes, topics, services and actions.
 
-    Types, QoS that differs from the default, and what `composer check` finds are in it. svg and
-    html need Graphviz: the program, or the extra 'graph'. LAYERs and NAME:=VALUE are as for
-    `composer up`.
+    Shows types, QoS that is not the default, and what `composer check` finds. svg and html need
+    Graphviz: the program, or the extra 'graph'. Takes LAYER and NAME:=VALUE as `composer up` does.
     """
     from composer.cli.graph import graph
 
     paths, arguments = split_words(words)
-    return graph(paths, arguments, settings, format_name=format_name, output=output)
+    return graph(paths, arguments, set_values, format_name=format_name, output=output)
 
 
 @cli.command('new')
 @click.argument('name')
 def new_command(name: str) -> int:
-    """Create the folder NAME with a project that works.
+    """Create a project in a new folder NAME.
 
-    It has a system, behaviours, tests that run it, CI, and the schema for editors.
+    The project has a system, its behaviours, tests, a CI workflow, and the schema for editors.
     """
     from composer.cli.new import create_project
 
@@ -306,7 +311,7 @@ def interfaces_group(context: click.Context) -> int:
 @interfaces_group.command('build')
 @click.argument('file', type=click.Path(path_type=Path))
 def interfaces_build_command(file: Path) -> int:
-    """Build the packages of FILE that are not there yet."""
+    """Build the packages of FILE that are not installed or built yet."""
     from composer.cli.interfaces import build
 
     return build(file)
@@ -324,9 +329,9 @@ def interfaces_list_command(package: str | None) -> int:
 @interfaces_group.command('show')
 @click.argument('name')
 def interfaces_show_command(name: str) -> int:
-    """Show fields, constants and comments of NAME.
+    """Show the fields, constants and comments of an interface.
 
-    NAME is a full one, as in std_msgs/msg/Header.
+    NAME is its full name, as in std_msgs/msg/Header.
     """
     from composer.cli.interfaces import show
 

@@ -1,4 +1,4 @@
-"""Which files a command line means: files, patterns, and folders with systems in them."""
+"""Find the files to check: those named on the command line, by a pattern, or in a folder."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 _SUFFIXES = ('.yaml', '.yml')
 _SCHEMA = 'composer.schema.json'
-# Neither is read: the folders of tools begin with a dot, these are full of other people's files.
-_FOREIGN_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
-_LARGEST_LOOK = 1_000_000
+# Not searched: these hold other people's files. Hidden folders belong to tools.
+_SKIPPED_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
+_MAX_BYTES_READ = 1_000_000
 
-# How alike two words are of which one has a letter more, less or changed.
-_SLIP = 0.8
+# The similarity of two words that differ by one letter.
+_SIMILAR = 0.8
 
 _TOP_KEY = re.compile(r'^(["\']?)([A-Za-z]\w*)\1\s*:(?=\s|$)', re.MULTILINE)
 _FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes)["\']?\s*:')
@@ -36,52 +36,53 @@ _ENTITIES = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What is to be checked.
+    """The files to check.
 
     Attributes:
         paths: Each once, in the order of the command line; `-` is standard input.
-        findings: Patterns and folders in which there is nothing.
+        findings: An error for each pattern or folder without a file to check.
     """
 
     paths: tuple[Path, ...]
     findings: tuple[Diagnostic, ...]
 
 
-def select_files(words: Sequence[str], *, skip_foreign: bool = False) -> Selection:
-    """Return the files that the words of a command line mean.
+def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Selection:
+    """Return the files that the words of a command line stand for.
 
-    Files that are named, or matched by a pattern, are taken as they are. Of folders, searched
-    all the way down, those `.yaml` and `.yml` files are taken that look like systems.
+    Files that are named, or matched by a pattern, are always selected. Folders are searched
+    recursively for `.yaml` and `.yml` files that look like systems.
 
     Args:
-        skip_foreign: Whether named files, too, are passed over if they do not look like systems.
+        words: Files, folders, patterns, and `-` for standard input.
+        skip_other_files: Also skip named files that do not look like systems.
     """
     paths: dict[str, Path] = {}
     findings = []
     for word in words:
-        fault = None
+        nothing = None
         for path, is_named in _expand(word):
             if path is None:
-                fault = _explain_nothing(word)
-            elif not (is_named and skip_foreign) or looks_like_system(path):
+                nothing = _explain_nothing(word)
+            elif not (is_named and skip_other_files) or looks_like_system(path):
                 paths.setdefault(os.path.abspath(path) if word != '-' else '-', path)  # noqa: PTH100
-        findings += [fault] if fault else []
+        findings += [nothing] if nothing else []
     return Selection(tuple(paths.values()), tuple(findings))
 
 
 def looks_like_system(path: Path) -> bool:
-    """Return whether a file is meant for Composer, even if much is wrong with it.
+    """Return whether a file is meant for Composer, even if it has errors.
 
-    That is so if it names the schema of Composer, or has the keys `version` and `nodes` at its
-    top, `nodes` not being a list; if one is missing or misspelt, publishers, timers and so on
-    have to stand below. Files of docker compose, of GitHub and of ROS 2 parameters are no systems
-    by that.
+    A file is if it names the schema of Composer, or has the top-level keys `version` and `nodes`
+    (`nodes` not being a list). If one of the two is missing or misspelt, publishers, timers and so
+    on must be below `nodes`. This excludes Docker Compose files, GitHub workflows and ROS 2
+    parameter files.
     """
     try:
         with path.open('rb') as file:
-            text = file.read(_LARGEST_LOOK).decode('utf-8-sig', errors='replace')
+            text = file.read(_MAX_BYTES_READ).decode('utf-8-sig', errors='replace')
     except OSError:
-        return True  # a finding says why it cannot be read
+        return True  # reading it for the check will report the error
     if re.search(rf'^#.*\$schema=\S*{re.escape(_SCHEMA)}', text, re.MULTILINE):
         return True
     if text.lstrip().startswith('{'):
@@ -96,19 +97,19 @@ def looks_like_system(path: Path) -> bool:
 
 
 def _find_near(wanted: str, keys: Mapping[str, int]) -> str | None:
-    """Return a key, or else one that is a slip of the pen away from it."""
+    """Return the wanted key, or one that differs by about one letter."""
     if wanted in keys:
         return wanted
-    near = difflib.get_close_matches(wanted, keys, n=1, cutoff=_SLIP)
+    near = difflib.get_close_matches(wanted, keys, n=1, cutoff=_SIMILAR)
     return near[0] if near else None
 
 
 def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
-    """Yield each file and whether it was named; a `None` if there is nothing."""
+    """Yield each file and whether it was named; `None` instead of a file if nothing was found."""
     if word == '-' or os.path.lexists(word) or (word and not glob.has_magic(word)):
         matches = [word]
     else:
-        matches = sorted(glob.glob(word, recursive=True))  # noqa: PTH207 - pathlib's has no absolute ones
+        matches = sorted(glob.glob(word, recursive=True))  # noqa: PTH207 - pathlib's cannot glob absolute patterns
         if not matches:
             yield None, False
     for match in matches:
@@ -125,19 +126,19 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
 def _walk(folder: Path) -> Iterator[Path]:
     for at, folders, files in os.walk(folder):
         folders[:] = sorted(
-            name for name in folders if not name.startswith('.') and name not in _FOREIGN_FOLDERS
+            name for name in folders if not name.startswith('.') and name not in _SKIPPED_FOLDERS
         )
         paths = (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
-        # A pipe would be waited for.
+        # Reading a pipe would block.
         yield from (path for path in paths if not path.is_fifo())
 
 
 def _explain_nothing(word: str) -> Diagnostic:
-    if os.path.isdir(word):  # noqa: PTH112 - the word may be no path
+    if os.path.isdir(word):  # noqa: PTH112 - the word may not be a path
         return Diagnostic(
             'nothing-to-check',
-            'there is no system in this folder',
+            'no system in this folder',
             word,
-            help="a file in it is one if 'version:' and 'nodes:' stand at its top",
+            help="a system is a .yaml file with 'version:' and 'nodes:' at its top level",
         )
     return Diagnostic('nothing-to-check', 'no file matches this pattern', word or "''")

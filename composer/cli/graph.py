@@ -1,4 +1,4 @@
-"""`composer graph`: the system as people draw it."""
+"""`composer graph`: draw a system."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.checks.checker import check_system, create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.cli.output import show_findings, write_file
 from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
@@ -23,30 +23,29 @@ if TYPE_CHECKING:
 def graph(
     paths: Sequence[Path],
     words: Sequence[str],
-    settings: Sequence[str],
+    set_values: Sequence[str],
     *,
     format_name: str | None,
     output: Path | None,
 ) -> int:
-    """Draw a system, with all that is wrong with it; return the exit code.
+    """Draw a system, with its errors and warnings marked; return the exit code.
 
-    Faults do not keep it from being drawn, unless nothing could be read.
+    A system with errors is drawn too, unless nothing of it could be read.
 
     Args:
-        format_name: One of `composer.drawing.FORMATS`; `None` to go by the ending of `output`.
-        output: Where the drawing goes; `None` for standard output.
+        format_name: One of `composer.drawing.FORMATS`; `None` to use the suffix of `output`.
+        output: The file to write; `None` for standard output.
 
     Raises:
-        DrawingError: The form needs Graphviz, and it is not there or fails.
-        UsageError: The arguments or settings do not fit the file, or no form is written to files
-            that end like `output`.
+        DrawingError: The format needs Graphviz, which is missing or failed.
+        UsageError: The arguments or `--set` do not fit the file, or no format has the suffix of
+            `output`.
         ComposerError: The drawing cannot be written.
     """
     format_name = format_name or _format_of(output)
-    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
-    catalogue = InterfaceCatalogue()
-    findings = check_system(system, catalogue)
-    context, _ = create_context(system, catalogue)
+    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    context = create_context(system, InterfaceCatalogue())
+    findings = check_in_context(system, context)
     if context is None:
         show_findings(findings)
         return ExitCode.FAILED
@@ -56,7 +55,7 @@ def graph(
     else:
         write_file(output, text, 'the drawing')
     if findings:
-        click.echo(f'{summarize(findings)}: they are in the drawing', err=True)
+        click.echo(f'{summarize(findings)}, marked in the drawing', err=True)
     return ExitCode.DONE
 
 
@@ -65,6 +64,6 @@ def _format_of(output: Path | None) -> str:
         return DEFAULT_FORMAT
     name = format_of(output.suffix)
     if name is None:
-        message = f"no form of drawing ends in '{output.suffix}'"
-        raise UsageError(message, help=f'name one with --format: {", ".join(FORMATS)}')
+        message = f"no format has the suffix '{output.suffix}'"
+        raise UsageError(message, help=f'choose one with --format: {", ".join(FORMATS)}')
     return name

@@ -1,4 +1,4 @@
-"""Behaviours as their modules give them: what only importing them shows."""
+"""Import behaviours, and check the functions against how they are called."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import sys
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
-from composer.checks.behaviours.functions import check_behaviour_call
+from composer.checks.behaviours.behaviour_functions import check_behaviour_call
 from composer.language.bindings import Binding, node_bindings
-from composer.runtime.behaviours import functions as behaviours
+from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ _OF_ROS_ENDINGS = ('_msgs', '_srvs', '_interfaces')
 def import_behaviours(
     context: CheckContext,
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
-    """Import every behaviour, and hold the functions themselves against their calls."""
+    """Import every behaviour; return the functions by name, and the findings about them."""
     functions: dict[str, Callable[..., Any]] = {}
     findings: list[Diagnostic] = []
     for binding in _bindings(context.spec):
@@ -41,27 +41,27 @@ def import_behaviours(
 
 
 class ImportCheck:
-    """Imports the behaviours whose source is right, and checks the functions themselves.
+    """Imports the behaviours without findings in their source, and checks the functions.
 
     Attributes:
-        missing_ros: The modules that could not be imported only because this Python has no ROS.
+        missing_ros: The modules that could not be imported because this Python has no ROS.
     """
 
     def __init__(self) -> None:
         self.missing_ros: set[str] = set()
 
     def __call__(self, context: CheckContext, found: list[Diagnostic]) -> Iterator[Diagnostic]:
-        """Yield what is wrong with the functions, beside what was found in their source."""
+        """Yield findings about the functions, except where their source already has findings."""
         with _own_modules(context):
             for binding in _bindings(context.spec):
                 if context.was_dropped(binding.behaviour.path):
                     continue
-                if not _is_faulty(context, binding, found):
+                if not _has_finding(context, binding, found):
                     yield from self._check(context, binding)
 
     def _check(self, context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
         try:
-            # What a module prints would stand in the report otherwise.
+            # What a module prints must not end up in the report.
             with redirect_stdout(sys.stderr):
                 function = behaviours.import_behaviour(binding.behaviour)
         except behaviours.BehaviourImportError as error:
@@ -94,8 +94,8 @@ def _explain(
     )
 
 
-def _is_faulty(context: CheckContext, binding: Binding, found: list[Diagnostic]) -> bool:
-    """Return whether something was found in a behaviour or its arguments already."""
+def _has_finding(context: CheckContext, binding: Binding, found: list[Diagnostic]) -> bool:
+    """Return whether a behaviour or its arguments already have a finding."""
     path = binding.behaviour.path
     place = context.system.positions.value(path)
     arguments = (*path[:-1], 'with')
@@ -124,7 +124,7 @@ def _lacks_ros(error: behaviours.BehaviourImportError) -> bool:
 
 @contextmanager
 def _own_modules(context: CheckContext) -> Iterator[None]:
-    """Let a file's modules be imported, and be forgotten: the next file may have others."""
+    """Make a file's modules importable, then forget them: the next file may have others."""
     from composer.python_source.module_finder import project_search_path
 
     before = set(sys.modules)

@@ -6,18 +6,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.ament import ament_prefixes
 from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
-from composer.interfaces.declared import describe_declared, provide_declared
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared_packages import load_declared, provide_declared
+from composer.interfaces.definitions.installed_definitions import describe_interface
 from composer.interfaces.descriptions import (
     ActionDescription,
     InterfaceDescription,
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.documentation import describe_interface
 from composer.language.pipeline import load_system
 from composer.names import did_you_mean, suggest
 
@@ -31,18 +32,18 @@ _KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 
 
 class UnknownInterfaceError(ComposerError):
-    """No installed package has an interface of that name."""
+    """No installed package has such an interface."""
 
 
 def build(path: Path) -> int:
-    """Build the packages that a file declares, if they are not installed or built already."""
+    """Build the packages that a file declares and that are not installed or built yet."""
     system = load_system(path)
-    _, _, findings = describe_declared(system, InterfaceCatalogue())
-    findings = [*system.diagnostics, *findings]
+    declared = load_declared(system, InterfaceCatalogue())
+    findings = [*system.diagnostics, *declared.findings]
     show_findings(findings)
     if has_errors(findings):
         return ExitCode.FAILED
-    packages = provide_declared(system, lambda line: click.echo(line, err=True))
+    packages = provide_declared(declared, lambda line: click.echo(line, err=True))
     for package in packages:
         click.echo(f'{package}: ready')
     if not packages:
@@ -68,7 +69,7 @@ def show(name: str) -> int:
     Raises:
         UnknownInterfaceError: There is no such interface.
     """
-    description = describe_interface(name, default_prefixes())
+    description = describe_interface(name, ament_prefixes())
     if description is None:
         message = f"no installed package has an interface '{name}'"
         raise UnknownInterfaceError(message, help=_advise(name))
@@ -78,7 +79,7 @@ def show(name: str) -> int:
 
 
 def _advise(name: str) -> str:
-    """Return where to look for an interface that is not there."""
+    """Return the help for an interface that does not exist."""
     catalogue = InterfaceCatalogue()
     package, _, rest = name.partition('/')
     if package not in catalogue.packages():
@@ -87,12 +88,12 @@ def _advise(name: str) -> str:
         return f"did you mean '{near}'?" if near else "'composer interfaces list' shows all"
     listing = f"'composer interfaces list {package}'"
     if not rest:
-        return f"'{package}' is a package: {listing} shows what it has"
+        return f"'{package}' is a package: {listing} shows its interfaces"
     names = [known for kind in _KINDS for known in catalogue.names(kind, package)]
     by_last_part = {known.rpartition('/')[2]: known for known in names}
     last_part = suggest(rest.rpartition('/')[2], by_last_part)
     if last_part is None:
-        return f'{listing} shows what it has'
+        return f'{listing} shows its interfaces'
     return f"did you mean '{by_last_part[last_part]}'?"
 
 
@@ -129,7 +130,7 @@ def _render_comment(comment: str) -> Iterator[str]:
 
 
 def _written(value: object) -> str:
-    """Write a value as a definition does."""
+    """Return a value as definitions write it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, tuple):

@@ -1,6 +1,7 @@
-"""`composer new`: a project that works at once, made of the files in `composer/templates/new`.
+"""`composer new`: create a project from the files in `composer/templates/new`.
 
-The template is a project itself, of the name `my_system`; what is `dot_` there begins with a dot.
+The template is itself a project, called `my_system`. A name that starts with `dot_` there starts
+with a dot in the new project.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
-from composer.schema.schema_file import SCHEMA_NAME, schema_path
+from composer.schema import SCHEMA_NAME, schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,11 +25,11 @@ _NAME = re.compile('[a-z][a-z0-9_]*')
 
 
 def create_project(name: str) -> int:
-    """Create the folder `name` with a project in it; return the exit code.
+    """Create a project in the folder `name`; return the exit code.
 
     Raises:
-        UsageError: The name cannot be that of a project.
-        ComposerError: There is something of that name already, or it cannot be written.
+        UsageError: The name cannot name a project.
+        ComposerError: The folder exists and is not empty, or cannot be written.
     """
     _check_name(name)
     folder = Path(name)
@@ -38,7 +39,7 @@ def create_project(name: str) -> int:
     except OSError as error:
         message = f'cannot write {error.filename or folder}: {error.strerror}'
         raise ComposerError(message) from error
-    click.echo(f'created {folder}, with')
+    click.echo(f'created {folder}:')
     for path in sorted(written):
         click.echo(f'  {path.relative_to(folder)}')
     click.echo(f'run it:\n  cd {name}\n  composer up configs/{name}.yaml\n  python -m pytest')
@@ -46,20 +47,20 @@ def create_project(name: str) -> int:
 
 
 def template_folder() -> Path:
-    """Return the folder with the files that a new project begins with."""
+    """Return the folder with the files of a new project."""
     return Path(str(resources.files('composer'))) / 'templates' / 'new'
 
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
         message = (
-            f"'{name}' cannot name a project: a name has lower-case letters, digits and "
-            'underscores, and begins with a letter'
+            f"'{name}' cannot name a project: use lower-case letters, digits and underscores, "
+            'starting with a letter'
         )
         near = _NAME.search(re.sub('[^a-z0-9_]+', '_', name.lower()).strip('_'))
-        raise UsageError(message, help=f"'{near[0]}', perhaps" if near else None)
+        raise UsageError(message, help=f"try '{near[0]}'" if near else None)
     if keyword.iskeyword(name):
-        message = f"'{name}' cannot name a project: it is a word of Python, and names a module"
+        message = f"'{name}' cannot name a project: it is a Python keyword"
         raise UsageError(message)
 
 
@@ -67,13 +68,13 @@ def _check_free(folder: Path) -> None:
     if folder.is_dir() and not any(folder.iterdir()):
         return
     if folder.exists() or folder.is_symlink():
-        what = 'a folder with something in it' if folder.is_dir() else 'not a folder'
-        message = f'{folder} is there already, and is {what}'
-        raise ComposerError(message, help='take another name, or move it out of the way')
+        what = 'is not empty' if folder.is_dir() else 'is not a folder'
+        message = f'{folder} already exists and {what}'
+        raise ComposerError(message, help='use another name, or move it')
 
 
 def _project_files(name: str) -> Iterator[tuple[Path, str]]:
-    """Yield each file of a project, by its path there, with its text."""
+    """Yield the path in the project and the text of each file."""
     template = template_folder()
     for path in sorted(template.rglob('*')):
         if path.is_dir() or '__pycache__' in path.parts:

@@ -1,4 +1,4 @@
-"""What commands have to say: to the terminal, and to the files that a command line names."""
+"""Output of commands: findings on the terminal, and the files named by `--output`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def wants_colour(*, is_error: bool = False) -> bool:
-    """Return whether standard output (or error) is a terminal, and nobody forbids colours.
+    """Return whether standard output (or error) is a terminal that may be coloured.
 
     Source: https://no-color.org
     """
@@ -28,17 +28,17 @@ def wants_colour(*, is_error: bool = False) -> bool:
 
 
 def show_findings(findings: Iterable[Diagnostic]) -> None:
-    """Show findings on standard error, which leaves standard output to what was asked for."""
+    """Print findings to standard error; standard output is for the result of the command."""
     colour = wants_colour(is_error=True)
     for finding in findings:
         click.echo(render_finding(finding, colour=colour) + '\n', err=True, color=colour)
 
 
 def write_file(path: Path, text: str, what: str) -> None:
-    """Write what a command has made to the file of `--output`.
+    """Write the result of a command to a file.
 
     Args:
-        what: What it is, for the message if it cannot be written: `the report`.
+        what: What it is, for the error message, as in `the report`.
 
     Raises:
         ComposerError: It cannot be written.

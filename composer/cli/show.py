@@ -1,46 +1,56 @@
-"""`composer show`: the final system, with all that is included in it and nothing to evaluate."""
+"""`composer show`: print the final system, its arguments, or its parameters."""
 
 from __future__ import annotations
 
 import json
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from composer.checks.checker import create_context
+from composer.checks.parameter_files import check_parameter_files
 from composer.cli.output import show_findings
 from composer.cli.show_comments import append_comments, find_kept_comments
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
+from composer.language.paths import resolve_path
 from composer.language.pipeline import load_system
+from composer.ros_parameters.file_reader import read_parameter_file
+from composer.ros_parameters.file_writer import render_parameter_file
+from composer.ros_parameters.overrides import find_overrides
 from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
+    from composer.diagnostics import Diagnostic
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
 
-# What is settled when a system is shown.
-_SETTLED = ('args', 'max_nodes')
+# Keys that have no meaning any more once a system is resolved.
+_RESOLVED_KEYS = ('args', 'max_nodes')
+_SIM_TIME = 'use_sim_time'
 
 
 def show(
     paths: Sequence[Path],
     words: Sequence[str],
-    settings: Sequence[str],
+    set_values: Sequence[str],
     *,
     output_format: str,
     origins: bool,
 ) -> int:
-    """Print a system; return the exit code.
+    """Print the final system; return the exit code.
 
     Raises:
-        UsageError: The arguments or settings do not fit the file.
+        UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_system(paths[0], words, layers=paths[1:], settings=settings)
+    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
     show_findings(system.diagnostics)
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
@@ -54,35 +64,75 @@ def show(
     return ExitCode.DONE
 
 
-def show_arguments(paths: Sequence[Path], settings: Sequence[str]) -> int:
+def show_arguments(paths: Sequence[Path], set_values: Sequence[str]) -> int:
     """Print the arguments that a file declares; return the exit code.
 
     Raises:
-        UsageError: The settings do not fit the file.
+        UsageError: `--set` does not fit the file.
     """
-    system = load_system(paths[0], layers=paths[1:], settings=settings)
+    system = load_system(paths[0], layers=paths[1:], set_values=set_values)
     show_findings(system.diagnostics)
     click.echo(describe_arguments(system.arguments))
     return ExitCode.FAILED if has_errors(system.diagnostics) else ExitCode.DONE
 
 
+def show_parameters(paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]) -> int:
+    """Print the parameters of all nodes as one parameter file; return the exit code.
+
+    Raises:
+        UsageError: The arguments or `--set` do not fit the file.
+    """
+    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    findings = _check_parameters(system)
+    show_findings(findings)
+    if has_errors(findings) or system.spec is None:
+        return ExitCode.FAILED
+    nodes = system.spec.nodes.values()
+    click.echo(
+        render_parameter_file({node.full_name: final_values(node) for node in nodes}), nl=False
+    )
+    return ExitCode.DONE
+
+
 def final_data(system: LoadedSystem) -> dict[str, Any]:
-    """Return a system as data that `composer up` accepts, wherever they are written to."""
+    """Return a system as data that `composer up` accepts, from any folder."""
     data = {
         key: value
         for key, value in system.entries.items()
-        if key not in _SETTLED and not key.startswith('x-') and (value != {} or key == 'nodes')
+        if key not in _RESOLVED_KEYS
+        and not key.startswith('x-')
+        and (value != {} or key == 'nodes')
     }
     return _with_absolute_paths(data)
 
 
 def describe_origin(system: LoadedSystem, path: DataPath) -> str:
-    """Return where a value was written, and where what its expressions use comes from."""
+    """Return where a value was written, and where the values in its expressions come from."""
     if not path:
         return ''
     place = system.positions.value(path).place
     note = system.notes.get(path)
     return f'{place}, {note}' if note else place
+
+
+def final_values(node: NodeSpec) -> dict[str, tuple[str, Any]]:
+    """Return the type and value of each parameter of a node that has a value, by name."""
+    files = [read_parameter_file(resolve_path(text, Path())) for text in node.parameter_files]
+    overrides = find_overrides(files, node.full_name)
+    values = {_SIM_TIME: ('bool', True)} if node.use_sim_time else {}
+    if _SIM_TIME in overrides:
+        values[_SIM_TIME] = 'bool', overrides[_SIM_TIME].value
+    for name, spec in node.parameters.items():
+        value = overrides[name].value if name in overrides else spec.value
+        if value is not None:
+            values[name] = str(spec.type), value
+    return values
+
+
+def _check_parameters(system: LoadedSystem) -> list[Diagnostic]:
+    context = create_context(system, InterfaceCatalogue())
+    found = check_parameter_files(context) if context else ()
+    return list(dict.fromkeys([*system.diagnostics, *found]))
 
 
 def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
@@ -107,5 +157,5 @@ def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _absolute(path: str) -> str:
-    # As written otherwise: links are not followed.
+    # Not `Path.resolve`: symbolic links stay as they are written.
     return path if path.startswith('package://') else os.path.abspath(path)  # noqa: PTH100

@@ -1,7 +1,6 @@
-"""The comments that silence rules, in what `composer show` prints of a system.
+"""Keep comments that silence rules in the output of `composer show`.
 
-Only those are kept without which something would be said of the printed system that is not said of
-the files that it comes from.
+Only those are kept without which a check of the output would find more than a check of the files.
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def find_kept_comments(system: LoadedSystem, text: str) -> dict[int, str]:
-    """Return the comments of a printed system, by the numbers of their lines.
+    """Return the comments to print, by line number.
 
     Args:
-        text: What is printed, without any comment.
+        text: The output without comments.
     """
     silenced = _find_silenced(system.positions.sources())
     if not silenced:
@@ -45,7 +44,7 @@ def find_kept_comments(system: LoadedSystem, text: str) -> dict[int, str]:
 
 
 def append_comments(text: str, comments: Mapping[int, str]) -> str:
-    """Return a text with comments at the ends of its lines, by their numbers."""
+    """Return a text with comments at the ends of its lines, given by line number."""
     lines = text.splitlines(keepends=True)
     for number, comment in comments.items():
         line = lines[number - 1].rstrip('\n')
@@ -72,7 +71,7 @@ def _paths_by_line(positions: SourceMap) -> dict[int, list[DataPath]]:
 
 
 def _lines_of(positions: SourceMap, paths: Iterable[DataPath]) -> set[tuple[SourceFile, int]]:
-    """Return where keys and values at paths were written: files and lines."""
+    """Return the files and lines in which the keys and values at some paths were written."""
     spans: set[Span] = set()
     for path in paths:
         spans |= {positions.key(path), positions.value(path)}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.diagnostics import Severity
-from composer.rules.wiring import WIRING
+from composer.rules import Severity, load_rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 
     HubKey: TypeAlias = tuple[ChannelKind, str]
 
-_OF_WIRING = {rule.name for rule in WIRING.rules}
 # What is said of a topic, service or action as a whole.
 _OF_HUBS = {'no-publisher', 'no-subscription', 'no-server'}
 # What an end says of its node's behaviours, not of what it is tied to.
@@ -71,7 +69,8 @@ class Marks:
                 self._hubs[channel.kind, channel.name].append(index)
             else:
                 self._edges[end].append(index)
-        if finding.rule in _OF_WIRING and finding.severity is Severity.ERROR:
+        rule = load_rule(finding.rule)
+        if rule.family == 'wiring' and rule.severity is Severity.ERROR:
             self._place_partners(index, finding, ends)
         if not ends:
             for path in paths:

@@ -9,9 +9,9 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Severity
 from composer.drawing.policies import describe_policies
 from composer.reports.text import escape
+from composer.rules import Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

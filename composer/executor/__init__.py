@@ -1,29 +1,43 @@
 """An executor for any rclpy program, whose cost per event does not grow with the graph.
 
-How it hears of events was decided by measuring (two cores, round trips/s between two nodes):
+How it gets its events was decided by measuring (two cores, round trips/s between two nodes):
 
 - One wait set and thread per callback group: 16,000 to 19,000. Each hop is a thread switch, each
   group a thread, and a QoS event in a wait set wakes it for every message of its subscription.
-- `rclpy.experimental.EventsExecutor` with finite waits, fed with views of the entities: 50,000.
-  But it takes each message out of the middleware at once, so that a slow callback needs a queue
+- `rclpy.experimental.EventsExecutor` with finite waits, which is given views of the entities:
+  50,000. But it takes each message out of the middleware at once, so a slow callback needs a queue
   without bounds; it arms QoS events, whose locks Fast DDS takes in two orders (ros2/rmw_fastrtps
   pull request 890); and it aborts the process if a view outlives it.
-- rcl's own announcements, which that executor is built on, taken directly (`rcl`): 40,000, with 0
-  or 1,000 other nodes. Nothing is taken before its callback can run, so queues are the QoS depth,
-  no lock is shared with the middleware, and it needs nothing experimental. This is what is here.
+- rcl's event callbacks, on which that executor is built, used directly (`c_bindings`): 40,000,
+  with 0 or 1,000 other nodes. Nothing is taken before its callback can run, so queues are the QoS
+  depth, no lock is shared with the middleware, and nothing experimental is needed. This is used.
 
-A datum's way: the middleware adds to an eventfd (`rcl`, `signals`) → the leader's epoll returns
-(`engine`) → the source is queued in its group (`schedule`) → claimed, taken and run by the leader
-itself (`execution`, `sources`), while a standby watches over the leader (`crew`). Deadlines of
-timers are in `alarms`, suspended coroutines in `tasks`, what rcl does not announce in `lane`, and
-`registry` compares the nodes' lists of entities with what is listened to. `switching` says how
-long a computing callback may hold up the others.
+The way of a message:
 
-Locks are held for moments and nothing is called under them but the next in this order: `registry`,
-`lane`, `crew`, `schedule`, `alarms`, `signals`. A callback, a take and a wait run under none.
+1. The middleware adds to the eventfd of the subscription (`c_bindings`).
+2. The leader's wait on an epoll returns, and the source of that subscription is told
+   (`event_poller`).
+3. The source is queued, or parked if its callback group is busy (`scheduler`).
+4. The leader starts it, and executes it itself (`event_loop`), while a standby thread waits to
+   take over if the callback is slow (`worker_threads`).
+5. The source takes the message and calls the callback (`event_source`, `entity_sources`,
+   `waitable_sources`).
+6. If the callback awaits something, the rest of it comes back through the scheduler as a task
+   (`event_loop`).
+
+Beside that way: `deadlines` makes timers ready, `wait_set_thread` all that rcl has no event
+callbacks for, and `entity_registry` keeps the sources in step with the entities of the nodes.
+`spinner` puts these parts together for `composer_executor`, whose methods are rclpy's;
+`switch_interval` says how long a computing callback may hold up the others, and `after_fork` what
+a forked child does with all this.
+
+Locks are held for moments, and nothing is called under them but the next in this order:
+`entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_poller`.
+Callbacks, takes and waits run under none.
 """
 
 from composer.executor.composer_executor import ComposerExecutor
-from composer.executor.missed import Missed
+from composer.executor.event_source import MissedCounts
+from composer.executor.wait_set_thread import checked_seldom
 
-__all__ = ['ComposerExecutor', 'Missed']
+__all__ = ['ComposerExecutor', 'MissedCounts', 'checked_seldom']

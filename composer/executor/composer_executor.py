@@ -11,104 +11,110 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
 from rclpy.task import Future, Task
 
-from composer.executor.alarms import Delay
-from composer.executor.engine import COURTESY_SEC, Engine
-from composer.executor.missed import Missed
-from composer.executor.tasks import Resume, TaskRun
+from composer.executor.deadlines import DelayedCall
+from composer.executor.event_loop import ImmediateCallback
+from composer.executor.event_source import MissedCounts
+from composer.executor.scheduler import ScheduledTask
+from composer.executor.spinner import GRACE_SEC, Spinner
 
-_MOST_THREADS = 256
+_MAX_THREADS = 256
 
 
 class ComposerExecutor(MultiThreadedExecutor):
     """Runs callbacks in a pool of threads; an event costs the same beside any number of entities.
 
-    It can be used wherever `rclpy.executors.MultiThreadedExecutor` is. Differences to be seen:
+    It can be used wherever `rclpy.executors.MultiThreadedExecutor` is. The differences:
 
-    - Without `num_threads`, threads are made as callbacks block, up to 256, so that a slow
-      callback delays nobody outside its group. With it, so many callbacks run at the same time.
-    - `spin_once` waits up to 50 ms for the callback that it began to finish.
+    - Without `num_threads`, threads are added as callbacks block, up to 256, so a slow callback
+      delays nobody outside its group. With it, so many callbacks run at the same time.
+    - `spin_once` waits up to 50 ms for the end of the callback that it began.
     - `shutdown` waits for running callbacks, as rclpy documents; but not for the one it is called
       from, and without `timeout_sec` not for long once the context has been shut down.
     - Several threads may spin at the same time.
-    - While one does, the process's `sys.getswitchinterval()` is at most 1 ms: see `switching`.
+    - While one does, the process's `sys.getswitchinterval()` is at most 1 ms: see
+      `switch_interval`.
 
     Args:
         num_threads: How many callbacks may run at the same time; None for as many as block.
         context: The context; None for the default one.
+
+    Attributes:
+        is_forked: Whether this process is a child that was forked after the executor was made.
     """
 
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
-        super().__init__(num_threads, context=context)  # Whose pool is never used.
-        self.is_inherited = False
-        self._engine = Engine(self, num_threads or _MOST_THREADS, self._guard, self._sigint_gc)
+        super().__init__(num_threads, context=context)  # Its pool is never used.
+        self.is_forked = False
+        self._spinner = Spinner(self, num_threads or _MAX_THREADS, self._guard, self._sigint_gc)
         _executors.add(self)
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
         """Add a callback or coroutine to be executed during `spin`; returns its future."""
-        if type(callback) is Resume:
+        if type(callback) is ImmediateCallback:
             callback(*args)
             return None
         task: Any = Task(callback, args, kwargs, executor=self)
-        self._engine.schedule.add_run(TaskRun(task))
+        self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
 
-    def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> Delay:
-        """Add a callback as `create_task` does, `delay_sec` from now; it can be cancelled."""
-        return Delay(self._engine.alarms, delay_sec, lambda: self.create_task(callback))
+    def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> DelayedCall:
+        """Add a callback like `create_task`, `delay_sec` from now; it can be cancelled."""
+        deadlines = self._spinner.poller.deadlines
+        return DelayedCall(deadlines, delay_sec, lambda: self.create_task(callback))
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
         """Let a callback wait for others: meanwhile it does not count against `num_threads`."""
-        if not self._engine.crew.step_aside():
+        if not self._spinner.workers.hand_over_in_callback():
             yield
             return
-        self._engine.schedule.step_aside(1)
+        self._spinner.scheduler.add_waiting(1)
         try:
             yield
         finally:
-            self._engine.schedule.step_aside(-1)
+            self._spinner.scheduler.add_waiting(-1)
 
     def add_node(self, node: Any) -> bool:
-        """Manage the callbacks of `node`; returns False if it is here already."""
+        """Run the callbacks of `node`; returns False if the executor has it already."""
         with self._nodes_lock:
             if node in self._nodes:
                 return False
             self._nodes.add(node)
-            self._engine.schedule.set_nodes(self._nodes)
+            self._spinner.scheduler.set_nodes(self._nodes)
         node.executor = self
         self.wake()
         return True
 
     def remove_node(self, node: Any) -> None:
-        """Manage the callbacks of `node` no more: none begins once this has returned."""
+        """Run the callbacks of `node` no more: none begins once this has returned."""
         with self._nodes_lock:
             if node not in self._nodes:
                 return
             self._nodes.remove(node)
-            self._engine.schedule.set_nodes(self._nodes)
-        self._engine.registry.drop(node)
+            self._spinner.scheduler.set_nodes(self._nodes)
+        self._spinner.registry.drop(node)
         self.wake()
 
-    def missed(self, node: Any, entity: Any) -> Missed:
+    def missed_counts(self, node: Any, entity: Any) -> MissedCounts:
         """Return what a subscription or timer of `node` missed because callbacks took too long.
 
-        Counting begins when the executor sees the entity; an unknown entity has missed nothing.
+        Counting begins when the executor listens to the entity; before, it has missed nothing.
         """
-        source = self._engine.registry.source_of(node, entity)
-        return Missed() if source is None else source.missed()
+        source = self._spinner.registry.source_of(node, entity)
+        return MissedCounts() if source is None else source.missed_counts()
 
     def wake(self) -> None:
-        """Look anew at the entities, their groups, the context and what is waited for."""
-        self._engine.registry.is_stale = True
-        self._engine.schedule.retry()
-        self._engine.wake()
+        """Look again at the entities, their groups, the context and what is waited for."""
+        self._spinner.registry.is_stale = True
+        self._spinner.scheduler.retry_deferred()
+        self._spinner.wake()
 
     def spin(self) -> None:
         """Execute callbacks until the executor or the context is shut down.
 
         An exception of a callback is raised here; spinning can be resumed after it.
         """
-        self._engine.spin_until(lambda: False, None)
+        self._spinner.spin_until(lambda: False, None)
 
     def spin_until_future_complete(
         self,
@@ -119,12 +125,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         if timeout_sec == 0:
             self.spin_once_until_future_complete(future, 0)
             return
-        with _Notice(future, self._engine.news.tell):
-            self._engine.spin_until(_is_settled(future), timeout_sec)
+        with _calling_when_done(future, self._spinner.notifier.notify):
+            self._spinner.spin_until(_is_over(future), timeout_sec)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Wait for one callback and execute it, at most `timeout_sec` (None: for ever)."""
-        self._engine.spin_once(lambda: False, timeout_sec)
+        """Wait for one callback and execute it, for at most `timeout_sec` (None: for ever)."""
+        self._spinner.spin_once(lambda: False, timeout_sec)
 
     def spin_once_until_future_complete(
         self,
@@ -134,8 +140,8 @@ class ComposerExecutor(MultiThreadedExecutor):
         """`spin_once`, but stop waiting when `future` is done."""
         if isinstance(timeout_sec, TimeoutObject):
             timeout_sec = float(timeout_sec.timeout)
-        with _Notice(future, self._engine.wake):
-            self._engine.spin_once(_is_settled(future), timeout_sec)
+        with _calling_when_done(future, self._spinner.wake):
+            self._spinner.spin_once(_is_over(future), timeout_sec)
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Begin no more callbacks and wait for those that run.
@@ -147,10 +153,10 @@ class ComposerExecutor(MultiThreadedExecutor):
             False if callbacks still ran after that time; then this can be called again.
         """
         self._is_shutdown = True
-        must_end = timeout_sec is not None or self._engine.context_is_valid()
-        if not self._engine.stop(timeout_sec if must_end else COURTESY_SEC) and must_end:
+        must_end = timeout_sec is not None or self._spinner.is_context_valid()
+        if not self._spinner.stop(timeout_sec if must_end else GRACE_SEC) and must_end:
             return False
-        self._engine.tear_down(self.get_nodes())
+        self._spinner.tear_down(self.get_nodes())
         with self._nodes_lock:
             self._nodes: set[Any] = set()
         with self._shutdown_lock:
@@ -164,43 +170,42 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins."""
-        self._engine.report(error)
+        self._spinner.report(error)
 
     def halt(self) -> None:
-        """End the threads: rclpy aborts a process that ends while one of them waits in it."""
+        """End the threads: rclpy aborts a process that exits while one of them waits in it."""
         self._is_shutdown = True
-        self._engine.stop(COURTESY_SEC)
-        self._engine.lane.close()
+        self._spinner.stop(GRACE_SEC)
+        self._spinner.wait_set_thread.close()
 
-    def leave_to_parent(self) -> None:
-        """Be shut down, and nothing of it destroyed: this process was forked."""
-        self.is_inherited = self._is_shutdown = True
-        _of_parent.append((self._engine, dict(vars(self._engine.registry)), self._sigint_gc))
+    def reset_after_fork(self) -> None:
+        """Be shut down, without destroying anything: this is a forked child."""
+        self.is_forked = self._is_shutdown = True
+        _kept_for_parent.append(
+            (self._spinner, dict(vars(self._spinner.registry)), self._sigint_gc)
+        )
         self._guard = self._sigint_gc = None
         self._nodes = set()
-        self._engine.leave_to_parent()
+        self._spinner.reset_after_fork()
 
     def __del__(self) -> None:
-        """Do what rclpy does, though `__init__` may have failed half-way."""
+        """Do what rclpy does; `__init__` may have failed half-way."""
         with suppress(AttributeError, InvalidHandle, ValueError):
             super().__del__()
 
 
-class _Notice:
-    """Has a function called when a future is done, as long as the context is entered."""
-
-    def __init__(self, future: Any, function: Callable[[], None]) -> None:
-        self._future = future
-        self._resume = Resume(function)
-
-    def __enter__(self) -> None:
-        self._future.add_done_callback(self._resume)
-
-    def __exit__(self, *_: object) -> None:
-        self._future.remove_done_callback(self._resume)
+@contextmanager
+def _calling_when_done(future: Any, function: Callable[[], None]) -> Iterator[None]:
+    """Have `function` called when `future` is done, if that is in this context."""
+    callback = ImmediateCallback(function)
+    future.add_done_callback(callback)
+    try:
+        yield
+    finally:
+        future.remove_done_callback(callback)
 
 
-def _is_settled(future: Any) -> Callable[[], bool]:
+def _is_over(future: Any) -> Callable[[], bool]:
     return lambda: future.done() or future.cancelled()
 
 
@@ -213,13 +218,14 @@ def _halt_all() -> None:
         executor.halt()
 
 
-_of_parent: list[Any] = []
+# In a forked child: what would be destroyed if nothing referred to it.
+_kept_for_parent: list[Any] = []
 
 
-def _leave_to_parent() -> None:
+def _reset_all_after_fork() -> None:
     for executor in tuple(_executors):
-        executor.leave_to_parent()
+        executor.reset_after_fork()
     _executors.clear()
 
 
-os.register_at_fork(after_in_child=_leave_to_parent)
+os.register_at_fork(after_in_child=_reset_all_after_fork)

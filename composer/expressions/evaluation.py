@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import StrictUndefined, TemplateAssertionError, nodes
 
-from composer.expressions import bounds
+from composer.expressions import limits
 from composer.names import suggest
 
 if TYPE_CHECKING:
@@ -120,11 +120,11 @@ def _unary(walk: _Walk, node: nodes.UnaryExpr) -> Any:
 def _binary(walk: _Walk, node: nodes.BinExpr) -> Any:
     left, right = walk.value(node.left), walk.value(node.right)
     if isinstance(node, nodes.Pow):
-        bounds.limit_power(left, right)
+        limits.limit_power(left, right)
     elif isinstance(node, nodes.Mul):
-        bounds.limit_product(left, right)
+        limits.limit_product(left, right)
     elif isinstance(node, nodes.Mod) and isinstance(left, str):
-        bounds.limit_percent_format(left, right)
+        limits.limit_percent_format(left, right)
     return walk.counted(_BINARY[type(node)](left, right))
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
+from composer.expressions import is_variable_name
 from composer.expressions.templates import Filler
-from composer.expressions.variables import is_usable_name
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -137,7 +137,7 @@ class _Expansion:
             return
         name, *others = foreach
         at = (*path, name)
-        if not is_usable_name(name):
+        if not is_variable_name(name):
             self._report(at, f"'{name}' cannot stand in an expression as a name")
             return
         values = filler.fill(foreach[name], at)

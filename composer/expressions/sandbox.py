@@ -14,10 +14,10 @@ from jinja2.parser import Parser
 from jinja2.runtime import new_context
 from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 
-from composer.expressions import bounds
-from composer.expressions.bounds import Budget
+from composer.expressions import limits
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.functions import FUNCTIONS
+from composer.expressions.limits import Budget
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -59,10 +59,10 @@ _METHODS: dict[type, frozenset[str]] = {
 _SIZED_METHODS = frozenset(('center', 'ljust', 'rjust', 'zfill'))
 
 _FILTER_LIMITS: dict[str, Callable[..., None]] = {
-    'format': bounds.limit_percent_format,
-    'join': bounds.limit_joined,
-    'replace': bounds.limit_replacement,
-    'sum': bounds.limit_sum,
+    'format': limits.limit_percent_format,
+    'join': limits.limit_joined,
+    'replace': limits.limit_replacement,
+    'sum': limits.limit_sum,
 }
 
 
@@ -177,11 +177,11 @@ class Sandbox(SandboxedEnvironment):
         context: Context | None = None,
         eval_ctx: EvalContext | None = None,
     ) -> Any:
-        """Apply a filter, also for other filters (`map`, `select`), within bounds."""
+        """Apply a filter, also for other filters (`map`, `select`), within limits."""
         arguments, keywords = list(args or ()), dict(kwargs or {})
         self.budget.weigh(value, arguments, keywords)
         if name in _SIZED_FILTERS:
-            bounds.limit_widths(*arguments, *keywords.values())
+            limits.limit_widths(*arguments, *keywords.values())
         if name in _FILTER_LIMITS:
             _FILTER_LIMITS[name](value, *arguments, **keywords)
         context = context or self._context
@@ -209,14 +209,14 @@ class Sandbox(SandboxedEnvironment):
         owner, name = method.owner, method.name
         self.budget.weigh(owner, list(arguments), dict(keywords))
         if name == 'format':
-            bounds.limit_formatted(owner, [arguments, keywords], '{')
+            limits.limit_formatted(owner, [arguments, keywords], '{')
             return SandboxedFormatter(self).vformat(owner, arguments, keywords)
         if name in _SIZED_METHODS:
-            bounds.limit_widths(*arguments)
+            limits.limit_widths(*arguments)
         if name == 'replace':
-            bounds.limit_replacement(owner, *arguments)
+            limits.limit_replacement(owner, *arguments)
         if name == 'join':
-            bounds.limit_joined(arguments[0] if arguments else (), owner)
+            limits.limit_joined(arguments[0] if arguments else (), owner)
         return self._counted(getattr(owner, name)(*arguments, **keywords))
 
     def _counted(self, value: Any) -> Any:

@@ -6,33 +6,18 @@ few file reads, and cannot run anyone's code.
 """
 
 import json
-import os
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any, Final, Literal, TypeAlias, cast
+from typing import Final, Literal, TypeAlias, cast
 
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package, locate_packages
 from composer.interfaces.descriptions import InterfaceDescription
-from composer.interfaces.type_descriptions import (
-    TypeDescriptionError,
-    find_type_hash,
-    parse_type_description,
-)
+from composer.interfaces.type_descriptions import TypeDescriptionError, parse_type_description
 
 InterfaceKind: TypeAlias = Literal['msg', 'srv', 'action']
 
-_INDEX: Final = 'share/ament_index/resource_index/rosidl_interfaces'
 # 'package/kind/Name'
 _NAME_PARTS: Final = 3
-
-
-def default_prefixes() -> list[Path]:
-    """Get the folders that ROS packages are installed in: sourced ones first, then Python's own.
-
-    The wheels of ROS packages install into `sys.prefix` and set no `AMENT_PREFIX_PATH`.
-    """
-    sourced = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-    return [*(Path(prefix) for prefix in sourced if prefix), Path(sys.prefix)]
 
 
 class InterfaceCatalogue:
@@ -44,9 +29,8 @@ class InterfaceCatalogue:
 
     def __init__(self, prefixes: Sequence[Path] | None = None) -> None:
         """Look for interfaces in these prefixes, or in the default ones."""
-        self._prefixes = default_prefixes() if prefixes is None else list(prefixes)
+        self._prefixes = ament_prefixes() if prefixes is None else list(prefixes)
         self._added: dict[str, InterfaceDescription] = {}
-        self._documents: dict[str, dict[str, Any] | None] = {}
         self._descriptions: dict[str, InterfaceDescription | None] = {}
         self._packages: dict[str, Path] | None = None
         self._entries: dict[tuple[str, InterfaceKind], frozenset[str]] = {}
@@ -93,38 +77,10 @@ class InterfaceCatalogue:
         if full_name in self._added:
             return self._added[full_name]
         if full_name not in self._descriptions:
-            self._descriptions[full_name] = self._read(full_name)
+            self._descriptions[full_name] = self._load(full_name)
         return self._descriptions[full_name]
 
-    def type_hash(self, full_name: str) -> str | None:
-        """Get the hash by which peers know that they mean the same type (`RIHS01_…`).
-
-        Returns:
-            None where the interface has no installed description, or was added by hand.
-        """
-        document = None if full_name in self._added else self._document(full_name)
-        if document is None:
-            return None
-        try:
-            return find_type_hash(document)
-        except TypeDescriptionError:
-            return None
-
-    def _read(self, full_name: str) -> InterfaceDescription | None:
-        document = self._document(full_name)
-        if document is None:
-            return None
-        try:
-            return parse_type_description(document)
-        except TypeDescriptionError:
-            return None
-
-    def _document(self, full_name: str) -> dict[str, Any] | None:
-        if full_name not in self._documents:
-            self._documents[full_name] = self._load(full_name)
-        return self._documents[full_name]
-
-    def _load(self, full_name: str) -> dict[str, Any] | None:
+    def _load(self, full_name: str) -> InterfaceDescription | None:
         parts = full_name.split('/')
         if len(parts) != _NAME_PARTS or parts[1] not in {'msg', 'srv', 'action'}:
             return None
@@ -133,22 +89,18 @@ class InterfaceCatalogue:
             return None
         path = prefix.joinpath('share', *parts[:2], f'{parts[2]}.json')
         try:
-            document = json.loads(path.read_bytes())
-        except (OSError, ValueError):
+            return parse_type_description(json.loads(path.read_bytes()))
+        except (OSError, ValueError, TypeDescriptionError):
             return None
-        return document if isinstance(document, dict) else None
 
     def _prefix_of(self, package: str) -> Path | None:
         if self._packages is not None:
             return self._packages.get(package)
-        candidates = (each for each in self._prefixes if (each / _INDEX / package).is_file())
-        return next(candidates, None)
+        return find_package(package, self._prefixes, INTERFACE_INDEX)
 
     def _installed(self) -> dict[str, Path]:
         if self._packages is None:
-            self._packages = {}
-            for prefix in reversed(self._prefixes):
-                self._packages.update(dict.fromkeys(_list_names(prefix / _INDEX), prefix))
+            self._packages = locate_packages(self._prefixes, INTERFACE_INDEX)
         return self._packages
 
     def _indexed(self, package: str, kind: InterfaceKind) -> frozenset[str]:
@@ -160,14 +112,7 @@ class InterfaceCatalogue:
         prefix = self._prefix_of(package)
         if prefix is None:
             return
-        for line in (prefix / _INDEX / package).read_text(encoding='utf-8').splitlines():
+        for line in (prefix / INTERFACE_INDEX / package).read_text(encoding='utf-8').splitlines():
             entry = PurePosixPath(line)
             if entry.parent.name == kind and entry.suffix in {'.idl', f'.{kind}'}:
                 yield f'{package}/{kind}/{entry.stem}'
-
-
-def _list_names(folder: Path) -> list[str]:
-    try:
-        return [path.name for path in folder.iterdir()]
-    except OSError:
-        return []

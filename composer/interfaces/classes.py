@@ -49,6 +49,21 @@ def import_interface(full_name: str) -> type:
     return interface
 
 
+def interface_name(interface: type) -> str:
+    """Return the full name of a generated class, such as `std_msgs/msg/String`.
+
+    A part of a service or an action has the name of its description:
+    `std_srvs/srv/SetBool_Request`.
+    """
+    package, kind, *_ = interface.__module__.split('.')
+    return f'{package}/{kind}/{interface.__name__}'
+
+
+def is_message_class(interface: type) -> bool:
+    """Return whether a class was generated for a message."""
+    return hasattr(interface, 'get_fields_and_field_types')
+
+
 def _import_kind(package: str, kind: InterfaceKind, full_name: str) -> ModuleType:
     try:
         return import_module(f'{package}.{kind}')

@@ -68,24 +68,6 @@ def parse_type_description(document: dict[str, Any]) -> InterfaceDescription:
         raise TypeDescriptionError(message) from error
 
 
-def find_type_hash(document: dict[str, Any]) -> str:
-    """Get the hash of the interface that a JSON document is about, such as `RIHS01_df66…`.
-
-    Raises:
-        TypeDescriptionError: the document is no type description.
-    """
-    try:
-        name = document['type_description_msg']['type_description']['type_name']
-        return next(
-            str(entry['hash_string'])
-            for entry in document['type_hashes']
-            if entry['type_name'] == name
-        )
-    except (*_MALFORMED, StopIteration) as error:
-        message = f'no type description: {error!r}'
-        raise TypeDescriptionError(message) from error
-
-
 def _parse_interface(document: dict[str, Any]) -> InterfaceDescription:
     content = document['type_description_msg']
     described = content['type_description']

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
-from composer.expressions.variables import is_usable_name
+from composer.expressions import is_variable_name
 from composer.names import did_you_mean
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -143,7 +143,7 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if not is_usable_name(argument.name):
+    if not is_variable_name(argument.name):
         yield (), f"'{argument.name}' cannot stand in an expression as a name"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Severity, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.names import did_you_mean
 from composer.yaml_text.document import Document
 
@@ -92,7 +92,6 @@ class _Merging:
                 'changes-nothing',
                 message,
                 help=did_you_mean(str(path[-1]), there, 'there are') if there else None,
-                severity=Severity.WARNING,
             )
         )
 

@@ -20,7 +20,7 @@ from composer.language.layers import merge_documents
 from composer.language.loaded_system import LoadedSystem
 from composer.language.parsing.system_parser import parse_specs
 from composer.language.paths import resolve_paths
-from composer.language.set_option import apply_settings
+from composer.language.set_option import apply_set_values
 from composer.schema.structure import check_structure
 from composer.yaml_text.reader import parse_document, read_document
 
@@ -36,7 +36,7 @@ def load_system(
     words: Sequence[str] | None = None,
     *,
     layers: Sequence[Path] = (),
-    settings: Sequence[str] = (),
+    set_values: Sequence[str] = (),
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -44,14 +44,14 @@ def load_system(
         words: The arguments of the command line; `None` to read the file with its defaults, and
             with samples where there are none.
         layers: Files that change the first one, each over those before it.
-        settings: Changes of single values, as in `nodes.talker.log_level=debug`.
+        set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
     """
     documents = [read_document(each) for each in (path, *layers)]
-    return _load(apply_settings(merge_documents(documents), settings), path, words)
+    return _load(apply_set_values(merge_documents(documents), set_values), path, words)
 
 
 def load_system_text(

@@ -21,29 +21,29 @@ if TYPE_CHECKING:
 _NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
 
 
-def apply_settings(document: Document, settings: Sequence[str]) -> Document:
+def apply_set_values(document: Document, set_values: Sequence[str]) -> Document:
     """Return a document with single values changed; they are typed as in a file.
 
     Args:
-        settings: As in `nodes.talker.timers.tick.period=0.1`; `null` removes.
+        set_values: As in `nodes.talker.timers.tick.period=0.1`; `null` removes.
 
     Raises:
-        UsageError: A setting has no value, or its path leads nowhere.
+        UsageError: An entry has no value, or its path leads nowhere.
     """
-    if document.data is None or not settings:
+    if document.data is None or not set_values:
         return document
     data, positions = document.data, document.positions.copy()
-    for setting in settings:
-        path_text, separator, value_text = setting.partition('=')
+    for set_value in set_values:
+        path_text, separator, value_text = set_value.partition('=')
         if not separator or not path_text:
-            message = f"'{setting}' sets nothing"
+            message = f"'{set_value}' sets nothing"
             raise UsageError(message, help='write path=value, as in executor.threads=4')
         path = _resolve(path_text, data)
-        value = _parse(setting, value_text)
+        value = _parse(set_value, value_text)
         if value is None and not is_null_a_value(path):
-            _find(path, data, setting)
+            _find(path, data, set_value)
         data = _changed(data, path, value, keeps_null=is_null_a_value(path))
-        source = SourceFile(f'--set {setting}', (setting,), home='.')
+        source = SourceFile(f'--set {set_value}', (set_value,), home='.')
         positions.remove(path)
         start = len(path_text) + 2
         written = Span(source, 1, 1, len(path_text))
@@ -79,7 +79,7 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
     return tuple(path)
 
 
-def _find(path: DataPath, data: dict[str, Any], setting: str) -> None:
+def _find(path: DataPath, data: dict[str, Any], set_value: str) -> None:
     """Make sure that there is something at a path.
 
     Raises:
@@ -89,7 +89,7 @@ def _find(path: DataPath, data: dict[str, Any], setting: str) -> None:
     for depth, key in enumerate(path):
         if not isinstance(inside, dict) or key not in inside:
             where = f' in {".".join(map(str, path[:depth]))}' if depth else ''
-            message = f"--set {setting}: there is no '{key}'{where} to remove"
+            message = f"--set {set_value}: there is no '{key}'{where} to remove"
             help_text = did_you_mean(str(key), inside, 'there are') if inside else None
             raise UsageError(message, help=help_text)
         inside = inside[key]
@@ -117,11 +117,11 @@ def _longest_key(text: str, mapping: dict[str, Any]) -> str | None:
     return max(fitting, key=len, default=None)
 
 
-def _parse(setting: str, text: str) -> Any:
-    document = parse_document(f'value: {text}'.encode(), f'--set {setting}')
+def _parse(set_value: str, text: str) -> Any:
+    document = parse_document(f'value: {text}'.encode(), f'--set {set_value}')
     if document.data is None or document.diagnostics:
         reason = document.diagnostics[0].message if document.diagnostics else 'it is empty'
-        message = f'--set {setting}: {reason}'
+        message = f'--set {set_value}: {reason}'
         raise UsageError(message)
     return document.data.get('value')
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.entity_kinds import EntityKind
-
     from composer.yaml_text.positions import DataPath
 
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']

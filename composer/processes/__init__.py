@@ -1,1 +1,1 @@
-"""External processes and their guardian."""
+"""External processes: their supervisor, and the reaper that ends them with the system."""

@@ -1,4 +1,4 @@
-"""`ProcessSpec` → the command that is run, with the arguments that ROS takes."""
+"""`ProcessSpec` → the command line of a process, ROS arguments included."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class CommandWriter:
-    """Writes the commands of processes.
+    """Writes the command lines of processes.
 
     Args:
-        folder: Takes the parameter files that are made for them.
+        folder: Where their parameter files are written.
         ros_arguments: The arguments after `--ros-args` of Composer's own command line.
-        log_levels: `debug` for all loggers, `talker:=debug` for one; they win over the file.
+        log_levels: `debug` for all loggers, `talker:=debug` for one; they override the file.
     """
 
     def __init__(
@@ -38,20 +38,20 @@ class CommandWriter:
         self._log_levels = [_level_for_rcl(each) for each in log_levels]
 
     def write(self, spec: ProcessSpec, environment: Mapping[str, str]) -> list[str]:
-        """Return the whole command.
+        """Return the command line.
 
         Raises:
-            StartError: The program or a parameter file is not there.
+            StartError: The program or a parameter file does not exist.
         """
         command = [*_find_program(spec, environment), *self._ros_arguments_of(spec)]
         for text in (*command, *(f'{key}={value}' for key, value in spec.env.items())):
             if '\0' in text:
-                message = f"process '{spec.name}': {text!r} has a null character in it"
+                message = f"process '{spec.name}': {text!r} contains a null character"
                 raise StartError(message)
         return command
 
     def _ros_arguments_of(self, spec: ProcessSpec) -> list[str]:
-        """Return the arguments: of remapping rules the first wins, of the others the last."""
+        """Return the ROS arguments: of remapping rules the first wins, of all others the last."""
         if not spec.is_ros:
             return []
         arguments = ['--ros-args']
@@ -76,10 +76,10 @@ class CommandWriter:
 
 
 def find_folder(spec: ProcessSpec) -> str | None:
-    """Return the folder that a process runs in; `None` for that of Composer.
+    """Return the working directory of a process; `None` for that of Composer.
 
     Raises:
-        StartError: There is no such folder.
+        StartError: It does not exist.
     """
     if spec.cwd is None:
         return None
@@ -91,13 +91,13 @@ def find_folder(spec: ProcessSpec) -> str | None:
 
 
 def render_parameters(parameters: Mapping[str, Any]) -> str:
-    """Return a parameter file for all nodes of a process; rcl reads the types that were meant."""
+    """Return a parameter file for all nodes of a process, from which rcl reads the right types."""
     values = _converted(dict(parameters))
     return yaml.dump({'/**': {'ros__parameters': values}}, Dumper=_Dumper, allow_unicode=True)
 
 
 def _with_absolute_files(ros_arguments: Sequence[str]) -> list[str]:
-    """Return arguments that hold in any folder."""
+    """Return the arguments with paths that hold in any working directory."""
     before = ['', *ros_arguments[:-1]]
     return [
         str(Path(each).absolute()) if option == '--params-file' else each
@@ -112,10 +112,10 @@ def _level_for_rcl(request: str) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes all text: what is a number or a boolean is another matter in rcl than in PyYAML."""
+    """Quotes all strings: rcl and PyYAML disagree on which are numbers or booleans."""
 
     def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - as it is called
-        return True  # rcl knows no aliases
+        return True  # rcl does not support aliases
 
 
 def _quote(dumper: _Dumper, text: str) -> yaml.Node:
@@ -135,7 +135,7 @@ def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str
     """Return the program and its own arguments.
 
     Raises:
-        StartError: There is no such program.
+        StartError: The program does not exist.
     """
     if spec.package is not None:
         executables = list_executables(spec.package)
@@ -166,7 +166,7 @@ def _find_file(spec: ProcessSpec, text: str) -> Path:
     if not path.is_file():
         message = f"process '{spec.name}': there is no parameter file '{path}'"
         raise StartError(message)
-    # The process may run in another folder.
+    # The process may have another working directory.
     return path.absolute()
 
 

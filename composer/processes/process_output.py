@@ -1,4 +1,4 @@
-"""What foreign processes print: shown line by line, each with the name of its process in front."""
+"""The output of external processes: shown line by line, each after the name of its process."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import threading
 from contextlib import suppress
 
 _CHUNK = 1 << 16
-# As much as the largest pipe holds.
+# Together as much as the largest pipe holds.
 _LAST_CHUNKS = 16
-# A line is shown in parts of about this length rather than kept.
+# Longer lines are shown in parts.
 _LONGEST_LINE = 1 << 16
-# A pipe that can be written to takes 4096 bytes (PIPE_BUF); a character has at most four.
+# A pipe that is ready takes 4096 bytes (PIPE_BUF); a character has at most four.
 _PIECE = 1000
 _POLL_MS = 200
 
 
 class _Output:
-    """The output of one process, as far as it has not been shown."""
+    """The output of one process that has not been shown yet."""
 
     def __init__(self, name: str) -> None:
         self.ended = threading.Event()
@@ -29,7 +29,7 @@ class _Output:
         self._rest = ''
 
     def take(self, data: bytes) -> str:
-        """Return the lines that are whole by now; no data is the end of them."""
+        """Return the lines that are complete; empty data marks the end of the output."""
         text = self._rest + self._decoder.decode(data, final=not data)
         lines, separator, self._rest = text.replace('\r\n', '\n').rpartition('\n')
         if self._rest and (not data or len(self._rest) > _LONGEST_LINE):
@@ -40,9 +40,9 @@ class _Output:
 
 
 class ProcessOutputs:
-    """Shows on standard output what processes print, in one thread for all of them.
+    """Shows the output of processes on standard output, with one thread for all of them.
 
-    It keeps at most one line of each. If nobody takes what it shows, the processes wait.
+    It keeps at most one line of each process. If standard output is blocked, the processes wait.
     """
 
     def __init__(self) -> None:
@@ -55,16 +55,16 @@ class ProcessOutputs:
         self._thread.start()
 
     def add(self, name: str, descriptor: int) -> threading.Event:
-        """Show what comes from a pipe, and close it at its end; return what is set then."""
+        """Show what comes from a pipe and close it at its end; return an event to be set then."""
         os.set_blocking(descriptor, False)
         output = self._outputs[descriptor] = _Output(name)
         self._poll.register(descriptor, select.POLLIN)
-        # The poll that is going on does not know of it.
+        # A poll that has begun does not include it.
         os.write(self._wake_up_end, b'.')
         return output.ended
 
     def close(self) -> None:
-        """Show what is there and no more; a child that somebody forked may keep a pipe open."""
+        """Show what the pipes hold now, and stop; a forked child may keep a pipe open."""
         self._is_closing = True
         os.write(self._wake_up_end, b'.')
         self._thread.join()
@@ -86,7 +86,7 @@ class ProcessOutputs:
                 self._end(descriptor)
 
     def _show_some(self, descriptor: int) -> bool:
-        """Show what a process has printed; return whether there may be more."""
+        """Show some output of a process; return whether there may be more."""
         try:
             data = os.read(descriptor, _CHUNK)
         except BlockingIOError:
@@ -104,22 +104,22 @@ class ProcessOutputs:
         output.ended.set()
 
     def _show(self, text: str) -> None:
-        # Whoever reads our output may have gone, which is no reason to stop.
+        # The reader of standard output may have gone; the system goes on.
         with suppress(OSError, ValueError):
             start = 0
             while start < len(text) and self._may_write():
-                # Whole lines, if they are not too long: others write to the terminal, too.
+                # Whole lines where possible: others write to the terminal, too.
                 end = text.rfind('\n', start, start + _PIECE) + 1 or start + _PIECE
                 sys.stdout.write(text[start:end])
                 sys.stdout.flush()
                 start = end
 
     def _may_write(self) -> bool:
-        """Wait until standard output takes something; return `False` if it is closing time."""
+        """Wait until standard output is ready; return `False` if the output is being closed."""
         try:
             descriptor = sys.stdout.fileno()
         except (OSError, ValueError):
-            return True  # it is not a file, but somebody's memory
+            return True  # a stream in memory
         ready = select.poll()
         ready.register(descriptor, select.POLLOUT)
         while not ready.poll(_POLL_MS):

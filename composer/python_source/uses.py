@@ -9,7 +9,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from composer.python_source.branches import find_run
+from composer.python_source.control_flow import find_run
 from composer.python_source.local_names import (
     find_chosen,
     find_parameter,
@@ -18,8 +18,8 @@ from composer.python_source.local_names import (
     stored_names,
 )
 from composer.python_source.modules import find_texts
-from composer.python_source.use_reader import UseReader
-from composer.python_source.use_records import ALL_KINDS, NodePass, NodeUse, NodeUses, UseKind
+from composer.python_source.node_use_reader import UseReader
+from composer.python_source.node_uses import ALL_KINDS, NodePass, NodeUse, NodeUses, UseKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Severity, has_errors
+from composer.diagnostics import has_errors
+from composer.rules import Severity
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic

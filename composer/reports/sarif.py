@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from composer.reports.report import relative_path
-from composer.rules import FAMILY_OF, RULES
-from composer.rules.examples import read_example
+from composer.rules import load_rule
+from composer.rules.examples import load_example
 from composer.version import find_version
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.reports.report import Report
-    from composer.rules.record import Rule
+    from composer.rules import Rule
 
 _SCHEMA = (
     'https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json'
@@ -35,7 +35,7 @@ def render_report(report: Report) -> str:
         'name': 'composer',
         'fullName': 'Composer for ROS 2',
         'version': find_version(),
-        'rules': [_describe_rule(RULES[rule]) for rule in fired],
+        'rules': [_describe_rule(load_rule(rule)) for rule in fired],
     }
     run = {
         'tool': {'driver': driver},
@@ -58,10 +58,10 @@ def render_report(report: Report) -> str:
 
 
 def _describe_rule(rule: Rule) -> dict[str, Any]:
-    example = read_example(rule.name)
+    example = load_example(rule.name)
     shown = (
-        f'{rule.meaning} {rule.why}\n\nNot so:\n\n```yaml\n{example.bad}```\n\n'
-        f'But so:\n\n```yaml\n{example.good}```\n'
+        f'{rule.meaning} {rule.why}\n\nBad:\n\n```yaml\n{example.bad}```\n\n'
+        f'Good:\n\n```yaml\n{example.good}```\n'
         if example
         else f'{rule.meaning} {rule.why}\n'
     )
@@ -72,7 +72,7 @@ def _describe_rule(rule: Rule) -> dict[str, Any]:
         'fullDescription': {'text': f'{rule.meaning} {rule.why}'},
         'help': {'text': shown.replace('```yaml\n', '').replace('```', ''), 'markdown': shown},
         'defaultConfiguration': {'level': rule.severity.value},
-        'properties': {'tags': [FAMILY_OF[rule.name].name]},
+        'properties': {'tags': [rule.family]},
     }
 
 

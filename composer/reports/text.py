@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.diagnostics import Severity
 from composer.reports.report import count_severities
+from composer.rules import Severity
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
@@ -39,9 +39,9 @@ def render_files(report: Report, *, colour: bool, is_quiet: bool = False) -> str
 
 
 def summarize(findings: list[Diagnostic]) -> str:
-    """Return `2 faults and 1 warning in 1 file`."""
+    """Return `2 errors and 1 warning in 1 file`."""
     errors, warnings = count_severities(findings)
-    counts = [count(errors, 'fault')] if errors else []
+    counts = [count(errors, 'error')] if errors else []
     counts += [count(warnings, 'warning')] if warnings else []
     files = len({finding.file for finding in findings})
     return f'{" and ".join(counts)} in {count(files, "file")}'

@@ -27,7 +27,7 @@ from composer.ros_parameters.rcl_values import parse_override
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from composer.ros_parameters.parameter_files import ParameterEntry, ParameterFile
+    from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
 
 _SCALARS = tuple(name for name in PARAMETER_TYPES if not name.endswith('_array'))
 _ARRAYS = tuple(name for name in PARAMETER_TYPES if name.endswith('_array'))

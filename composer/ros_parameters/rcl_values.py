@@ -1,16 +1,20 @@
-"""Values in parameter files and behind `:=`, as rcl reads them.
+"""Values of parameters as rcl reads them, in parameter files and behind `:=`.
 
-Source: `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c`).
+The types that rcl gives to scalars are not those of YAML 1.2: they lean on `strtol` and `strtod`
+of the C library.
+Source: `get_value` and `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c`).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import re
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
 from composer.names import with_article
-from composer.ros_parameters.parameter_types import infer_parameter_type
-from composer.ros_parameters.rcl_scalars import read_scalar
+from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN, infer_parameter_type
+from composer.yaml_text.scalars import TAG_STR
 from composer.yaml_text.tree import (
     CompositionError,
     MappingNode,
@@ -24,6 +28,26 @@ if TYPE_CHECKING:
     from composer.diagnostics import Span
 
 RULE = 'bad-parameter-file'
+ParameterScalar: TypeAlias = bool | int | float | str
+
+_TRUE = frozenset({'Y', 'y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'})
+_FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'})
+_DOTTED = re.compile(r'(\.nan|\.NaN|\.NAN|[-+]?\.(?:inf|Inf|INF))')
+
+_SPACE = r'[ \t\n\v\f\r]*'
+# What `strtol` takes whole in base 0: a zero in front makes it octal.
+_INTEGER = re.compile(rf'{_SPACE}([-+]?)(?:0[xX]([0-9a-fA-F]+)|(0[0-7]*)|([1-9][0-9]*))')
+# What `strtod` takes whole.
+_DECIMAL = re.compile(rf'{_SPACE}[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?')
+_HEXADECIMAL = re.compile(
+    rf'{_SPACE}[-+]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][-+]?[0-9]+)?'
+)
+_NAMED = re.compile(rf'{_SPACE}[-+]?(?:inf|infinity|nan(?:\([0-9A-Za-z_]*\))?)', re.IGNORECASE)
+
+# The smallest number of full precision; below it `strtod` reports what is not exact.
+_LEAST_NORMAL = 2.2250738585072014e-308
+# No number needs more; Python does not read integers of more digits without being asked to.
+_MAX_LENGTH = 1000
 
 
 def parse_override(text: str) -> tuple[Any, str | None] | None:
@@ -98,3 +122,74 @@ def _help_for_mixture(first: Any, other: Any) -> str | None:
     if {type(first), type(other)} == {int, float}:
         return 'give each of them a decimal point'
     return 'put each in quotes if they are texts' if str in (type(first), type(other)) else None
+
+
+def read_scalar(node: ScalarNode) -> ParameterScalar:
+    """Return the value that rcl reads."""
+    # rcl's strings are those of C.
+    text = node.text.split('\0')[0]
+    return text if node.quoted or node.tag == TAG_STR else read_plain_scalar(text)
+
+
+def read_plain_scalar(text: str) -> ParameterScalar:
+    """Return the value that rcl reads in a scalar without quotes, of plain or block style."""
+    if text in _TRUE:
+        return True
+    if text in _FALSE:
+        return False
+    integer = _read_integer(text)
+    if integer is not None:
+        return integer
+    double = _read_double(text)
+    return text if double is None else double
+
+
+def _read_integer(text: str) -> int | None:
+    match = _INTEGER.fullmatch(text)
+    if match is None or len(text) > _MAX_LENGTH:
+        return None
+    sign, *digits = match.groups()
+    value = next(int(text, base) for text, base in zip(digits, (16, 8, 10), strict=True) if text)
+    value = -value if sign == '-' else value
+    # What does not fit is tried as a double.
+    return value if INT64_MIN <= value <= INT64_MAX else None
+
+
+def _read_double(text: str) -> float | None:
+    if _DOTTED.fullmatch(text):
+        return float(text.replace('.', '', 1))
+    if _NAMED.fullmatch(text):
+        return float(text.partition('(')[0])
+    if _DECIMAL.fullmatch(text):
+        value = float(text)
+        return value if _is_in_range(value, text) else None
+    if _HEXADECIMAL.fullmatch(text):
+        return _read_hexadecimal(text.strip().lower())
+    return None
+
+
+def _read_hexadecimal(text: str) -> float | None:
+    try:
+        value = float.fromhex(text)
+    except OverflowError:
+        return None
+    mantissa, _, exponent = text.partition('x')[2].partition('p')
+    whole, _, part = mantissa.partition('.')
+    if abs(value) >= _LEAST_NORMAL or not int(whole + part, 16):
+        return value
+    if not value or len(text) > _MAX_LENGTH:
+        return None
+    exact = int(whole + part, 16) * Fraction(2) ** (int(exponent or 0) - 4 * len(part))
+    return value if exact == abs(Fraction(value)) else None
+
+
+def _is_in_range(value: float, text: str) -> bool:
+    """Return whether `strtod` reports no overflow or underflow, after which rcl takes a string."""
+    magnitude = abs(value)
+    if magnitude == float('inf'):
+        return False
+    if magnitude >= _LEAST_NORMAL:
+        return True
+    if magnitude == 0:
+        return not re.sub('[eE].*', '', text).strip(' \t\n\v\f\r+-.0')
+    return len(text) <= _MAX_LENGTH and Fraction(text.strip()) == Fraction(value)

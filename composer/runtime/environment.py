@@ -1,4 +1,4 @@
-"""Environment variables that a file declares: set before ROS starts, and taken back at the end."""
+"""The environment variables of a file: set before ROS is imported, and restored at the end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MIDDLEWARE = 'RMW_IMPLEMENTATION'
 
 @contextmanager
 def environment_set(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set variables of this process, and give them back their old values at the end."""
+    """Set environment variables, and restore their old values at the end."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -30,7 +30,7 @@ def environment_set(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def check_middleware(variables: Mapping[str, str]) -> None:
-    """Make sure that the middleware runs that variables ask for.
+    """Load the middleware that the variables name, if they name one.
 
     Raises:
         StartError: It cannot be loaded, or this process has loaded another one before.

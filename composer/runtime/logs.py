@@ -1,4 +1,4 @@
-"""The ROS loggers: their levels, from the file and the command line, and their publishers."""
+"""The ROS loggers: their levels, from the file and the command line, and `/rosout`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import NodeSpec
 
-# The logger of Composer itself, for what concerns the whole system.
+# The logger of Composer itself, for messages about the whole system.
 system_logger = get_logger('composer')
 
 _rosout_is_enabled = ctypes.PyDLL(_rclpy.__file__).rcl_logging_rosout_enabled
@@ -24,11 +24,11 @@ _PROBE = 'composer_probe'
 
 @contextmanager
 def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[None]:
-    """Set the levels of the nodes' loggers, and give them back their old ones at the end.
+    """Set the levels of the nodes' loggers, and restore the old ones at the end.
 
     Args:
-        nodes: Their `log_level` holds where the command line does not say otherwise.
-        requests: What the command line says: `debug` for all nodes and Composer itself,
+        nodes: Their `log_level` holds unless the command line sets another one.
+        requests: The levels of the command line: `debug` for all nodes and Composer itself,
             `talker:=debug` for one logger; later ones win.
     """
     names = {_logger_name(node): node.log_level for node in nodes}
@@ -50,11 +50,11 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
 
 
 def has_rosout_publisher(logger_name: str) -> bool:
-    """Return whether rcl knows a publisher for what this logger says.
+    """Return whether rcl has a `/rosout` publisher for this logger.
 
     rcl keeps these publishers by the logger's name, from the creation of the first node with that
-    name to the end of any of them. It answers whether there is one when it is asked for a
-    sublogger, but always with yes where `/rosout` is turned off for the whole process.
+    name to the end of any of them. Adding a sublogger tells whether there is one, except where
+    `/rosout` is turned off for the whole process: there it always succeeds.
     """
     if not _rosout_is_enabled():
         return False

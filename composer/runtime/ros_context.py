@@ -1,4 +1,4 @@
-"""The context of a system: what of ROS all its nodes are in, and what the command line says."""
+"""The ROS context of a system, initialized with the arguments of the command line."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
-from composer.runtime.ownership import reserve
+from composer.runtime.reserved_methods import reserve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
 def create_ros_context(ros_arguments: Sequence[str]) -> Context:
-    """Return a context that only the system itself may shut down.
+    """Return an initialized context, which only the system itself may shut down.
 
     Args:
         ros_arguments: The arguments after `--ros-args` of the command line.
 
     Raises:
-        UsageError: ROS does not understand them, or they name a node.
+        UsageError: ROS does not accept them, or they rename all nodes.
         StartError: ROS 2 cannot start.
     """
     context = Context()

@@ -1,15 +1,14 @@
-"""Running a system from start to stop, signals included."""
+"""Runs a system from start to stop, and handles signals."""
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode
-from composer.runtime import forks, last_resort
+from composer.runtime import forced_exit, forked_children
 from composer.runtime.logs import log_levels, system_logger
 from composer.runtime.system import System
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Comes when the terminal is closed, often twice: from the shell, and from the kernel.
+# Sent when the terminal is closed, often twice: by the shell and by the kernel.
 _HANG_UP = signal.SIGHUP
 
 
@@ -33,30 +32,30 @@ def run_system(
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
 ) -> int:
-    """Start a system, wait for its end, and stop it.
+    """Start a system, wait until a stop is requested, and stop it.
 
-    The first SIGINT or SIGTERM stops it, a second one leaves at once with exit code 1, and a third
-    one ends the process even if no Python can run. SIGHUP stops it, too, unless it was ignored
-    before, as by `nohup`; more of them change nothing. If a behaviour cannot be ended, the process
-    is left with its exit code, since its threads cannot be ended either.
+    The first SIGINT or SIGTERM stops the system, a second one ends the process at once with exit
+    code 1, and a third one does so even if no Python code can run. SIGHUP stops the system, too,
+    unless it was ignored before, as by `nohup`; further ones change nothing. If a behaviour does
+    not end, this ends the process with the exit code, since its thread cannot be ended.
 
     Returns:
         The exit code.
 
     Raises:
-        StartError: It could not be brought up.
+        StartError: The system could not start.
         UsageError: The ROS arguments are wrong.
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
         system = System(spec, positions, functions, ros_arguments, log_level_requests)
-        with _stopped_by_signals(system, spec):
+        with _handling_signals(system, spec):
             try:
                 system.start()
                 try:
                     system.wait()
                 finally:
-                    # Also if something was thrown into this thread.
-                    last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
+                    # Also if a signal handler of a behaviour raised an error in this thread.
+                    forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
                     code, ended = system.stop()
             except ComposerError as error:
                 if system.has_ended:
@@ -64,15 +63,15 @@ def run_system(
                 system_logger.error(str(error))
                 code, ended = ExitCode.FAILED, False
             finally:
-                last_resort.disarm()
+                forced_exit.cancel()
     if not ended:
-        _leave(code)
+        forced_exit.leave(code)
     return code
 
 
 @contextmanager
-def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
-    # Python delivers signals to the main thread alone; elsewhere they stay with the caller.
+def _handling_signals(system: System, spec: SystemSpec) -> Iterator[None]:
+    # Python handles signals in the main thread alone; elsewhere the caller keeps them.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -81,26 +80,21 @@ def _stopped_by_signals(system: System, spec: SystemSpec) -> Iterator[None]:
         if system.stop_requested:
             if number == _HANG_UP:
                 return
-            system.abandon()
-            _leave(ExitCode.FAILED)
+            system.kill_processes()
+            forced_exit.leave(ExitCode.FAILED)
         system.request_stop()
-        last_resort.arm(spec.longest_stop_sec, len(spec.nodes))
+        forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
         for each in _SIGNALS:
-            last_resort.let_kernel_act_after_next(each)
+            forced_exit.let_kernel_act_after_next(each)
 
     handled = list(_SIGNALS)
     if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
         handled.append(_HANG_UP)
     before: dict[int, Any] = {number: signal.signal(number, handle) for number in handled}
-    forks.signal_handlers.update(before)
+    forked_children.signal_handlers.update(before)
     try:
         yield
     finally:
-        forks.signal_handlers.clear()
+        forked_children.signal_handlers.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _leave(code: int) -> None:
-    forks.flush_output()
-    os._exit(code)

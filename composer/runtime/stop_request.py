@@ -1,47 +1,72 @@
-"""Whether a system is to end, and the exit code that it ends with."""
+"""The request to stop a system: who makes it, who waits for it, and the exit code."""
 
 from __future__ import annotations
 
 import queue
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
-from composer.runtime.behaviours.waiting import StopSignal
 
-_LONGEST_DEAF_SEC = 0.5
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_POLL_SEC = 0.5
 
 
 class StopRequest:
-    """What anybody may make, and one thread waits for.
+    """A request that any thread or signal handler may make.
 
     Attributes:
-        signal: Whether it was made, for those who wait in behaviours.
-        code: The exit code: the first that was not 0.
+        is_set: Whether it was made.
+        code: The exit code: the first one that was not 0.
     """
 
     def __init__(self) -> None:
-        self.signal = StopSignal()
+        self.is_set = False
         self.code: int = ExitCode.DONE
+        self._callbacks: dict[Callable[[], None], None] = {}
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
 
-    def note(self, code: int) -> None:
-        """Let this be the exit code, unless there is one that is not 0."""
-        if self.code == ExitCode.DONE:
-            self.code = code
-
-    def make(self, code: int) -> None:
-        """Let `wait` return.
+    def make(self, code: int = ExitCode.DONE) -> None:
+        """Request the stop, and wake all that wait.
 
         A signal handler may call it while the main thread is anywhere, so it takes no lock that
         `wait` holds; a `threading.Event` would.
         """
-        self.note(code)
-        self.signal.set()
+        self.set_code(code)
+        self.is_set = True
+        for wake in list(self._callbacks):
+            wake()
         self._wake_ups.put(None)
 
+    def set_code(self, code: int) -> None:
+        """Set the exit code, unless there is one that is not 0."""
+        if self.code == ExitCode.DONE:
+            self.code = code
+
     def wait(self) -> None:
-        """Wait until it is made."""
-        while not self.signal.is_set:
+        """Wait until it is made; for one thread."""
+        while not self.is_set:
             # A signal that comes right before the wait begins does not interrupt it.
             with suppress(queue.Empty):
-                self._wake_ups.get(timeout=_LONGEST_DEAF_SEC)
+                self._wake_ups.get(timeout=_POLL_SEC)
+
+    @contextmanager
+    def waking(self, wake: Callable[[], None]) -> Iterator[bool]:
+        """Have `wake` called when the request is made.
+
+        Returns:
+            Whether that is still to come; after the request, `wake` is not called.
+        """
+        if self.is_set:
+            yield False
+            return
+        self._callbacks[wake] = None
+        if self.is_set:
+            # It was made while the line above ran.
+            wake()
+        try:
+            yield True
+        finally:
+            del self._callbacks[wake]

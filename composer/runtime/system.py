@@ -1,4 +1,4 @@
-"""`SystemSpec` → a living system: all of it comes up or none of it, and it goes down cleanly."""
+"""`SystemSpec` → a running system: all of it starts or nothing, and all of it stops cleanly."""
 
 from __future__ import annotations
 
@@ -6,29 +6,28 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode
-from composer.processes.supervisor import Processes
-from composer.runtime.behaviours.error_handling import Supervisor
-from composer.runtime.behaviours.failures import ServiceFailures
-from composer.runtime.health.diagnostics_publisher import HealthPublisher
-from composer.runtime.health.hangs import HangWatch
-from composer.runtime.health.statistics import HealthBoard
-from composer.runtime.health.unmatched import GraphWatch
+from composer.processes.supervisor import ProcessSupervisor
+from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
+from composer.runtime.health.hangs import HangWatcher
+from composer.runtime.health.statistics import HealthRegistry
+from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
-from composer.runtime.nodes.restart import NodeRestarter
-from composer.runtime.nodes.start import NodeStarter
-from composer.runtime.nodes.stop import stop_nodes
-from composer.runtime.ownership import release, reserve
-from composer.runtime.readiness import Readiness, describe_parts, list_waiters
+from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
+from composer.runtime.reserved_methods import release, reserve
+from composer.runtime.restart import ErrorPolicy, NodeRestarter
 from composer.runtime.ros_context import create_ros_context
+from composer.runtime.start import NodeStarter
+from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.system_services import SystemServices
+from composer.runtime.wait_for import WaitingStarter, describe_parts, list_waiters
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
 
@@ -38,15 +37,15 @@ _EXECUTOR_STOP_SEC = 1.0
 class System:
     """A system that can be started once and stopped once.
 
-    Attributes:
-        has_ended: Whether all has been torn down. If `start` or `stop` could not do so, threads
-            still run, and only the end of the process ends them.
-
     Args:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
-        log_levels: What the command line says of these, for foreign processes.
+        log_levels: The log levels of the command line, for external processes.
+
+    Attributes:
+        has_ended: Whether everything has been destroyed. If not, behaviours still run after
+            `stop`, and only the end of this process ends them.
     """
 
     def __init__(
@@ -64,20 +63,21 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
-            self._context, spec.threads, log=system_logger.error, lost=self._on_lost
+            self._context, spec.threads, log=system_logger.error, on_lost=self._on_lost
         )
         reserve(self._executor, 'the executor', 'shutdown')
-        self._watch = HangWatch(lambda: list(self._nodes.values()), _limits(spec))
-        self._graph_watch = GraphWatch(lambda: list(self._nodes.values()))
-        self._supervisor = Supervisor(self._restart, self._stop_request.make)
+        self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
+        self._graph_watcher = GraphWatcher(self._endpoints)
+        self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._services = self._share(positions, functions, ros_arguments)
         self._starter = NodeStarter(self._nodes, self._services)
         self._restarter = NodeRestarter(
             self._nodes, self._starter, self._services, spec.shutdown_timeout_sec
         )
-        self._health_publisher: HealthPublisher | None = None
-        self._processes = Processes(
+        self._diagnostics_publisher: DiagnosticsPublisher | None = None
+        self._processes = ProcessSupervisor(
             spec.processes.values(),
+            system_logger,
             self._end,
             spec.shutdown_timeout_sec,
             ros_arguments,
@@ -89,60 +89,61 @@ class System:
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str],
-    ) -> SystemServices:
+    ) -> SystemHandle:
         spec = self._spec
-        return SystemServices(
+        return SystemHandle(
             context=self._context,
             positions=positions,
             profiles=spec.qos,
             functions=functions,
             ros_arguments=ros_arguments,
-            act_on_error=self._supervisor.act,
+            act_on_error=self._error_policy.act,
             shutdown=self._stop_request.make,
             executor=self._executor,
-            stop=self._stop_request.signal,
+            stop=self._stop_request,
             failures=ServiceFailures(),
             without_parameter_services=frozenset(
                 node.full_name for node in spec.nodes.values() if not node.parameter_services
             ),
-            health=None if spec.diagnostics_period_sec is None else HealthBoard(),
+            health=None if spec.diagnostics_period_sec is None else HealthRegistry(),
         )
 
     @property
     def stop_requested(self) -> bool:
-        """Whether somebody wants the system to end."""
-        return self._stop_request.signal.is_set
+        """Whether a stop was requested."""
+        return self._stop_request.is_set
 
     def request_stop(self, code: int = ExitCode.DONE) -> None:
-        """Let `wait` return; the first request that is not 0 decides the exit code.
+        """Let `wait` return; a signal handler may call it.
 
-        A signal handler may call it while the main thread is anywhere.
+        Args:
+            code: The exit code; the first one that is not 0 counts.
         """
         self._stop_request.make(code)
 
-    def abandon(self) -> None:
-        """Kill all foreign processes; a signal handler may call it before it ends this one."""
-        self._processes.abandon()
+    def kill_processes(self) -> None:
+        """Kill all external processes; a signal handler may call it before it ends this one."""
+        self._processes.kill_all()
 
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
-        Foreign processes come before any `on_start`; what waits for something comes after all
-        that does not, whose behaviours run by then. Nodes that have begun hear their `on_stop`
-        if a later one cannot.
+        External processes start before any `on_start`. What has a `wait_for` starts last, while
+        the behaviours of all others run. If a node cannot start, the `on_stop` of those that
+        have started is run.
 
         Raises:
-            StartError: One of them failed; all has been torn down again.
+            StartError: Something could not start; all the rest has been stopped again.
         """
         try:
             for spec in self._spec.nodes.values():
                 self._starter.create(spec)
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
-            self._publish_health()
+            self._publish_diagnostics()
             self._executor.start()
-            self._watch.start()
-            self._graph_watch.start()
+            self._hang_watcher.start()
+            self._graph_watcher.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
@@ -162,27 +163,27 @@ class System:
         self._stop_request.wait()
 
     def stop(self) -> tuple[int, bool]:
-        """End the system.
+        """Stop the system.
 
         Returns:
-            The exit code, and whether all behaviours have ended. If they have not, their threads
-            still run, and only the end of the process ends them.
+            The exit code, and whether all behaviours have ended. If not, their threads still
+            run, and only the end of this process ends them.
         """
-        self._supervisor.stop()
+        self._error_policy.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
-        # An `on_stop` may have needed them.
+        # Processes end after the nodes: an `on_stop` may need them.
         if not (self._processes.stop() and ended):
-            self._stop_request.note(ExitCode.FAILED)
+            self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
             node.errors.flush()
         if ended:
-            self._tear_down()
+            self._destroy()
         self.has_ended = ended
         return self._stop_request.code, ended
 
     def _start_all(self) -> list[LiveNode]:
-        """Start all processes and nodes; return those nodes whose gates are yet to be opened."""
+        """Start all processes and nodes; return the nodes whose gates are still to be opened."""
         for process in self._processes.by_name.values():
             if not (process.spec.wait_for or self.stop_requested):
                 self._processes.start(process)
@@ -193,10 +194,10 @@ class System:
         if not waiters or self.stop_requested:
             return prompt
         self._starter.open(prompt)
-        readiness = Readiness(
+        starter = WaitingStarter(
             self._context, self._nodes, self._processes.by_name, self._services.positions
         )
-        readiness.start_all(waiters, self._stop_request.signal)
+        starter.start_all(waiters, self._stop_request)
         return []
 
     def _start_late(self, node: LiveNode) -> None:
@@ -208,21 +209,21 @@ class System:
         self._restarter.restart(full_name)
 
     def _end(self, code: int) -> None:
-        """End the system because of a process, unless it ends already."""
+        """Stop the system because of a process, unless it stops already."""
         if not self.stop_requested:
             self.request_stop(code)
 
-    def _publish_health(self) -> None:
+    def _publish_diagnostics(self) -> None:
         board, period_sec = self._services.health, self._spec.diagnostics_period_sec
         if board is None or period_sec is None:
             return
-        publisher = HealthPublisher(self._spec.name, period_sec, board, self._overdue_calls)
+        publisher = DiagnosticsPublisher(self._spec.name, period_sec, board, self._overdue_calls)
         try:
             publisher.start(self._context, self._services.ros_arguments)
         except ImportError as error:
             system_logger.warn(f'there will be no /diagnostics: {error}')
         else:
-            self._health_publisher = publisher
+            self._diagnostics_publisher = publisher
 
     def _overdue_calls(self) -> list[tuple[str, RunningCall]]:
         return [
@@ -232,22 +233,25 @@ class System:
             if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
 
+    def _endpoints(self) -> list[TopicEndpoint]:
+        return [end for node in list(self._nodes.values()) for end in node.endpoints]
+
     def _on_lost(self) -> None:
         if not self.stop_requested:
-            system_logger.error('ROS was shut down under the system, which ends now')
+            system_logger.error('the ROS context was shut down, so the system ends')
             self.request_stop(ExitCode.FAILED)
 
-    def _tear_down(self) -> None:
-        self._graph_watch.stop()
-        if self._health_publisher is not None:
-            self._health_publisher.stop()
+    def _destroy(self) -> None:
+        self._graph_watcher.stop()
+        if self._diagnostics_publisher is not None:
+            self._diagnostics_publisher.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)
         for node in self._nodes.values():
             node.destroy()
         self._nodes.clear()
-        self._watch.stop()
+        self._hang_watcher.stop()
         release(self._context)
         self._context.try_shutdown()
         self._context.destroy()

@@ -1,4 +1,4 @@
-"""The executor of a whole system: it spins by itself, and no fault of one part ends it."""
+"""The executor of a system: it spins in its own thread, and no error ends it."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
-from composer.runtime.behaviours.error_texts import format_fault
-from composer.runtime.ownership import release
+from composer.runtime.behaviours.tracebacks import format_fault
+from composer.runtime.reserved_methods import release
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rclpy.context import Context
 
-# After a fault of the executor itself, which should not be; it must not fill the log.
+# After an unexpected error of the executor itself, which must not flood the log.
 _PAUSE_SEC = 0.1
 
 
 class NoResponseError(ComposerError):
-    """Raised by a service's callback that cannot answer: rclpy sends a response otherwise."""
+    """Raised by a service's callback that has no response, to keep rclpy from sending one."""
 
 
 class SystemExecutor(ComposerExecutor):
     """Runs the callbacks of all nodes, from `start` to `stop`.
 
     Args:
-        threads: How many callbacks may run at the same time, without those that wait for others;
-            `None` for as many as block.
-        log: Takes the text of a fault outside all behaviours; dispatching goes on.
-        lost: Called when no callback can run any more, though nobody has called `stop`.
+        threads: How many callbacks may run at the same time, not counting those that wait for
+            others; `None` for no limit.
+        log: Takes the text of an error outside all behaviours, after which the executor goes on.
+        on_lost: Called when the context was shut down before `stop`.
     """
 
     def __init__(
@@ -43,44 +43,44 @@ class SystemExecutor(ComposerExecutor):
         context: Context,
         threads: int | None,
         log: Callable[[str], None],
-        lost: Callable[[], None] | None = None,
+        on_lost: Callable[[], None] | None = None,
     ) -> None:
         with warnings.catch_warnings():
-            # rclpy advises against one thread here, but means its own executors.
+            # rclpy warns of a single thread, but means its own executors.
             warnings.simplefilter('ignore', UserWarning)
             super().__init__(threads, context=context)
         self._log = log
-        self._lost = lost
+        self._on_lost = on_lost
         self._is_stopped = False
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True
         )
 
     def start(self) -> None:
-        """Begin to run callbacks."""
+        """Start to run callbacks."""
         self._thread.start()
 
     def stop(self, timeout_sec: float) -> bool:
-        """Run no more callbacks.
+        """Stop to run callbacks.
 
         Returns:
-            Whether all that were running have ended in time.
+            Whether all running ones have ended in time.
         """
         self._is_stopped = True
         release(self)
         return self.shutdown(timeout_sec)
 
     def report(self, error: BaseException) -> None:
-        """Log what a callback raised; where others spin, rclpy's executors end by it."""
+        """Log an error of a callback; rclpy's own executors end by it."""
         if not isinstance(error, NoResponseError):
-            # What comes out of here would end the thread that spins.
+            # An error raised here would end the thread that spins.
             with suppress(Exception):
                 self._log(format_fault(error))
 
     def _keep_spinning(self) -> None:
         self._spin_on()
-        if self._lost is not None and not self._is_stopped:
-            self._lost()
+        if self._on_lost is not None and not self._is_stopped:
+            self._on_lost()
 
     def _spin_on(self) -> None:
         while not self._is_shutdown and self.context.ok():
@@ -88,6 +88,6 @@ class SystemExecutor(ComposerExecutor):
                 self.spin()
             except (ShutdownException, ExternalShutdownException):
                 return
-            except BaseException as error:  # noqa: BLE001 - one fault must not end all nodes
+            except BaseException as error:  # noqa: BLE001 - one error must not end all nodes
                 self.report(error)
                 sleep(_PAUSE_SEC)

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from composer.names import did_you_mean, suggest
-from composer.schema.faults import (
+from composer.schema.violations import (
     StructureFault,
     conflicting_keys,
     describe_types,
@@ -17,12 +17,15 @@ from composer.schema.faults import (
     show_value,
     wrong_type,
 )
-from composer.schema.meant_forms import find_meant_form
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from jsonschema.exceptions import ValidationError
+
+
+_KINDS = ('msg', 'srv', 'action')
+_SEPARATORS = re.compile(r'[/.:]+')
 
 
 def explain(error: ValidationError) -> Iterator[StructureFault]:
@@ -92,7 +95,7 @@ def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
 def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
     expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
     path = path_of(error)
-    meant = find_meant_form(error.instance, error.validator_value)
+    meant = _find_meant_form(error.instance, error.validator_value)
     yield StructureFault(
         'bad-value',
         f'expected {expected}; got {show_value(error.instance)}',
@@ -208,6 +211,32 @@ def _near(value: Any, options: list[str]) -> str | None:
         return None
     found = did_you_mean(value, options)
     return found if found and found.startswith('did') else None
+
+
+def _find_meant_form(text: str, pattern: str) -> str | None:
+    """Return what a text would be in the form of a pattern of the schema, or `None`.
+
+    Types as other places write them: `std_msgs/String` (ROS 1), `std_msgs.msg.String` (Python),
+    `std_msgs::msg::String` (C++); behaviours with a dot, slashes, dashes, `.py` or `()` in them.
+    """
+    kind = next((kind for kind in _KINDS if f'/{kind}/' in pattern), None)
+    form = _as_type(text, kind) if kind else _as_behaviour(text)
+    return form if re.search(pattern, form) and form != text else None
+
+
+def _as_type(text: str, kind: str) -> str:
+    package, *middle, name = [*_SEPARATORS.split(text.strip()), '']
+    name = middle.pop() if middle else name
+    is_other = any(part in _KINDS and part != kind for part in middle)
+    return '' if is_other or len(middle) > 1 else f'{package}/{kind}/{name}'
+
+
+def _as_behaviour(text: str) -> str:
+    plain = text.strip().removesuffix('()').replace('-', '_').replace('::', ':')
+    module, _, function = plain.rpartition(':')
+    if not module:
+        module, _, function = function.rpartition('.')
+    return f'{module.removesuffix(".py").replace("/", ".")}:{function}'
 
 
 _EXPLANATIONS: dict[str, Callable[[ValidationError], Iterator[StructureFault]]] = {

@@ -12,15 +12,15 @@ from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import MAX_FINDINGS
+from composer.schema import schema_path
 from composer.schema.compiler import Acceptor, SchemaCompiler
 from composer.schema.explanations import explain
-from composer.schema.schema_file import schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.schema.faults import StructureFault
+    from composer.schema.violations import StructureFault
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key, SourceMap
 

@@ -151,7 +151,8 @@ class _Constructor:
                     part, 'bad-merge', 'the merge key << takes a mapping, or a list of them'
                 )
                 continue
-            self._count_up(part, path, len(part.pairs))
+            # An empty mapping counts as well: merging it many times takes time too.
+            self._count_up(part, path, max(1, len(part.pairs)))
             merged = MappingNode(None, part.span)
             for key_node, value_node in part.pairs:
                 known = isinstance(key_node, ScalarNode) and key_node.text in data

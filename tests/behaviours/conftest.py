@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture
 def face(node):
     """Return the face of a live node for one entity."""
-    from composer.runtime.nodes.node import Node
+    from composer.runtime.nodes.behaviour_node import Node
 
     return Node(node, SimpleNamespace(), {}, lambda code: None)
 

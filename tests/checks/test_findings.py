@@ -11,10 +11,10 @@ import pytest
 import composer
 from composer.checks.checker import check_files, check_system
 from composer.cli.file_selection import select_files
-from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
+from composer.rules import Severity
 
 DATA = Path(__file__).parents[1] / 'data'
 INVALID = DATA / 'invalid'

@@ -79,7 +79,7 @@ def test_nothing_is_a_finding(tree, tmp_path):
     assert select('a', '*.yml') == (
         [],
         [
-            ('nothing-to-check', 'a', 'there is no system in this folder'),
+            ('nothing-to-check', 'a', 'no system in this folder'),
             ('nothing-to-check', '*.yml', 'no file matches this pattern'),
         ],
     )
@@ -88,7 +88,7 @@ def test_nothing_is_a_finding(tree, tmp_path):
 def test_named_files_can_be_passed_over_too(tree):
     tree(one_yaml=SYSTEM, compose_yaml=COMPOSE)
     words = ('one.yaml', 'compose.yaml', 'missing.yaml')
-    assert select(*words, skip_foreign=True) == (['one.yaml', 'missing.yaml'], [])
+    assert select(*words, skip_other_files=True) == (['one.yaml', 'missing.yaml'], [])
 
 
 def test_standard_input_is_a_dash():
@@ -152,7 +152,7 @@ def test_an_empty_word_is_not_the_working_folder(tree):
 
 def test_a_name_that_is_too_long_is_a_missing_file():
     assert select('a' * 5000) == (['a' * 5000], [])
-    assert select('a' * 5000, skip_foreign=True) == (['a' * 5000], [])
+    assert select('a' * 5000, skip_other_files=True) == (['a' * 5000], [])
 
 
 def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):

@@ -29,7 +29,7 @@ def test_it_draws_mermaid_by_itself(robot, capsys):
     assert run(['graph', 'robot.yaml', 'name:=arm']) == 0
     captured = capsys.readouterr()
     assert captured.out.startswith('flowchart LR\n  n0(["arm_0"]):::node\n')
-    assert captured.err == '1 warning in 1 file: they are in the drawing\n'
+    assert captured.err == '1 warning in 1 file, marked in the drawing\n'
 
 
 def test_arguments_layers_and_settings_count(robot, capsys):

@@ -104,9 +104,9 @@ def test_show_prints_the_comment_on_a_service(run):
         ('std_mgs/msg/Header', "did you mean 'std_msgs/msg/Header'?"),
         (
             'std_msgs',
-            "'std_msgs' is a package: 'composer interfaces list std_msgs' shows what it has",
+            "'std_msgs' is a package: 'composer interfaces list std_msgs' shows its interfaces",
         ),
-        ('std_msgs/msg/Qqqqqq', "'composer interfaces list std_msgs' shows what it has"),
+        ('std_msgs/msg/Qqqqqq', "'composer interfaces list std_msgs' shows its interfaces"),
         ('nope', "'composer interfaces list' shows all"),
         ('', "'composer interfaces list' shows all"),
     ],

@@ -1,4 +1,4 @@
-"""The command line: what it takes, what it says, and what it exits with."""
+"""The command line: its arguments, output and exit codes."""
 
 import os
 import re
@@ -16,7 +16,7 @@ ROOT = Path(composer.__file__).parents[1]
 GREETER = ROOT / 'configs' / 'greeter.yaml'
 VALID = ROOT / 'tests' / 'data' / 'valid'
 INVALID = ROOT / 'tests' / 'data' / 'invalid'
-EXAMPLES = ROOT / 'composer' / 'examples'
+EXAMPLES = ROOT / 'composer' / 'rules'
 
 # A `sitecustomize` with which nothing of ROS can be imported, as if it were not installed.
 WITHOUT_ROS = """
@@ -81,30 +81,30 @@ def test_each_file_is_named(run):
     assert out == f'{GREETER}: ok, 2 nodes\n{smallest}: ok, 0 nodes\n'
 
 
-def test_a_faulty_file_fails_with_all_that_is_wrong(run):
+def test_a_file_with_errors_fails_with_all_of_them(run):
     folder = EXAMPLES / 'bad-key'
     code, out, err = run('check', folder / 'bad.yaml')
     assert code == 1
-    assert err == '2 faults in 1 file\n'
+    assert err == '2 errors in 1 file\n'
     expected = (folder / 'bad.txt').read_text()
     assert out.replace(f'{folder}/', '') == expected + '\n'
 
 
-def test_faults_of_one_file_do_not_hide_the_others(run):
+def test_errors_of_one_file_do_not_hide_the_others(run):
     version = EXAMPLES / 'unsupported-version' / 'bad.yaml'
     missing = INVALID / 'no_such_file.yaml'
     code, out, err = run('check', version, GREETER, missing)
     assert code == 1
-    assert err == '2 faults in 2 files\n'
+    assert err == '2 errors in 2 files\n'
     assert f'{version}:1:10: error[unsupported-version]: ' in out
     assert f'{GREETER}: ok, 2 nodes\n' in out
     assert f'{missing}: error[unreadable-file]: cannot read the file: No such file' in out
 
 
 @pytest.mark.parametrize('name', ['unreadable-file', 'too-deep', 'yaml-syntax'])
-def test_an_unreadable_file_is_one_fault(run, name):
+def test_an_unreadable_file_is_one_error(run, name):
     code, out, err = run('check', EXAMPLES / name / 'bad.yaml')
-    assert (code, err) == (1, '1 fault in 1 file\n')
+    assert (code, err) == (1, '1 error in 1 file\n')
     assert out.count('error[') == 1
     assert 'Traceback' not in out
 
@@ -204,7 +204,7 @@ def test_wrong_usage_is_exit_code_2(run, arguments):
 def test_a_wrong_level_says_the_right_ones(run):
     _, _, err = run('up', GREETER, '--log-level', 'loud')
     assert err == (
-        "error: 'loud' is no log level\n  help: debug, info, warn, error or fatal, or NODE:=LEVEL\n"
+        "error: 'loud' is not a log level\n  help: use debug, info, warn, error or fatal, or NODE:=LEVEL\n"
     )
 
 
@@ -212,7 +212,7 @@ def test_a_wrong_option_says_the_nearest_right_one_and_where_the_others_stand(ru
     _, _, err = run('show', GREETER, '--orign')
     assert err.startswith("error: no such option '--orign'")
     assert "'--origin'" in err
-    assert err.endswith("\n  help: 'composer show --help' shows how it is used\n")
+    assert err.endswith("\n  help: 'composer show --help' shows the usage\n")
 
 
 @pytest.mark.parametrize('command', ['show', 'graph'])
@@ -273,7 +273,7 @@ def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
     assert (code, out) == (3, '')
     lines = err.splitlines()
     assert lines[0] == (
-        'This is a bug in Composer, not in your file. Please report it with what follows.'
+        'This is a bug in Composer, not in your file. Please report it with the lines below.'
     )
     assert f"  arguments: ['check', '{GREETER}']" in lines
     assert lines[-1].startswith(type(raised).__name__)

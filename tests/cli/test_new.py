@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from composer.cli.main import run
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = {
@@ -73,7 +73,7 @@ def test_nothing_of_the_template_s_name_is_left(project):
     assert not [path for path, text in texts(project).items() if 'my_system' in path + text]
 
 
-def test_the_system_has_no_faults_and_no_warnings(project):
+def test_the_system_has_no_errors_and_no_warnings(project):
     assert run(['check', '--strict', str(project)]) == 0
 
 
@@ -140,8 +140,8 @@ def test_its_tests_fail_if_the_system_does_not_work(project, domain_id):
 def test_a_name_is_one_of_a_ros_package(folder, capsys, name, near):
     assert run(['new', name]) == 2
     assert capsys.readouterr().err == (
-        f"error: '{name}' cannot name a project: a name has lower-case letters, digits and "
-        f"underscores, and begins with a letter\n  help: '{near}', perhaps\n"
+        f"error: '{name}' cannot name a project: use lower-case letters, digits and underscores, "
+        f"starting with a letter\n  help: try '{near}'\n"
     )
     assert not list(folder.iterdir())
 
@@ -154,7 +154,7 @@ def test_a_name_without_any_letter_has_none_near(folder, capsys, name):
 
 def test_a_word_of_python_names_no_project(folder, capsys):
     assert run(['new', 'class']) == 2
-    assert 'it is a word of Python' in capsys.readouterr().err
+    assert 'it is a Python keyword' in capsys.readouterr().err
 
 
 def test_an_empty_folder_is_filled(folder):
@@ -168,8 +168,7 @@ def test_a_folder_with_something_in_it_is_left_alone(folder, capsys):
     (folder / 'my_robot' / '.hidden').write_text('mine')
     assert run(['new', 'my_robot']) == 1
     assert capsys.readouterr().err == (
-        'error: my_robot is there already, and is a folder with something in it\n'
-        '  help: take another name, or move it out of the way\n'
+        'error: my_robot already exists and is not empty\n  help: use another name, or move it\n'
     )
     assert texts(folder / 'my_robot') == {'.hidden': 'mine'}
 
@@ -179,7 +178,7 @@ def test_a_file_or_a_dangling_link_is_left_alone(folder, capsys, is_link):
     path = folder / 'my_robot'
     path.symlink_to('nowhere') if is_link else path.write_text('mine')
     assert run(['new', 'my_robot']) == 1
-    assert 'is there already, and is not a folder' in capsys.readouterr().err
+    assert 'already exists and is not a folder' in capsys.readouterr().err
     assert path.is_symlink() if is_link else path.read_text() == 'mine'
 
 

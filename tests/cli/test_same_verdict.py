@@ -3,21 +3,19 @@
 import pytest
 
 from composer.cli import main as cli
-from composer.diagnostics import Severity
-from composer.rules import RULES
-from composer.rules.examples import examples_folder
+from composer.rules import RULES_FOLDER, Severity, load_rule
 
-FOLDER = examples_folder()
 REFUSED = [
-    pytest.param(path.name, marks=pytest.mark.ros if RULES[path.name].needs else ())
-    for path in sorted(FOLDER.iterdir())
-    if RULES[path.name].severity is Severity.ERROR
+    pytest.param(path.parent.name, marks=pytest.mark.ros if rule.needs else ())
+    for path in sorted(RULES_FOLDER.glob('*/bad.yaml'))
+    for rule in [load_rule(path.parent.name)]
+    if rule.severity is Severity.ERROR
 ]
 
 
 @pytest.mark.parametrize('rule', REFUSED)
 def test_what_check_refuses_is_refused_in_the_same_words(rule, capsys, monkeypatch):
-    monkeypatch.chdir(FOLDER / rule)
+    monkeypatch.chdir(RULES_FOLDER / rule)
     imports = ['--import'] if rule == 'broken-behaviour' else []
     assert cli.run(['check', '--quiet', *imports, 'bad.yaml']) == 1
     said = capsys.readouterr().out

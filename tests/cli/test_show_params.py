@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from composer.cli.main import run
+from composer.ros_parameters.file_reader import parse_parameter_file
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import parse_parameter_file
 
 SYSTEM = """
     version: 1

@@ -4,7 +4,7 @@ import textwrap
 
 import pytest
 
-from composer.checks.checker import check_system, create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.drawing.picture import build_picture
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
@@ -15,16 +15,15 @@ def draw(tmp_path, monkeypatch):
     """Return a function that makes a picture of the text of a file."""
     monkeypatch.chdir(tmp_path)
 
-    def draw(text, *settings, name='robot', layer=None):
+    def draw(text, *set_values, name='robot', layer=None):
         path = tmp_path / f'{name}.yaml'
         path.write_text(textwrap.dedent(text).lstrip())
         layers = [tmp_path / 'site.yaml'] if layer else []
         for each in layers:
             each.write_text(layer)
-        system = load_system(path, layers=layers, settings=settings)
-        catalogue = InterfaceCatalogue()
-        findings = check_system(system, catalogue)
-        return build_picture(create_context(system, catalogue)[0], findings)
+        system = load_system(path, layers=layers, set_values=set_values)
+        context = create_context(system, InterfaceCatalogue())
+        return build_picture(context, check_in_context(system, context))
 
     return draw
 

@@ -8,4 +8,4 @@ def patient(monkeypatch):
     """Let `spin_once` wait for the end of its callback, however long the machine keeps it."""
     from spinning import DEADLINE_SEC
 
-    monkeypatch.setattr('composer.executor.engine.COURTESY_SEC', DEADLINE_SEC)
+    monkeypatch.setattr('composer.executor.spinner.GRACE_SEC', DEADLINE_SEC)

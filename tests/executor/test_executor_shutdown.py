@@ -31,14 +31,6 @@ def test_wait_for_ready_callbacks_raises_after_shutdown(executor: Any) -> None:
         executor.wait_for_ready_callbacks()
 
 
-def test_shutdown_ends_spin_at_once(node: Any, executor: Any) -> None:
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    assert executor.shutdown()
-    thread.join(DEADLINE_SEC)
-    assert not thread.is_alive()
-
-
 def test_shutdown_waits_for_a_callback_and_reports_a_stuck_one(node: Any, executor: Any) -> None:
     let_go = threading.Event()
     began = threading.Event()
@@ -109,15 +101,15 @@ except KeyboardInterrupt:
 def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
     executor: Any, context: Context, monkeypatch: Any
 ) -> None:
-    lane = executor._engine.lane
+    wait_set_thread = executor._spinner.wait_set_thread
     waits: list[int] = []
-    wait = lane._wait
+    wait = wait_set_thread._wait
 
-    def count_and_wait(most_sec: float | None) -> None:
+    def count_and_wait(max_sec: float | None) -> None:
         waits.append(1)
-        wait(most_sec)
+        wait(max_sec)
 
-    monkeypatch.setattr(lane, '_wait', count_and_wait)
+    monkeypatch.setattr(wait_set_thread, '_wait', count_and_wait)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
     wait_for(lambda: waits)
@@ -135,37 +127,37 @@ def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
 def test_spin_once_ends_with_what_ended_right_before_it_waits(
     node: Any, executor: Any, context: Context, monkeypatch: Any, what: str
 ) -> None:
-    engine = executor._engine
-    wait_if = engine.polling.wait_if
+    spinner = executor._spinner
+    wait_if = spinner.poller.wait_if
 
     def wait_later(*arguments: Any) -> None:
         if what == 'context':
             context.handle.shutdown()
-            engine.wake()
+            spinner.wake()
         else:
             executor.shutdown(0)
         wait_if(*arguments)
 
-    monkeypatch.setattr(engine.polling, 'wait_if', wait_later)
+    monkeypatch.setattr(spinner.poller, 'wait_if', wait_later)
     thread = threading.Thread(target=executor.spin_once, daemon=True)
     thread.start()
     thread.join(DEADLINE_SEC)
     assert not thread.is_alive()
 
 
-def test_spin_ends_when_a_signal_ends_the_context_during_a_look_at_events(
+def test_spin_ends_when_a_signal_ends_the_context_while_events_are_checked(
     node: Any, executor: Any, context: Context, monkeypatch: Any
 ) -> None:
-    lane = executor._engine.lane
-    sweep = lane._sweep
+    wait_set_thread = executor._spinner.wait_set_thread
+    check_events = wait_set_thread._check_events
 
-    def sweep_in_vain() -> None:
-        if lane._default.sources:
+    def check_in_vain() -> None:
+        if wait_set_thread._seldom.sources:
             context.handle.shutdown()  # As rclpy's handler of signals does it.
-            lane._default.due = 0.0
-        sweep()
+            wait_set_thread._seldom.due = 0.0
+        check_events()
 
-    monkeypatch.setattr(lane, '_sweep', sweep_in_vain)
+    monkeypatch.setattr(wait_set_thread, '_check_events', check_in_vain)
     node.create_subscription(Empty, 'looked_at', lambda _: None, 1)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()

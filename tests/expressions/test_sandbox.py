@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from composer.expressions.bounds import MAX_SIZE
+from composer.expressions.limits import MAX_SIZE
 from composer.language.pipeline import load_system_text
 
 TOO_LARGE = [

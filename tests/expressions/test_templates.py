@@ -9,7 +9,8 @@ from jsonschema import Draft202012Validator
 from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system_text
-from composer.schema.structure import schema_path, without_templates
+from composer.schema import schema_path
+from composer.schema.structure import without_templates
 
 HEAD = """
 version: 1

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import (
     ActionDescription,
     FieldDescription,
@@ -33,7 +33,6 @@ def install(prefix: Path, package: str, lines: list[str], **type_ids: int) -> No
                 'type_description': {'type_name': full_name, 'fields': fields},
                 'referenced_type_descriptions': [],
             },
-            'type_hashes': [{'type_name': full_name, 'hash_string': f'RIHS01_{type_id}'}],
         }
         (folder / f'{name}.json').write_text(json.dumps(content))
 
@@ -73,10 +72,8 @@ def test_the_messages_that_old_generators_list_for_services_are_no_services(pref
     assert InterfaceCatalogue([prefix]).names('srv') == ['my_msgs/srv/Ask']
 
 
-def test_a_description_and_its_hash_come_from_the_installed_file(prefix: Path) -> None:
-    catalogue = InterfaceCatalogue([prefix])
-    assert catalogue.describe('my_msgs/msg/Number') == NUMBER
-    assert catalogue.type_hash('my_msgs/msg/Number') == 'RIHS01_6'
+def test_a_description_comes_from_the_installed_file(prefix: Path) -> None:
+    assert InterfaceCatalogue([prefix]).describe('my_msgs/msg/Number') == NUMBER
 
 
 def test_a_file_is_read_once(prefix: Path) -> None:
@@ -84,7 +81,6 @@ def test_a_file_is_read_once(prefix: Path) -> None:
     first = catalogue.describe('my_msgs/msg/Number')
     (prefix / 'share/my_msgs/msg/Number.json').unlink()
     assert catalogue.describe('my_msgs/msg/Number') is first
-    assert catalogue.type_hash('my_msgs/msg/Number') == 'RIHS01_6'
 
 
 @pytest.mark.parametrize(
@@ -105,21 +101,16 @@ def test_what_has_no_readable_description_is_none(prefix: Path, name: str) -> No
     assert InterfaceCatalogue([prefix]).describe(name) is None
 
 
-@pytest.mark.parametrize('name', ['my_msgs/msg/Missing', 'my_msgs/msg/Bent', 'Number'])
-def test_what_has_no_readable_hash_is_none(prefix: Path, name: str) -> None:
-    assert InterfaceCatalogue([prefix]).type_hash(name) is None
-
-
 def test_the_first_prefix_with_a_package_counts(prefix: Path, tmp_path: Path) -> None:
     install(tmp_path / 'two', 'my_msgs', ['msg/Number.msg'], Number=11)
+    other = MessageDescription(NUMBER.name, (FieldDescription('data', FieldType('float64')),))
     listed_first = InterfaceCatalogue([tmp_path / 'two', prefix])
     listed_first.packages()
     for catalogue in (InterfaceCatalogue([tmp_path / 'two', prefix]), listed_first):
-        assert catalogue.type_hash('my_msgs/msg/Number') == 'RIHS01_11'
+        assert catalogue.describe('my_msgs/msg/Number') == other
         assert catalogue.names('msg') == ['my_msgs/msg/Number']
-    assert InterfaceCatalogue([prefix, tmp_path / 'two']).type_hash('my_msgs/msg/Number') == (
-        'RIHS01_6'
-    )
+    own_first = InterfaceCatalogue([prefix, tmp_path / 'two'])
+    assert own_first.describe('my_msgs/msg/Number') == NUMBER
 
 
 def test_added_descriptions_count_before_installed_ones(prefix: Path) -> None:
@@ -127,7 +118,6 @@ def test_added_descriptions_count_before_installed_ones(prefix: Path) -> None:
     other = MessageDescription('my_msgs/msg/Number', ())
     catalogue.add(other)
     assert catalogue.describe('my_msgs/msg/Number') is other
-    assert catalogue.type_hash('my_msgs/msg/Number') is None
     assert catalogue.names('msg', 'my_msgs').count('my_msgs/msg/Number') == 1
 
 
@@ -146,17 +136,6 @@ def test_without_ros_there_is_nothing_and_that_is_no_error(tmp_path: Path) -> No
     assert not catalogue.available
     assert catalogue.packages() == catalogue.names('msg') == []
     assert catalogue.describe('std_msgs/msg/String') is None
-
-
-def test_sourced_prefixes_come_before_that_of_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('AMENT_PREFIX_PATH', '/opt/ros/overlay:/opt/ros/jazzy:')
-    assert default_prefixes() == [
-        Path('/opt/ros/overlay'),
-        Path('/opt/ros/jazzy'),
-        Path(sys.prefix),
-    ]
-    monkeypatch.delenv('AMENT_PREFIX_PATH')
-    assert default_prefixes() == [Path(sys.prefix)]
 
 
 @pytest.mark.ros

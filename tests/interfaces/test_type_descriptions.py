@@ -9,11 +9,7 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.type_descriptions import (
-    TypeDescriptionError,
-    find_type_hash,
-    parse_type_description,
-)
+from composer.interfaces.type_descriptions import TypeDescriptionError, parse_type_description
 
 
 def field(name: str, number: int, **others: Any) -> dict[str, Any]:
@@ -31,10 +27,6 @@ def document(name: str, *fields: dict[str, Any], parts: tuple[str, ...] = ()) ->
                 for part in parts
             ],
         },
-        'type_hashes': [
-            {'type_name': 'other/msg/Other', 'hash_string': 'RIHS01_other'},
-            {'type_name': name, 'hash_string': 'RIHS01_own'},
-        ],
     }
 
 
@@ -145,13 +137,3 @@ def test_a_type_that_definitions_do_not_have_is_refused(number: int) -> None:
 def test_a_document_of_another_shape_is_refused(content: dict[str, Any]) -> None:
     with pytest.raises(TypeDescriptionError):
         parse_type_description(content)
-
-
-def test_the_hash_is_that_of_the_interface_itself() -> None:
-    assert find_type_hash(document('my_msgs/msg/All')) == 'RIHS01_own'
-
-
-@pytest.mark.parametrize('hashes', [[], [{'type_name': 'other/msg/Other'}], None])
-def test_a_document_without_the_hash_is_refused(hashes: object) -> None:
-    with pytest.raises(TypeDescriptionError):
-        find_type_hash({**document('my_msgs/msg/All'), 'type_hashes': hashes})

@@ -5,9 +5,9 @@ import textwrap
 import pytest
 
 from composer.checks.checker import check_system
-from composer.diagnostics import Severity
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
+from composer.rules import Severity
 
 ARM = """
 version: 1

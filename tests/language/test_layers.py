@@ -4,9 +4,9 @@ import textwrap
 
 import pytest
 
-from composer.diagnostics import Severity
 from composer.errors import UsageError
 from composer.language.pipeline import load_system
+from composer.rules import Severity
 
 BASE = """
     version: 1
@@ -36,8 +36,8 @@ def write(tmp_path, monkeypatch):
     return write
 
 
-def load(paths, *settings, words=None):
-    return load_system(paths[0], words, layers=paths[1:], settings=settings)
+def load(paths, *set_values, words=None):
+    return load_system(paths[0], words, layers=paths[1:], set_values=set_values)
 
 
 def test_mappings_merge_and_all_else_replaces(write):

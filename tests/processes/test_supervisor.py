@@ -103,16 +103,16 @@ def children(pid):
     return found
 
 
-def guardians(child):
-    """Return the guardian of a system, and the second one, which is its parent."""
+def reapers(child):
+    """Return the reaper of a system, and the second one, which is its parent."""
 
     def among_children(parent):
         lines = command_lines()
-        return [pid for pid in children(parent) if b'runtime/guardian.py' in lines.get(pid, b'')]
+        return [pid for pid in children(parent) if b'processes/reaper.py' in lines.get(pid, b'')]
 
     (second,) = among_children(child._process.pid)
-    (guardian,) = among_children(second)
-    return guardian, second
+    (reaper,) = among_children(second)
+    return reaper, second
 
 
 def system(processes, nodes=None, **keys):
@@ -184,83 +184,83 @@ def test_nothing_is_left_after_a_second_signal(compose, stubborn):
 
 def test_nothing_is_left_after_the_death_of_composer(compose, stubborn, wait_for, scratch):
     child = compose_stubborn(compose, stubborn)
-    helpers = guardians(child)
+    helpers = reapers(child)
     child.stop(signal.SIGKILL)
 
     wait_for(lambda: not stubborn.left(), 'the end of all processes')
-    wait_for(lambda: not {*helpers} & {*command_lines()}, 'the end of the guardians')
+    wait_for(lambda: not {*helpers} & {*command_lines()}, 'the end of the reapers')
     assert list(scratch.iterdir()) == []
 
 
-def test_nothing_is_left_after_the_death_of_composer_and_the_guardian(
+def test_nothing_is_left_after_the_death_of_composer_and_the_reaper(
     compose, stubborn, wait_for, scratch
 ):
     child = compose_stubborn(compose, stubborn)
-    guardian, _ = guardians(child)
-    os.kill(guardian, signal.SIGSTOP)
+    reaper, _ = reapers(child)
+    os.kill(reaper, signal.SIGSTOP)
     child.send(signal.SIGSTOP)
-    os.kill(guardian, signal.SIGKILL)
+    os.kill(reaper, signal.SIGKILL)
     child.stop(signal.SIGKILL)
 
     wait_for(lambda: not stubborn.left(), 'the end of all processes')
     wait_for(lambda: not list(scratch.iterdir()), 'the end of what is temporary')
 
 
-def test_a_process_dies_with_composer_and_both_guardians(compose, stubborn, wait_for):
+def test_a_process_dies_with_composer_and_both_reapers(compose, stubborn, wait_for):
     child = compose_stubborn(compose, stubborn, ['plain', 'deaf', 'asleep', 'mute'])
-    guardian, second = guardians(child)
+    reaper, second = reapers(child)
     child.send(signal.SIGSTOP)
-    for pid in (guardian, second):
+    for pid in (reaper, second):
         os.kill(pid, signal.SIGSTOP)
-    for pid in (second, guardian):
+    for pid in (second, reaper):
         os.kill(pid, signal.SIGKILL)
     child.stop(signal.SIGKILL)
 
     wait_for(lambda: not stubborn.left(), 'the end of all processes')
 
 
-def test_the_death_of_the_guardian_ends_the_system(compose, stubborn):
+def test_the_death_of_the_reaper_ends_the_system(compose, stubborn):
     child = compose_stubborn(compose, stubborn)
-    guardian, _ = guardians(child)
-    os.kill(guardian, signal.SIGKILL)
+    reaper, _ = reapers(child)
+    os.kill(reaper, signal.SIGKILL)
 
     assert child.wait() == 1
-    assert child.matching('the guardian of the processes was killed, and so were they')
+    assert child.matching('the process reaper was killed, and all external processes with it')
     assert stubborn.left() == {}
 
 
-def test_the_second_guardian_is_not_needed_for_a_clean_stop(compose, stubborn, wait_for):
+def test_the_second_reaper_is_not_needed_for_a_clean_stop(compose, stubborn, wait_for):
     child = compose_stubborn(compose, stubborn, ['plain', 'daemon', 'nameless'])
-    guardian, second = guardians(child)
+    reaper, second = reapers(child)
     os.kill(second, signal.SIGKILL)
 
     assert child.stop() == 0
     assert stubborn.left() == {}
-    wait_for(lambda: guardian not in command_lines(), 'the end of the guardian')
+    wait_for(lambda: reaper not in command_lines(), 'the end of the reaper')
 
 
-def test_a_guardian_that_hangs_is_ended_by_the_second_one(compose, stubborn, wait_for, scratch):
+def test_a_reaper_that_hangs_is_ended_by_the_second_one(compose, stubborn, wait_for, scratch):
     child = compose_stubborn(compose, stubborn)
-    guardian, second = guardians(child)
-    os.kill(guardian, signal.SIGSTOP)
+    reaper, second = reapers(child)
+    os.kill(reaper, signal.SIGSTOP)
     child.stop(signal.SIGKILL)
 
     wait_for(lambda: not stubborn.left(), 'the end of all processes')
-    wait_for(lambda: second not in command_lines(), 'the end of the second guardian')
+    wait_for(lambda: second not in command_lines(), 'the end of the second reaper')
     assert list(scratch.iterdir()) == []
 
 
-def test_nothing_marked_is_left_after_the_death_of_both_guardians(compose, stubborn):
-    # What has left its session and emptied its environment is known to the guardians alone.
+def test_nothing_marked_is_left_after_the_death_of_both_reapers(compose, stubborn):
+    # What has left its session and emptied its environment is known to the reapers alone.
     kinds = [kind for kind in KINDS if kind != 'nameless']
     child = compose_stubborn(compose, stubborn, kinds)
-    both = guardians(child)
+    both = reapers(child)
     for number in (signal.SIGSTOP, signal.SIGKILL):
         for pid in both:
             os.kill(pid, number)
 
     assert child.wait() == 1
-    assert child.matching('the guardian of the processes was killed, and so were they')
+    assert child.matching('the process reaper was killed, and all external processes with it')
     assert stubborn.left() == {}
 
 
@@ -325,7 +325,7 @@ def test_a_process_is_stopped_by_the_signal_that_it_wants(compose, name):
 
 
 def test_signals_that_composer_ignores_reach_the_process(compose):
-    # Python ignores SIGPIPE, and the guardian SIGINT and SIGTERM.
+    # Python ignores SIGPIPE, and the reaper SIGINT and SIGTERM.
     command = shell('grep -E "^Sig(Ign|Blk)" /proc/self/status')
     child = compose(system({'driver': {'command': command}}))
     child.wait_for_line('exit code 0')
@@ -480,7 +480,7 @@ def test_restart_is_for_the_ends_that_it_names(compose, when, end, runs):
             {'command': ['./empty.bin']},
             "cannot be started: './empty.bin': Exec format error",
         ),
-        ({'command': ['echo', 'a\0b']}, "'a\\x00b' has a null character in it"),
+        ({'command': ['echo', 'a\0b']}, "'a\\x00b' contains a null character"),
     ],
 )
 def test_a_process_that_cannot_be_started_ends_the_start(compose, stubborn, process, message):

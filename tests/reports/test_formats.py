@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import composer
-from composer.diagnostics import Diagnostic, Related, Severity, SourceFile, Span
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span
 from composer.reports import FORMATS, render_report
 from composer.reports.report import CheckedFile, Report, relative_path
 from composer.reports.text import render_files
@@ -27,9 +27,7 @@ ERROR = Diagnostic(
     help='write rover',
     related=(Related('here too', Span(SOURCE, 1, 1, 7)),),
 )
-WARNING = Diagnostic(
-    'unused-ignore', 'remove it', SOURCE.name, Span(SOURCE, 2, 7, 0), Severity.WARNING
-)
+WARNING = Diagnostic('unused-ignore', 'remove it', SOURCE.name, Span(SOURCE, 2, 7, 0))
 PLACELESS = Diagnostic('unreadable-file', 'cannot read the file', 'lander.yaml')
 REPORT = Report(
     (
@@ -392,7 +390,7 @@ def test_a_junit_report_has_a_case_for_each_file():
         'fine.yaml',
     ]
     (failure,) = suite[0]
-    assert failure.get('message') == '1 fault and 1 warning in 1 file'
+    assert failure.get('message') == '1 error and 1 warning in 1 file'
     assert failure.get('type') == 'unused-ignore, bad-name'
     assert 'robots/rover.yaml:3:3: error[bad-name]: ' in failure.text
     assert len(suite[2]) == 0

@@ -9,20 +9,20 @@ from composer.reports.text import render_finding
 def excerpt(line, column, length=1):
     """Return the line as it is shown and the line with the carets, without their margins."""
     span = Span(SourceFile('a.yaml', (line,)), 1, column, length)
-    _, shown, carets = render_finding(diagnostic_at(span, 'rule', 'message')).splitlines()
+    _, shown, carets = render_finding(diagnostic_at(span, 'bad-name', 'message')).splitlines()
     return shown.removeprefix('  1 | '), carets.removeprefix('    | ')
 
 
 def test_a_finding_without_a_place_names_the_file():
-    assert render_finding(Diagnostic('rule', 'message', 'a.yaml', help='do so')) == (
-        'a.yaml: error[rule]: message\n  help: do so'
+    assert render_finding(Diagnostic('bad-name', 'message', 'a.yaml', help='do so')) == (
+        'a.yaml: error[bad-name]: message\n  help: do so'
     )
 
 
 def test_an_empty_line_is_not_shown():
     span = Span(SourceFile('a.yaml', ('', '   ')), 2, 1)
-    assert render_finding(diagnostic_at(span, 'rule', 'message')) == (
-        'a.yaml:2:1: error[rule]: message'
+    assert render_finding(diagnostic_at(span, 'bad-name', 'message')) == (
+        'a.yaml:2:1: error[bad-name]: message'
     )
 
 
@@ -52,7 +52,7 @@ def test_of_a_long_line_the_surroundings_of_the_fault_are_shown(column):
 
 def test_what_a_terminal_would_obey_is_escaped():
     span = Span(SourceFile('a.yaml', ('a',)), 1, 1)
-    finding = diagnostic_at(span, 'rule', 'one\n\x1b[31mtwo', help="write '\x07'")
+    finding = diagnostic_at(span, 'bad-name', 'one\n\x1b[31mtwo', help="write '\x07'")
     lines = render_finding(finding).splitlines()
-    assert lines[0] == r'a.yaml:1:1: error[rule]: one\n\x1b[31mtwo'
+    assert lines[0] == r'a.yaml:1:1: error[bad-name]: one\n\x1b[31mtwo'
     assert lines[-1] == r"  help: write '\x07'"

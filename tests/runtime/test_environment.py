@@ -1,4 +1,4 @@
-"""`environment:` holds for ROS, for behaviours and for foreign processes, and is taken back."""
+"""`environment:` holds for ROS, for behaviours and for external processes, and is restored at the end."""
 
 import os
 import subprocess

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from composer.language.pipeline import load_system_text
+from composer.schema import schema_path
 from composer.schema.compiler import SchemaCompiler
-from composer.schema.structure import schema_path, without_templates
+from composer.schema.structure import without_templates
 from composer.schema.validator import create_validator
 
 SCHEMA = json.loads(schema_path().read_text())

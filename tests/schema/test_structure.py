@@ -6,7 +6,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from composer.language.pipeline import load_system_text
-from composer.schema.schema_file import schema_path
+from composer.schema import schema_path
 
 HEAD = 'version: 1\n'
 

@@ -13,7 +13,7 @@ from jinja2 import StrictUndefined, TemplateError, nodes
 
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
-from composer.interfaces.values import unknown_field
+from composer.interfaces.field_errors import unknown_field
 from composer.names import did_you_mean
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import composer
 from composer.interfaces.descriptions import MessageDescription
-from composer.interfaces.values import unknown_field
+from composer.interfaces.field_errors import unknown_field
 from composer.python_source.module_finder import MissingModule
 
 if TYPE_CHECKING:

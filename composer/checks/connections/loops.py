@@ -7,9 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.cycles import find_cycles
-from composer.diagnostics import Severity
 from composer.python_source.modules import FunctionKind, ModuleSource
-from composer.python_source.returns import always_answers
+from composer.python_source.return_values import always_answers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -46,10 +45,10 @@ def check_loops(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
     reported: set[str] = set()
     for loop in _find_loops(plain):
         reported |= {relay.heard for relay in loop}
-        yield _explain(context, loop, 'relay-loop', Severity.ERROR)
+        yield _explain(context, loop, 'relay-loop')
     for loop in _find_loops(relays):
         if not reported & {relay.heard for relay in loop}:
-            yield _explain(context, loop, 'message-loop', Severity.WARNING)
+            yield _explain(context, loop, 'message-loop')
 
 
 def _find_relays(context: CheckContext, graph: Graph) -> Iterator[_Relay]:
@@ -81,9 +80,7 @@ def _find_loops(relays: Iterable[_Relay]) -> Iterator[list[_Relay]]:
         yield [by_edge[pair] for pair in pairwise(ring)]
 
 
-def _explain(
-    context: CheckContext, loop: list[_Relay], rule: str, severity: Severity
-) -> Diagnostic:
+def _explain(context: CheckContext, loop: list[_Relay], rule: str) -> Diagnostic:
     first, *others = loop
     names = [relay.heard for relay in loop]
     way = ' → '.join([*names, names[0]])
@@ -92,7 +89,6 @@ def _explain(
         rule,
         f'each message runs in a circle for ever: {way}',
         help='publish on another topic, or let a behaviour return None where it ends',
-        severity=severity,
         related=[
             context.related(relay.end.path, f"{relay.end} passes it on to '{relay.published}'")
             for relay in others

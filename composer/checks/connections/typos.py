@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import build_graph, full_name
 from composer.checks.connections.waits import waiters
-from composer.diagnostics import Severity
 from composer.language.specs import REENTRANT
 from composer.names import count_slips, expand_name, with_article
 
@@ -86,7 +85,6 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
                 _RULE,
                 f"{with_article(condition.kind)} '{name}' is nowhere in this system",
                 help=f"did you mean '{meant}'?",
-                severity=Severity.WARNING,
             )
 
 
@@ -140,7 +138,6 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
                     _RULE,
                     f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
                     help=f"did you mean '{_as_written(bare, near, node.namespace)}'?",
-                    severity=Severity.WARNING,
                 )
     yield from (finding for span, finding in slips.items() if span not in matching)
 
@@ -160,5 +157,4 @@ def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:
                     _RULE,
                     f"'{group}' is a group of its own, whose members never run at the same time",
                     help=f"did you mean '{REENTRANT}'?",
-                    severity=Severity.WARNING,
                 )

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import is_doubtful
-from composer.diagnostics import Severity
 from composer.names import suggest
 
 if TYPE_CHECKING:
@@ -81,7 +80,6 @@ def _explain(
         rule,
         message.format(channel.name),
         help=f"did you mean '{near}'? Otherwise {help_text}" if near else help_text,
-        severity=Severity.WARNING,
     )
 
 

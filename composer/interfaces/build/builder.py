@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from composer.ament import INTERFACE_INDEX, find_package
 from composer.errors import ComposerError
 from composer.interfaces.build.compilation import BuildPlan, plan_jobs, write_generation_arguments
 from composer.interfaces.build.jobs import JobError, run_jobs
 from composer.interfaces.build.toolchain import find_toolchain
 from composer.interfaces.definitions.package_folder import PackageDefinitions
-from composer.interfaces.definitions.references import used_packages
-from composer.interfaces.prefixes import INTERFACE_INDEX, find_package_prefix
+from composer.interfaces.definitions.packages import used_packages
 
 _SHOWN_LINES = 20
 
@@ -65,7 +65,7 @@ class Dependencies:
         Raises:
             DependencyMissingError: it is not there.
         """
-        place = self.built.get(package) or find_package_prefix(package, self.prefixes)
+        place = self.built.get(package) or find_package(package, self.prefixes, INTERFACE_INDEX)
         if place is None:
             message = f'the interface package {package!r} is not installed'
             release = f'ros-$ROS_DISTRO-{package.replace("_", "-")}'

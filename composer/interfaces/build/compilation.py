@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from composer.ament import find_path
 from composer.interfaces.build import generation
 from composer.interfaces.build.jobs import Job
 from composer.interfaces.build.toolchain import Toolchain
-from composer.interfaces.prefixes import find_path
 
 # -w: warnings on generated code help nobody. NDEBUG leaves out comparisons of constants.
 _COMPILE_FLAGS = ('-fPIC', '-O1', '-w', '-pipe', '-DNDEBUG')

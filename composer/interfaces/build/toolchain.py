@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from composer.ament import find_path
 from composer.errors import ComposerError
-from composer.interfaces.prefixes import find_path
 
 # In the order of their work; the last five write sources that are compiled.
 GENERATORS = (

@@ -11,6 +11,11 @@ from pathlib import Path
 from typing import Final
 
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
+from composer.interfaces.definitions.definition_parser import (
+    SyntaxFault,
+    load_parser,
+    parse_message,
+)
 from composer.interfaces.definitions.statement_rules import check_statement, find_message
 from composer.interfaces.definitions.statements import (
     SEPARATOR,
@@ -19,7 +24,6 @@ from composer.interfaces.definitions.statements import (
     is_near_separator,
     split_sections,
 )
-from composer.interfaces.definitions.syntax import SyntaxFault, load_parser, parse_message
 from composer.interfaces.descriptions import (
     ActionDescription,
     InterfaceDescription,

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from composer.diagnostics import Diagnostic, Span, diagnostic_at
+from composer.interfaces.definitions.definition_parser import SyntaxFault, load_parser, parse_value
 from composer.interfaces.definitions.statements import Statement
-from composer.interfaces.definitions.syntax import SyntaxFault, load_parser, parse_value
 from composer.names import suggest
 
 FLOAT32_MAX: Final = (2 - 2**-23) * 2.0**127

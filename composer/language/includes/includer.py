@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Severity, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
@@ -140,7 +140,6 @@ class Includer:
                     f"'{name}' is not set: only the environment of the file that is started "
                     'counts',
                     help="set it in that file, or for a process under 'env'",
-                    severity=Severity.WARNING,
                 )
 
 

@@ -13,17 +13,15 @@ from threading import get_ident
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from composer.executor.forks import end_child
+from composer.executor.after_fork import end_child
 from composer.python_source.modules import FunctionKind
-from composer.runtime import forks
-from composer.runtime.behaviours.functions import kind_of
+from composer.runtime import forked_children
+from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.stacks import format_coroutine, format_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import CoroutineType
-
-    from composer.runtime.health.statistics import CallTimes
 
 
 class Pace:
@@ -154,7 +152,7 @@ class BehaviourCall:
         function: Called with the callback's arguments.
         deliver: Takes what the function returned.
         failed: Takes what it raised.
-        times: Hears how long each call took; `None` measures nothing.
+        add_time: Takes how long each call took, in nanoseconds; `None` measures nothing.
         admits: Asked right before the function is called, when the call is in the ledger already:
             whoever closes a gate and then looks into the ledger misses no call. `None` for always.
         pace: Of a function that hands out intermediate results.
@@ -164,6 +162,7 @@ class BehaviourCall:
     """
 
     __slots__ = (
+        '_add_time',
         '_admits',
         '_deliver',
         '_failed',
@@ -171,7 +170,6 @@ class BehaviourCall:
         '_ledger',
         '_owner',
         '_pace',
-        '_times',
         'run',
     )
 
@@ -183,7 +181,7 @@ class BehaviourCall:
         *,
         deliver: Callable[[Any], None],
         failed: Callable[[str, BaseException], None],
-        times: CallTimes | None = None,
+        add_time: Callable[[int], None] | None = None,
         admits: Callable[[], bool] | None = None,
         pace: Pace | None = None,
     ) -> None:
@@ -194,7 +192,7 @@ class BehaviourCall:
         self._ledger = ledger
         self._deliver = deliver
         self._failed = failed
-        self._times = times
+        self._add_time = add_time
         self.run: Callable[..., bool] = self._compile()
 
     def delivering(
@@ -207,7 +205,7 @@ class BehaviourCall:
             self._ledger,
             deliver=deliver,
             failed=self._failed,
-            times=self._times,
+            add_time=self._add_time,
             admits=self._admits,
             pace=pace,
         )
@@ -228,8 +226,7 @@ class BehaviourCall:
             self._failed,
         )
         ledger, entries, tokens = self._ledger, self._ledger.entries, self._ledger.tokens
-        add_time = None if self._times is None else self._times.add
-        admits, pace = self._admits, self._pace
+        admits, pace, add_time = self._admits, self._pace, self._add_time
         now_ns, get_thread = monotonic_ns, get_ident
 
         def call_behaviour(*arguments: Any) -> bool:
@@ -240,11 +237,11 @@ class BehaviourCall:
                 if admits is not None and not admits():
                     return False
                 result = function(*arguments)
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 deliver(result)
             except BaseException as error:  # noqa: BLE001 - it never takes another node down
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 failed(owner, error)
                 return False
@@ -260,7 +257,7 @@ class BehaviourCall:
         return call_behaviour
 
     def _compile_async(self) -> Callable[..., Any]:
-        ledger, times = self._ledger, self._times
+        ledger, add_time = self._ledger, self._add_time
 
         async def await_behaviour(*arguments: Any) -> None:
             begun_ns = monotonic_ns()
@@ -274,24 +271,24 @@ class BehaviourCall:
                     coroutine.close()
                     return
                 result = await coroutine
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child()
                 self._deliver(result)
             except BaseException as error:
-                if forks.in_child:
+                if forked_children.in_child:
                     end_child(error)
                 if _comes_from_outside(error):
                     # The executor drops the coroutine; to go on would be an error of Python's.
                     raise
                 self._failed(self._owner, error)
             finally:
-                if times is not None:
-                    times.add(monotonic_ns() - begun_ns)
+                if add_time is not None:
+                    add_time(monotonic_ns() - begun_ns)
                 if token is not None:
                     ledger.end(token)
 
         # A child goes on in the executor whenever its coroutine waits.
-        forks.coroutine_codes.add(await_behaviour.__code__)
+        forked_children.coroutine_codes.add(await_behaviour.__code__)
         return await_behaviour
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _SUSPENDABLE = (CoroutineType, GeneratorType, AsyncGeneratorType)
 _FRAMES = ('cr_frame', 'gi_frame', 'ag_frame')
 _AWAITED = ('cr_await', 'gi_yieldfrom', 'ag_await')
-_OWN_FOLDER = str(Path(__file__).resolve().parents[1])
+_OWN_FOLDER = str(Path(__file__).resolve().parents[2])
 # What calls behaviours; the frames outside of it say nothing about them.
 _WRAPPER = str(Path(__file__).resolve().with_name('calls.py'))
 _MOST_FRAMES = 200

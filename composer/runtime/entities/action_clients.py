@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections import deque
 from functools import partial
@@ -21,32 +20,18 @@ from composer.errors import (
 )
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
-from composer.runtime.behaviours.functions import kind_of
-from composer.runtime.behaviours.waiting import stopping_error
+from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.messages.payloads import converter_for
+from composer.runtime.nodes.goals import Goal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
     from composer.language.specs import ActionClientSpec, BehaviourSpec
+    from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.runtime.nodes.node import Payload
 
-_STATUS_NAMES = {
-    GoalStatus.STATUS_UNKNOWN: 'unknown',
-    GoalStatus.STATUS_ACCEPTED: 'accepted',
-    GoalStatus.STATUS_EXECUTING: 'executing',
-    GoalStatus.STATUS_CANCELING: 'canceling',
-    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
-    GoalStatus.STATUS_CANCELED: 'canceled',
-    GoalStatus.STATUS_ABORTED: 'aborted',
-}
-
-# What a wait for feedback gets when a stop is requested.
-_STOPPED = object()
 # The middleware's default of 10 loses what comes faster than it is taken.
 _QOS = QoSProfile(depth=1000)
 
@@ -55,7 +40,7 @@ def create_action_clients(node: LiveNode) -> None:
     """Create the clients; behaviours reach them through `node.send_goal`."""
     for spec in node.spec.action_clients.values():
         client = ActionClient(node, spec)
-        node.action_clients[spec.name] = client
+        node.entities['action_clients'][spec.name] = client
         node.at_destruction.append(client.destroy)
 
 
@@ -89,7 +74,7 @@ class ActionClient:
         if not waits.until_true(self._client.server_is_ready, timeout_sec):
             text = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
             raise ActionNotAvailableError(text)
-        goal = Goal(self._name, self._node)
+        goal = Goal(self._name, self._node.waits, self._node.coroutine_waits)
         future = self._client.send_goal_async(message, partial(self._take_feedback, goal))
         left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
         if not waits.until_done(future, left):
@@ -111,7 +96,9 @@ class ActionClient:
         goal.heard.put(None)
         if future.done() and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
-                self._node.face.logger.warning(f"the goal of '{self._name}' was {goal.status}")
+                self._node.behaviour_node.logger.warning(
+                    f"the goal of '{self._name}' was {goal.status}"
+                )
             self._result.put(response.result)
 
 
@@ -173,81 +160,6 @@ class _Client(RosActionClient):
         await super().execute(taken_data)
 
 
-class Goal:
-    """A goal that a server has accepted.
-
-    Attributes:
-        heard: The feedback that has come, then `None` when the goal has ended.
-    """
-
-    def __init__(self, name: str, node: LiveNode) -> None:
-        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._name = name
-        self._node = node
-        self._handle: Any = None
-        self.result_future: Any = None
-
-    def begin(self, handle: Any) -> None:
-        """Take the handle of the accepted goal, and ask for its result."""
-        self._handle = handle
-        self.result_future = handle.get_result_async()
-
-    @property
-    def status(self) -> str:
-        """How the goal is: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
-        if self.result_future.done():
-            return _STATUS_NAMES[self.result_future.result().status]
-        return 'executing'
-
-    @property
-    def feedback(self) -> Iterator[Any]:
-        """The feedback messages as they come, until the goal has ended; each comes once.
-
-        Raises:
-            SystemStoppingError: A stop was requested while it waited for the next one.
-        """
-        while (message := self._next_feedback()) is not None:
-            yield message
-        self.heard.put(None)
-
-    def _next_feedback(self) -> Any:
-        waits = self._node.waits
-        with waits.stop.waking(lambda: self.heard.put(_STOPPED)), waits.make_room():
-            message = self.heard.get()
-        if message is _STOPPED:
-            raise stopping_error()
-        return message
-
-    def cancel(self, timeout: float | None = 5.0) -> bool:
-        """Ask the server to cancel the goal; return whether it agreed.
-
-        Raises:
-            GoalTimeoutError: It did not answer within `timeout` seconds.
-        """
-        future = self._handle.cancel_goal_async()
-        if not self._node.waits.until_done(future, timeout):
-            message = f"the server of '{self._name}' did not answer the request to cancel"
-            raise GoalTimeoutError(message)
-        return bool(future.result().goals_canceling)
-
-    def result(self, timeout: float | None = None) -> Any:
-        """Wait for the end of the goal, and return its result message; `status` says how it ended.
-
-        Raises:
-            GoalTimeoutError: It did not end within `timeout` seconds.
-            SystemStoppingError: A stop was requested while it waited.
-        """
-        if not self._node.waits.until_done(self.result_future, timeout):
-            message = f"the goal of '{self._name}' did not end within {timeout:g} s"
-            raise GoalTimeoutError(message)
-        return self.result_future.result().result
-
-    async def result_async(self) -> Any:
-        """As `result`, without holding a thread while it waits."""
-        await self._node.coroutine_waits.until_done(self.result_future, None)
-        return self.result_future.result().result
-
-
 class _Hearing:
     """Calls a behaviour for each item, as one of the node's own callbacks.
 
@@ -264,7 +176,7 @@ class _Hearing:
         call = node.call(
             owner,
             behaviour.path,
-            partial(function, node.face, **behaviour.arguments),
+            partial(function, node.behaviour_node, **behaviour.arguments),
             admits=node.gate.lets_events,
         )
         kind = kind_of(function)

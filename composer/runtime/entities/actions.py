@@ -14,8 +14,8 @@ from rclpy.qos import QoSProfile
 
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
+from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.calls import Pace
-from composer.runtime.behaviours.functions import kind_of
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.messages.payloads import converter_for
 
@@ -123,7 +123,7 @@ class _Server(ActionServer):
         answer = answers[0]
         if answer is False or isinstance(answer, str):
             reason = f': {answer}' if answer else ''
-            self._live.face.logger.info(f'{self._owner} refused a goal{reason}')
+            self._live.behaviour_node.logger.info(f'{self._owner} refused a goal{reason}')
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
@@ -132,7 +132,7 @@ class _Server(ActionServer):
         call = self._live.call(
             f'{self._owner} (accept)',
             accept.path,
-            partial(function, self._live.face, **accept.arguments),
+            partial(function, self._live.behaviour_node, **accept.arguments),
             rules=self._spec,
             admits=self._live.gate.lets_requests,
         ).delivering(answers.append)

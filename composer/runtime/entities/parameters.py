@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from composer.errors import StartError
 from composer.python_source.modules import FunctionKind
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
-from composer.runtime.behaviours.functions import kind_of
+from composer.runtime.behaviours.callables import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -138,7 +138,7 @@ class _BehaviourHearing:
         new_values = {change.name: change.value for change in changes}
         answers: list[Any] = []
         function = partial(
-            self._node.function(self._spec), self._node.face, **self._spec.arguments
+            self._node.function(self._spec), self._node.behaviour_node, **self._spec.arguments
         )
         call = self._node.call('on_parameters', self._spec.path, function)
         call = call.delivering(answers.append)

@@ -6,27 +6,28 @@ from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.entities.qos_profiles import create_qos_profile
-from composer.runtime.health.unmatched import Endpoint
+from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
     from composer.language.specs import PublisherSpec
+    from composer.runtime.nodes.behaviour_node import Payload, Publish
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.runtime.nodes.node import Payload, Publish
 
 
 def create_publishers(node: LiveNode) -> None:
-    """Create the node's publishers; behaviours reach them through `node.publishers`."""
+    """Create the node's publishers; behaviours reach them through `node.publish`."""
     for spec in node.spec.publishers.values():
-        node.publishers[spec.name] = _create_publisher(node, spec)
+        node.entities['publishers'][spec.name] = _create_publisher(node, spec)
 
 
 def _create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
     message_class = import_interface(spec.type)
     profile = create_qos_profile(spec.qos, node.services.profiles)
-    events = Endpoint(node, spec, profile).publisher_events()
+    endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
+    node.endpoints.append(endpoint)
     send = node.ros.create_publisher(
-        message_class, spec.topic, profile, event_callbacks=events
+        message_class, spec.topic, profile, event_callbacks=endpoint.publisher_events()
     ).publish
     convert = converter_for(message_class).convert
 

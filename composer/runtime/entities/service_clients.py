@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
     from composer.language.specs import ServiceClientSpec
+    from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.runtime.nodes.node import Payload
 
 
 def create_service_clients(node: LiveNode) -> None:
     """Create the clients; behaviours reach them through `node.call`."""
     for spec in node.spec.service_clients.values():
-        node.service_clients[spec.name] = ServiceClient(node, spec)
+        node.entities['service_clients'][spec.name] = ServiceClient(node, spec)
 
 
 class ServiceClient:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
-from composer.runtime.behaviours.functions import kind_of
+from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.system_executor import NoResponseError

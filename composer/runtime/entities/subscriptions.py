@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.entities.qos_profiles import create_qos_profile
-from composer.runtime.health.unmatched import Endpoint
+from composer.runtime.health.unmatched import TopicEndpoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,13 +28,15 @@ def create_subscriptions(node: LiveNode) -> None:
             admits=node.gate.lets_events,
         )
         profile = create_qos_profile(spec.qos, node.services.profiles)
+        endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
+        node.endpoints.append(endpoint)
         subscription = node.ros.create_subscription(
             import_interface(spec.type),
             spec.topic,
             call.as_callback(),
             profile,
             callback_group=node.group(spec.group),
-            event_callbacks=Endpoint(node, spec, profile).subscription_events(),
+            event_callbacks=endpoint.subscription_events(),
         )
         node.follow(owner, subscription)
 

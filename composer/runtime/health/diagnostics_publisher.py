@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.runtime.behaviours.calls import RunningCall
-    from composer.runtime.health.statistics import HealthBoard
+    from composer.runtime.health.statistics import HealthRegistry
 
 # To write a message holds the interpreter: for a large system, one goes out for so many entities.
 _MOST_STATUSES = 50
@@ -35,7 +35,7 @@ def node_name(system: str) -> str:
     return f'_composer_{re.sub("[^A-Za-z0-9_]+", "_", system)}'[:_LONGEST_NAME]
 
 
-class HealthPublisher:
+class DiagnosticsPublisher:
     """Publishes a system's health while it is started.
 
     Args:
@@ -48,7 +48,7 @@ class HealthPublisher:
         self,
         system: str,
         period_sec: float,
-        board: HealthBoard,
+        board: HealthRegistry,
         overdue: Callable[[], Iterable[tuple[str, RunningCall]]],
     ) -> None:
         self._system = system

@@ -7,16 +7,17 @@ themselves only note when they began.
 from __future__ import annotations
 
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.calls import RunningCall
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from composer.runtime.behaviours.calls import CallLedger
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.behaviours.error_reports import ErrorReporter
 
 _LOOKS_PER_LIMIT = 4
 _SHORTEST_PAUSE_SEC = 0.01
@@ -43,7 +44,7 @@ class HangLimit:
         self.after_sec = after_sec
         self._place = place
         self._warn = warn
-        self._quiet_sec = _QUIET_SEC
+        self._quiet = Backoff(_QUIET_SEC, _LONGEST_QUIET_SEC, recovered_sec=float('inf'))
         self._quiet_until = float('-inf')
         self._unsaid: set[int] = set()
         self._reported: dict[int, int] = {}
@@ -70,8 +71,7 @@ class HangLimit:
         self._unsaid.discard(token)
         others = f' ({len(self._unsaid)} others before it did so too)' if self._unsaid else ''
         self._unsaid.clear()
-        self._quiet_until = now_ns * 1e-9 + self._quiet_sec
-        self._quiet_sec = min(self._quiet_sec * 2, _LONGEST_QUIET_SEC)
+        self._quiet_until = now_ns * 1e-9 + self._quiet.next_delay_sec()
         self._reported[token] = call.since_ns
         self._warn(
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
@@ -86,7 +86,24 @@ class HangLimit:
             self._warn(f'{self._owner} ({self._place}) {what} after {ran_sec:.1f} s')
 
 
-class HangWatch(Watch):
+class WatchedNode(Protocol):
+    """What is looked at of a node.
+
+    Attributes:
+        limits: By the entities in words.
+    """
+
+    @property
+    def ledger(self) -> CallLedger: ...  # noqa: D102
+
+    @property
+    def limits(self) -> Mapping[str, HangLimit]: ...  # noqa: D102
+
+    @property
+    def errors(self) -> ErrorReporter: ...  # noqa: D102
+
+
+class HangWatcher(Watcher):
     """The thread that looks at what runs.
 
     Args:
@@ -95,7 +112,7 @@ class HangWatch(Watch):
     """
 
     def __init__(
-        self, nodes: Callable[[], Iterable[LiveNode]], limits_sec: Iterable[float | None]
+        self, nodes: Callable[[], Iterable[WatchedNode]], limits_sec: Iterable[float | None]
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
         pause_sec = max(shortest / _LOOKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)

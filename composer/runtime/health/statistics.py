@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from composer.executor import Missed
-from composer.runtime.behaviours.error_texts import summarize
+from composer.executor import MissedCounts
+from composer.runtime.behaviours.tracebacks import summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _UNIT_BITS = 8
 _SUB_BITS = 3
 
-_NOTHING = Missed()
+_NOTHING = MissedCounts()
 
 
 class CallTimes:
@@ -109,11 +109,11 @@ class EntityReport:
     times: CallTimes
     errors: int
     last_error: str
-    missed: Missed
+    missed: MissedCounts
     overdue_sec: float
     all_calls: int
     all_errors: int
-    all_missed: Missed
+    all_missed: MissedCounts
 
 
 class EntityHealth:
@@ -140,7 +140,7 @@ class EntityHealth:
         self._calls = 0
         self._errors = 0
         self._last_error = ''
-        self._look: Callable[[], Missed] = Missed
+        self._look: Callable[[], MissedCounts] = MissedCounts
         self._past = self._missed = self._all_missed = _NOTHING
         self._said = 0, _NOTHING
 
@@ -149,7 +149,7 @@ class EntityHealth:
         self._errors += 1
         self._last_error = summarize(error)
 
-    def follow(self, look: Callable[[], Missed]) -> None:
+    def follow(self, look: Callable[[], MissedCounts]) -> None:
         """From now on, ask here for what it has missed: its node was built, or built anew."""
         self._look_anew()
         self._past, self._missed = self._all_missed, _NOTHING
@@ -188,7 +188,7 @@ class EntityHealth:
             self._all_missed = self._past + missed
 
 
-class HealthBoard:
+class HealthRegistry:
     """The health of all entities of a system that have something to do."""
 
     def __init__(self) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from composer.runtime.behaviours.error_texts import format_fault
+from composer.runtime.behaviours.tracebacks import format_fault
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class Watch:
+class Watcher:
     """Calls a function at intervals, whatever it raises; the same fault is logged once.
 
     Args:

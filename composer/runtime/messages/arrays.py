@@ -16,13 +16,8 @@ from operator import is_
 from typing import Any, Final, TypeAlias
 
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.values import (
-    OCTET_KINDS,
-    FieldError,
-    Reader,
-    check_length,
-    read_items,
-)
+from composer.interfaces.field_errors import FieldError
+from composer.interfaces.field_values import OCTET_KINDS, Reader, check_length, read_items
 
 _SequenceReader: TypeAlias = Callable[[object], Sequence[Any]]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.values import INTEGER_RANGES, Reader, check_length
+from composer.interfaces.field_values import INTEGER_RANGES, Reader, check_length
 
 
 def fixed_reader(field_type: FieldType, read_numbers: Reader) -> Reader:

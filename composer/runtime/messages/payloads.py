@@ -11,7 +11,7 @@ field. The same holds inside: wherever a message is wanted, all three will do. I
   wants (an `int` in a `float64` field, a tuple for a list) is replaced in place: rclpy 7 checks
   no fields unless `ROS_PYTHON_CHECK_FIELDS=1`, and publishes such an `int` as garbage.
 
-Which values fit which field is the business of `composer.interfaces.values`, for arrays of
+Which values fit which field is the business of `composer.interfaces.field_values`, for arrays of
 `composer.runtime.messages.arrays`. Both stop at the first fault.
 """
 
@@ -20,17 +20,16 @@ from functools import cache
 from typing import Any, Final
 
 from composer.errors import ComposerError
-from composer.interfaces.classes import import_interface
+from composer.interfaces.class_fields import describe_class
+from composer.interfaces.classes import import_interface, is_message_class
 from composer.interfaces.descriptions import FieldType
-from composer.interfaces.slots import describe_class
-from composer.interfaces.values import (
+from composer.interfaces.field_errors import (
     FieldError,
-    Reader,
+    format_field_error,
     no_message,
-    scalar_reader,
     unknown_field,
 )
-from composer.interfaces.wording import format_fault, is_message_class
+from composer.interfaces.field_values import Reader, scalar_reader
 from composer.runtime.messages.arrays import array_reader
 
 # The types of most bare values, told at once from messages and mappings.
@@ -47,7 +46,7 @@ class PayloadError(ComposerError):
 
     def __init__(self, type_name: str, error: FieldError) -> None:
         """Say where in a message of this type the error lies."""
-        super().__init__(format_fault(type_name, error.path, str(error)), help=error.help)
+        super().__init__(format_field_error(type_name, error.path, str(error)), help=error.help)
         self.type_name = type_name
         self.path = error.path
 

@@ -12,21 +12,22 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
+from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
 from composer.runtime.behaviours.calls import BehaviourCall, CallLedger
-from composer.runtime.behaviours.error_handling import ErrorReporter
-from composer.runtime.behaviours.waiting import CoroutineWaits, ThreadWaits
-from composer.runtime.entities.remote_parameters import RemoteParameters
+from composer.runtime.behaviours.error_reports import ErrorReporter
+from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
 from composer.runtime.health.hangs import HangLimit
+from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     Gate,
     GatedMutuallyExclusiveGroup,
     GatedReentrantGroup,
 )
-from composer.runtime.nodes.node import Node, Publish
+from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
-from composer.runtime.ownership import release, reserve
+from composer.runtime.reserved_methods import release, reserve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,11 +36,9 @@ if TYPE_CHECKING:
     from rclpy.timer import Timer
 
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError
-    from composer.runtime.entities.action_clients import ActionClient
-    from composer.runtime.entities.service_clients import ServiceClient
     from composer.runtime.health.statistics import EntityHealth
-    from composer.runtime.health.unmatched import Endpoint
-    from composer.runtime.system_services import SystemServices
+    from composer.runtime.health.unmatched import TopicEndpoint
+    from composer.runtime.nodes.system_handle import SystemHandle
     from composer.yaml_text.positions import DataPath
 
 
@@ -68,7 +67,7 @@ class LiveNode:
 
     Attributes:
         gate: Closed until the node has started, and when it stops.
-        publishers: What publishes a payload, by the publisher's name.
+        entities: What behaviours use by name, by the section of its kind.
         has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
         waits: How its plain functions wait; `coroutine_waits` is for coroutines.
         background: A group that no behaviour is in: responses and the like are always taken.
@@ -80,20 +79,18 @@ class LiveNode:
     """
 
     spec: NodeSpec
-    services: SystemServices
+    services: SystemHandle
     ros: ComposedRosNode
-    face: Node
+    behaviour_node: Node
     errors: ErrorReporter
-    publishers: dict[str, Publish]
-    service_clients: dict[str, ServiceClient]
-    action_clients: dict[str, ActionClient]
+    entities: dict[str, dict[str, Any]]
     waits: ThreadWaits
     coroutine_waits: CoroutineWaits
     background: CallbackGroup
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
-    endpoints: list[Endpoint] = field(default_factory=list)
+    endpoints: list[TopicEndpoint] = field(default_factory=list)
     at_stop: list[AtStop] = field(default_factory=list)
     limits: dict[str, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
@@ -116,7 +113,9 @@ class LiveNode:
 
     def bind(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
         """Return the function of a behaviour with the node and its constant arguments given."""
-        return partial(self.function(behaviour), self.face.for_entity(), **behaviour.arguments)
+        return partial(
+            self.function(behaviour), self.behaviour_node.with_own_state(), **behaviour.arguments
+        )
 
     def health(self, owner: str) -> EntityHealth | None:
         """Return the health of an entity in words, `None` if it is not measured."""
@@ -127,7 +126,7 @@ class LiveNode:
         """Let the health of an entity in words tell what its ROS entity has missed."""
         health = self.health(owner)
         if health is not None:
-            health.follow(partial(self.services.executor.missed, self.ros, entity))
+            health.follow(partial(self.services.executor.missed_counts, self.ros, entity))
 
     @property
     def full_name(self) -> str:
@@ -172,7 +171,7 @@ class LiveNode:
             self.ledger,
             deliver=self._delivery(publish),
             failed=failed,
-            times=None if health is None else health.times,
+            add_time=None if health is None else health.times.add,
             admits=admits,
         )
 
@@ -182,7 +181,7 @@ class LiveNode:
         behaviour: BehaviourSpec,
         failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of `on_start` or `on_stop`, which takes the node's face.
+        """Return the wrapped call of `on_start` or `on_stop`, which takes the node alone.
 
         Args:
             failed: Takes what it raised, after that has been reported.
@@ -239,7 +238,7 @@ class LiveNode:
     def _delivery(self, publish: str | None) -> Callable[[Any], None]:
         if publish is None:
             return _discard
-        send = self.publishers[publish]
+        send = self.entities['publishers'][publish]
 
         def deliver(payload: Any) -> None:
             if payload is not None:
@@ -248,35 +247,32 @@ class LiveNode:
         return deliver
 
 
-def create_live_node(spec: NodeSpec, services: SystemServices) -> LiveNode:
+def create_live_node(spec: NodeSpec, services: SystemHandle) -> LiveNode:
     """Create a node without entities."""
     ros = ComposedRosNode(spec, services.context, services.ros_arguments)
     reserve(ros, 'the node', 'destroy_node')
-    publishers: dict[str, Publish] = {}
-    service_clients: dict[str, ServiceClient] = {}
-    action_clients: dict[str, ActionClient] = {}
+    entities: dict[str, dict[str, Any]] = {kind.section: {} for kind in ENTITY_KINDS}
     background = ReentrantCallbackGroup()
     gate = Gate()
     waits = ThreadWaits(services.executor.waiting, services.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
-    node = LiveNode(
+    remote_parameters = RemoteParameters(
+        ros, spec.namespace, waits, background, services.without_parameter_services
+    )
+    return LiveNode(
         spec,
         services,
         ros,
-        face=Node(ros, state, publishers, services.shutdown),
+        behaviour_node=Node(ros, state, entities, remote_parameters, services.shutdown),
         errors=ErrorReporter(ros.get_logger().error),
-        publishers=publishers,
-        service_clients=service_clients,
-        action_clients=action_clients,
+        entities=entities,
         waits=waits,
         coroutine_waits=CoroutineWaits(services.executor, waits),
         background=background,
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),
     )
-    node.face.connect(service_clients, action_clients, RemoteParameters(node))
-    return node
 
 
 def _discard(_result: Any) -> None:

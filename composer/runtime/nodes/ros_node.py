@@ -42,8 +42,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from composer.language.paths import resolve_path
+from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import find_overrides, parse_command_line
-from composer.ros_parameters.parameter_files import read_parameter_file
 from composer.runtime.logs import has_rosout_publisher
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from rclpy.publisher import Publisher
 
     from composer.language.specs import NodeSpec
-    from composer.ros_parameters.parameter_files import ParameterEntry
+    from composer.ros_parameters.file_reader import ParameterEntry
 
 _PARAMETER_EVENTS = '/parameter_events'
 _TYPE_DESCRIPTION = 'start_type_description_service'

@@ -1,3 +1,4 @@
+import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -5,13 +6,14 @@ from pathlib import Path
 import pytest
 from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
 
+from composer.ament import ament_prefixes
 from composer.interfaces.build.builder import (
     BuildError,
     Dependencies,
     DependencyMissingError,
     build_package,
 )
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.package_folder import load_definitions
 
 pytestmark = pytest.mark.ros
@@ -67,9 +69,12 @@ USED = {'msg/Wheel.msg': 'float64 radius 0.5\nstd_msgs/Header header\n'}
 PROVIDE = """
 import sys
 from pathlib import Path
-from composer.interfaces.packages import provide_packages
+from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.definitions.packages import load_packages
 names = sys.argv[1].split(',')
-provided = provide_packages(dict(zip(names, map(Path, sys.argv[2:]))), print)
+folders = dict(zip(names, map(Path, sys.argv[2:])))
+provided = provide_packages(load_packages(folders, InterfaceCatalogue()), print)
 """
 PROVIDE_AND_LOCATE = PROVIDE + 'print(provided[-1].prefix)'
 
@@ -207,7 +212,7 @@ def test_a_built_package_is_found_and_described_like_an_installed_one(
 ) -> None:
     run = run_python(PROVIDE_AND_LOCATE, 'more_parts,all_parts', *reversed(parts))
     prefix = Path(run.stdout.splitlines()[-1])
-    catalogue = InterfaceCatalogue([*default_prefixes(), prefix])
+    catalogue = InterfaceCatalogue([*ament_prefixes(), prefix])
     assert catalogue.names('srv', 'all_parts') == [
         'all_parts/srv/Everything',
         'all_parts/srv/Nothing',
@@ -223,8 +228,12 @@ def test_a_built_package_is_found_and_described_like_an_installed_one(
 def test_the_type_hash_of_add_two_ints_is_the_official_one(run_python: RunPython) -> None:
     folder = SHIPPED / 'example_interfaces'
     run = run_python(PROVIDE_AND_LOCATE, 'example_interfaces', folder)
-    catalogue = InterfaceCatalogue([Path(run.stdout.splitlines()[-1])])
-    assert catalogue.type_hash('example_interfaces/srv/AddTwoInts') == (
+    name = 'example_interfaces/srv/AddTwoInts'
+    document = Path(run.stdout.splitlines()[-1], 'share', f'{name}.json').read_text()
+    hashes = {
+        each['type_name']: each['hash_string'] for each in json.loads(document)['type_hashes']
+    }
+    assert hashes[name] == (
         'RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a'
     )
 
@@ -318,7 +327,7 @@ def build_into(
 ) -> None:
     folder.mkdir()
     definitions = load_definitions(folder.name, write(files))
-    build_package(definitions, folder, Dependencies(default_prefixes(), built))
+    build_package(definitions, folder, Dependencies(ament_prefixes(), built))
 
 
 def test_a_built_package_can_be_moved(

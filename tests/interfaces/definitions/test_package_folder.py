@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 from building import SHIPPED, WriteDefinitions
 
-from composer.interfaces.catalogue import InterfaceCatalogue, default_prefixes
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 from composer.interfaces.descriptions import (
     ActionDescription,
@@ -13,7 +14,6 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.interfaces.prefixes import find_package_prefix
 
 pytestmark = pytest.mark.ros
 
@@ -153,7 +153,7 @@ def test_a_wrong_package_name_is_a_fault(write_definitions: WriteDefinitions) ->
 
 @pytest.mark.parametrize('package', InterfaceCatalogue().packages())
 def test_installed_definitions_have_no_faults(package: str) -> None:
-    prefix = find_package_prefix(package, default_prefixes())
+    prefix = find_package(package, ament_prefixes(), INTERFACE_INDEX)
     assert prefix is not None
     definitions = load_definitions(package, prefix / 'share' / package)
     assert definitions.diagnostics == []

@@ -12,8 +12,8 @@ import rclpy
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
+from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import find_overrides
-from composer.ros_parameters.parameter_files import read_parameter_file
 from tests.running import reserved_domain
 
 pytestmark = pytest.mark.ros

@@ -14,7 +14,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from std_msgs.msg import Int32
 
-from composer.executor import Missed
+from composer.executor import MissedCounts
 from tests.running import DEADLINE_SEC
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -87,7 +87,10 @@ def test_messages_that_a_full_queue_drops_are_overruns(node, executor, wait_for,
             publisher.publish(Int32(data=number))
         slow.may_end.set()
         wait_for(lambda: slow.heard == [-1, *range(90, 100)], 'what was kept')
-        wait_for(lambda: executor.missed(node, slow.entity) == Missed(overruns=90), 'overruns')
+        wait_for(
+            lambda: executor.missed_counts(node, slow.entity) == MissedCounts(overruns=90),
+            'overruns',
+        )
 
 
 def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
@@ -98,7 +101,10 @@ def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
         wait_for(lambda: slow.heard, 'the first message')
         for number in range(100):
             publisher.publish(Int32(data=number))
-        wait_for(lambda: executor.missed(node, slow.entity) == Missed(overruns=90), 'overruns')
+        wait_for(
+            lambda: executor.missed_counts(node, slow.entity) == MissedCounts(overruns=90),
+            'overruns',
+        )
         slow.may_end.set()
 
 
@@ -112,12 +118,14 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
     with spinning(executor):
         wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
         print('go', file=sender.stdin, flush=True)
-        wait_for(lambda: executor.missed(node, slow.entity).overruns, 'the first overrun')
+        wait_for(lambda: executor.missed_counts(node, slow.entity).overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1] == 199, 'the last message')
         if reliability == 'RELIABLE':
             wait_for(
-                lambda: executor.missed(node, slow.entity).overruns == 200 - len(slow.heard),
+                lambda: (
+                    executor.missed_counts(node, slow.entity).overruns == 200 - len(slow.heard)
+                ),
                 'the exact count',
             )
 
@@ -130,7 +138,7 @@ def test_subscriptions_that_keep_up_have_no_overruns(node, executor, wait_for):
         for number in range(300):
             publisher.publish(Int32(data=number))
             wait_for(lambda: len(slow.heard) == number + 1, 'the message')  # noqa: B023
-        assert executor.missed(node, slow.entity) == Missed()
+        assert executor.missed_counts(node, slow.entity) == MissedCounts()
 
 
 def test_takes_of_reentrant_groups_are_no_overruns(node, executor, wait_for):
@@ -141,7 +149,7 @@ def test_takes_of_reentrant_groups_are_no_overruns(node, executor, wait_for):
             publisher.publish(Int32(data=number))
         wait_for(lambda: len(slow.heard) == 30, 'all at the same time')
         slow.may_end.set()
-        assert executor.missed(node, slow.entity) == Missed()
+        assert executor.missed_counts(node, slow.entity) == MissedCounts()
 
 
 def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
@@ -156,20 +164,20 @@ def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
     def leap_to(seconds, tick_count):
         clock.set_ros_time_override(Time(nanoseconds=int(seconds * 1e9)))
         wait_for(lambda: len(ticks) == tick_count, f'the tick at {seconds}')
-        return executor.missed(node, timer)
+        return executor.missed_counts(node, timer)
 
     with spinning(executor):
         wait_for(lambda: timer in executor_entities(executor, node), 'the timer to be seen')
-        assert leap_to(101.05, 1) == Missed()
-        assert leap_to(102.2, 2) == Missed(late_ticks=1)
-        assert leap_to(107.5, 3) == Missed(late_ticks=2, skipped_ticks=4)
-        assert leap_to(108.0, 4) == Missed(late_ticks=2, skipped_ticks=4)
+        assert leap_to(101.05, 1) == MissedCounts()
+        assert leap_to(102.2, 2) == MissedCounts(late_ticks=1)
+        assert leap_to(107.5, 3) == MissedCounts(late_ticks=2, skipped_ticks=4)
+        assert leap_to(108.0, 4) == MissedCounts(late_ticks=2, skipped_ticks=4)
         timer.reset()
-        assert leap_to(109.0, 5) == Missed(late_ticks=2, skipped_ticks=4)
+        assert leap_to(109.0, 5) == MissedCounts(late_ticks=2, skipped_ticks=4)
 
 
 def executor_entities(executor, node):
-    source = executor._engine.registry
+    source = executor._spinner.registry
     return source._nodes[node].sources if node in source._nodes else {}
 
 
@@ -183,17 +191,17 @@ def test_ticks_behind_a_slow_callback_of_their_group_are_late_and_skipped(
     with spinning(executor):
         publisher.publish(Int32())
         wait_for(lambda: slow.heard, 'the message')
-        before = executor.missed(node, timer)
+        before = executor.missed_counts(node, timer)
         count = len(ticks)
         ended = threading.Timer(1.0, slow.may_end.set)
         ended.start()
         wait_for(lambda: len(ticks) > count, 'the next tick')
-        after = executor.missed(node, timer)
+        after = executor.missed_counts(node, timer)
         assert after.late_ticks > before.late_ticks
         assert after.skipped_ticks - before.skipped_ticks >= 18
 
 
 def test_what_the_executor_does_not_know_has_missed_nothing(node, executor):
     timer = node.create_timer(10.0, print, autostart=False)
-    assert executor.missed(node, timer) == Missed()
-    assert executor.missed(None, timer) == Missed()
+    assert executor.missed_counts(node, timer) == MissedCounts()
+    assert executor.missed_counts(None, timer) == MissedCounts()

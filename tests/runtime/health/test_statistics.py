@@ -10,11 +10,11 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.validate_node_name import validate_node_name
 
-from composer.executor import Missed
+from composer.executor import MissedCounts
 from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, RunningCall
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.diagnostics_publisher import node_name
-from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthBoard
+from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry
 
 
 def times_of(durations):
@@ -87,7 +87,7 @@ def test_calls_of_several_threads_are_all_counted():
 
 def test_a_report_tells_the_period_and_the_whole():
     health = EntityHealth()
-    missed = Missed(overruns=3)
+    missed = MissedCounts(overruns=3)
     health.follow(lambda: missed)
     health.times.add(1000)
     health.note_error(ValueError('boom'))
@@ -98,7 +98,7 @@ def test_a_report_tells_the_period_and_the_whole():
     second = health.report(2.0, 7.0)
     assert (second.times.calls(), second.errors, second.last_error) == (1, 0, '')
     assert (second.all_calls, second.all_errors) == (2, 1)
-    assert (second.missed, second.all_missed) == (Missed(), missed)
+    assert (second.missed, second.all_missed) == (MissedCounts(), missed)
     assert (second.period_sec, second.overdue_sec) == (2.0, 7.0)
 
 
@@ -123,22 +123,22 @@ def test_a_huge_error_that_ros_cannot_say_is_made_short_and_sayable():
 
 
 def test_counts_survive_that_the_node_is_built_anew():
-    board = HealthBoard()
+    board = HealthRegistry()
     old = board.entity('/a', "timer 'b'")
-    counts = [Missed(late_ticks=2)]
+    counts = [MissedCounts(late_ticks=2)]
     old.follow(lambda: counts[-1])
     old.report(1.0, 0.0)
-    counts.append(Missed())  # Its timer has been destroyed.
-    assert old.report(1.0, 0.0).all_missed == Missed(late_ticks=2)
+    counts.append(MissedCounts())  # Its timer has been destroyed.
+    assert old.report(1.0, 0.0).all_missed == MissedCounts(late_ticks=2)
     new = board.entity('/a', "timer 'b'")
-    new.follow(lambda: Missed(late_ticks=1, skipped_ticks=4))
+    new.follow(lambda: MissedCounts(late_ticks=1, skipped_ticks=4))
     report = new.report(1.0, 0.0)
-    assert report.all_missed == Missed(late_ticks=3, skipped_ticks=4)
-    assert report.missed == Missed(late_ticks=1, skipped_ticks=4)
+    assert report.all_missed == MissedCounts(late_ticks=3, skipped_ticks=4)
+    assert report.missed == MissedCounts(late_ticks=1, skipped_ticks=4)
 
 
 def test_the_board_knows_the_oldest_call_of_each_entity():
-    board = HealthBoard()
+    board = HealthRegistry()
     for owner in ("timer 'b'", "timer 'c'"):
         board.entity('/a', owner)
     running = [('/a', RunningCall("timer 'b'", begun_ns, 1)) for begun_ns in (9, 4, 6)]
@@ -149,7 +149,7 @@ def test_the_board_knows_the_oldest_call_of_each_entity():
 
 def measured_call(function, times, failed=lambda owner, error: None):
     return BehaviourCall(
-        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, times=times
+        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, add_time=times.add
     )
 
 
@@ -186,7 +186,7 @@ def test_every_system_has_a_node_with_a_valid_name(system):
 
 def status_of(owner, durations=(), errors=(), missed=None, overdue_sec=0.0):
     health = EntityHealth()
-    health.follow(lambda: missed or Missed())
+    health.follow(lambda: missed or MissedCounts())
     for duration in durations:
         health.times.add(duration)
     for error in errors:
@@ -225,13 +225,13 @@ def test_only_subscriptions_have_overruns_and_services_neither():
         ("timer 'a'", {}, DiagnosticStatus.OK, 'not called'),
         (
             "timer 'a'",
-            {'missed': Missed(late_ticks=1, skipped_ticks=3)},
+            {'missed': MissedCounts(late_ticks=1, skipped_ticks=3)},
             DiagnosticStatus.WARN,
             '1 late tick; 3 skipped ticks',
         ),
         (
             "subscription 'a'",
-            {'missed': Missed(overruns=2)},
+            {'missed': MissedCounts(overruns=2)},
             DiagnosticStatus.WARN,
             '2 messages dropped from the full queue',
         ),
@@ -243,7 +243,7 @@ def test_only_subscriptions_have_overruns_and_services_neither():
         ),
         (
             "timer 'a'",
-            {'errors': [KeyError('x'), ValueError('boom')], 'missed': Missed(late_ticks=2)},
+            {'errors': [KeyError('x'), ValueError('boom')], 'missed': MissedCounts(late_ticks=2)},
             DiagnosticStatus.ERROR,
             '2 errors, last: ValueError: boom; 2 late ticks',
         ),

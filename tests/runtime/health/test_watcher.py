@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.runtime.health import watcher as watching
-from composer.runtime.health.watcher import Watch
+from composer.runtime.health.watcher import Watcher
 
 
 def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
@@ -16,7 +16,7 @@ def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
         looks.append(1)
         raise ValueError
 
-    watch = Watch('watch', look, 0.001)
+    watch = Watcher('watch', look, 0.001)
     watch.start()
     wait_for(lambda: len(looks) > 3, 'looks after the first fault')
     watch.stop()

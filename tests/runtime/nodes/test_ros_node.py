@@ -9,8 +9,6 @@ from rcl_interfaces.srv import GetLoggerLevels, GetParameters, ListParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.interfaces.catalogue import InterfaceCatalogue
-
 pytestmark = pytest.mark.ros
 
 PARAMETER_SERVICES = {
@@ -150,7 +148,7 @@ def test_a_node_publishes_its_log_and_what_becomes_of_its_parameters(
     assert seen() == topics
 
 
-def test_services_that_were_asked_for_answer(graph, shared_peer):
+def test_services_that_were_asked_for_answer(graph, shared_peer, wait_for):
     assert graph.get_name() == 'peer'
     response = shared_peer.call(ListParameters, '/forced/list_parameters')
     assert 'use_sim_time' in response.result.names
@@ -158,7 +156,9 @@ def test_services_that_were_asked_for_answer(graph, shared_peer):
     (level,) = shared_peer.call(GetLoggerLevels, '/levelled/get_logger_levels', **request).levels
     assert level.name == 'levelled'
     name = 'std_msgs/msg/String'
-    wanted = {'type_name': name, 'type_hash': InterfaceCatalogue().type_hash(name)}
+    wait_for(lambda: graph.get_publishers_info_by_topic('/deep/word'), 'the publisher')
+    (publisher,) = graph.get_publishers_info_by_topic('/deep/word')
+    wanted = {'type_name': name, 'type_hash': str(publisher.topic_type_hash)}
     service = '/deep/described/get_type_description'
     described = shared_peer.call(GetTypeDescription, service, **wanted)
     assert described.type_description.type_description.type_name == name

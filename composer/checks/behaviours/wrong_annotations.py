@@ -1,0 +1,239 @@
+"""Annotations of behaviours against the types that they are wired to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+from composer.interfaces.descriptions import (
+    ActionDescription,
+    MessageDescription,
+    ServiceDescription,
+)
+from composer.interfaces.payload_checks import check_payload
+from composer.language.bindings import node_bindings
+from composer.python_source.annotations import Annotation, read_annotation
+from composer.python_source.modules import FunctionKind, ModuleSource
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.bindings import Binding
+    from composer.language.specs import NodeSpec
+    from composer.python_source.modules import FunctionNode
+    from composer.yaml_text.positions import DataPath
+
+_RULE = 'wrong-annotation'
+_PARTS = {'Request', 'Response', 'Goal', 'Result', 'Feedback'}
+# What a bare value of a built-in type is held against a field by.
+_SAMPLES: dict[str, object] = {'bool': False, 'float': 0.5, 'int': 1, 'str': 'a'}
+
+
+@dataclass(frozen=True, slots=True)
+class _Wire:
+    """What a behaviour is given and what becomes of what it gives.
+
+    Attributes:
+        given: The type of its second argument.
+        yielded: The type that each payload which it yields becomes.
+        returned: The same of what it returns.
+        is_unsure: Whether one of the types is not the real one.
+    """
+
+    given: str | None = None
+    yielded: str | None = None
+    returned: str | None = None
+    is_unsure: bool = False
+
+
+def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
+    """Behaviours are annotated with the types that they are wired to, or with none."""
+    for node in context.spec.nodes.values():
+        wires = _wires_of(context, node)
+        for binding in node_bindings(node):
+            wire = wires.get(binding.behaviour.path)
+            if wire is None or wire.is_unsure or context.was_dropped(binding.behaviour.path):
+                continue
+            module = context.modules.find(binding.behaviour.module)
+            if isinstance(module, ModuleSource):
+                yield from _check_behaviour(context, binding, wire, module)
+
+
+def _wires_of(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
+    """Return what each behaviour of a node is wired to, by its path."""
+    published = {
+        name: publisher.type if context.has_real_type(publisher) else None
+        for name, publisher in node.publishers.items()
+    }
+    wires: dict[DataPath, _Wire] = {}
+    for timer in node.timers.values():
+        sent = published.get(timer.publish or '')
+        wires[*timer.path, 'behaviour'] = _Wire(yielded=sent, returned=sent)
+    for subscription in node.subscriptions.values():
+        sent = published.get(subscription.publish or '')
+        unsure = not context.has_real_type(subscription)
+        wire = _Wire(subscription.type, returned=sent, is_unsure=unsure)
+        wires[*subscription.path, 'behaviour'] = wire
+    for service in node.services.values():
+        name = service.type
+        unsure = not context.has_real_type(service)
+        wire = _Wire(f'{name}_Request', returned=f'{name}_Response', is_unsure=unsure)
+        wires[*service.path, 'behaviour'] = wire
+    return wires | _wires_of_actions(context, node)
+
+
+def _wires_of_actions(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
+    wires: dict[DataPath, _Wire] = {}
+    for action in node.actions.values():
+        name, unsure = action.type, not context.has_real_type(action)
+        goal, feedback, result = (f'{name}_{part}' for part in ('Goal', 'Feedback', 'Result'))
+        wires[*action.path, 'behaviour'] = _Wire(goal, feedback, result, unsure)
+        wires[*action.path, 'accept'] = _Wire(goal, is_unsure=unsure)
+    for client in node.action_clients.values():
+        name, unsure = client.type, not context.has_real_type(client)
+        wires[*client.path, 'feedback'] = _Wire(f'{name}_Feedback', is_unsure=unsure)
+        wires[*client.path, 'result'] = _Wire(f'{name}_Result', is_unsure=unsure)
+    return wires
+
+
+def _check_behaviour(
+    context: CheckContext, binding: Binding, wire: _Wire, module: ModuleSource
+) -> Iterator[Diagnostic]:
+    source = module.functions.get(binding.behaviour.function)
+    if source is None or source.definition is None:
+        return
+    yield from _check_parameter(context, binding, wire, module, source.definition)
+    answer = read_annotation(source.definition.returns, module.imports)
+    if source.kind in (FunctionKind.PLAIN, FunctionKind.COROUTINE):
+        yield from _check_payload(context, binding, 'returns', answer, wire.returned)
+        return
+    items = [read_annotation(each, module.imports) for each in answer.items]
+    if items:
+        yield from _check_payload(context, binding, 'yields', items[0], wire.yielded)
+    if items and source.kind is FunctionKind.GENERATOR and len(items) > _RETURNED:
+        is_action = binding.parameters[-1:] == ('goal',)
+        returned = wire.returned if is_action else None
+        yield from _check_payload(context, binding, 'returns', items[_RETURNED], returned)
+
+
+# The place of what it returns in `Generator[yielded, sent, returned]`.
+_RETURNED = 2
+
+
+def _check_parameter(
+    context: CheckContext,
+    binding: Binding,
+    wire: _Wire,
+    module: ModuleSource,
+    function: FunctionNode,
+) -> Iterator[Diagnostic]:
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    if arguments:
+        first = read_annotation(arguments[0].annotation, module.imports)
+        if first.interface or first.builtin:
+            name = arguments[0].arg
+            message = f"'{binding.behaviour.function}' takes a {_shown(first)} as '{name}'"
+            yield _explain(context, binding, f'{message}, and is given the node first')
+    if wire.given is None or len(arguments) <= 1:
+        return
+    read = read_annotation(arguments[1].annotation, module.imports)
+    if read.builtin is None and (
+        read.interface is None or _are_alike(context, read.interface, wire.given)
+    ):
+        return
+    yield _explain(
+        context,
+        binding,
+        f"'{binding.behaviour.function}' takes a {_shown(read)} as '{arguments[1].arg}', "
+        f'and is given a {_in_python(wire.given)}',
+    )
+
+
+def _check_payload(
+    context: CheckContext, binding: Binding, verb: str, read: Annotation, wanted: str | None
+) -> Iterator[Diagnostic]:
+    """Check what a behaviour gives: a message, a mapping, or the bare value of a sole field."""
+    if wanted is None:
+        return
+    description = _describe(context, wanted)
+    if read.interface is not None:
+        fits = _are_alike(context, read.interface, wanted) or _may_hold(
+            description, read.interface
+        )
+    elif read.builtin in _SAMPLES and description is not None:
+        sample = _SAMPLES[read.builtin]
+        fits = not any(check_payload(description, sample, context.catalogue))
+    else:
+        return
+    if not fits:
+        yield _explain(
+            context,
+            binding,
+            f"'{binding.behaviour.function}' {verb} a {_shown(read)}, "
+            f'which does not make a {_in_python(wanted)}',
+        )
+
+
+def _explain(context: CheckContext, binding: Binding, message: str) -> Diagnostic:
+    behaviour = binding.behaviour
+    return context.at_value(
+        behaviour.path,
+        _RULE,
+        message,
+        part=behaviour.function,
+        help=f'mend the annotation, or the type of {binding.owner}',
+    )
+
+
+def _may_hold(description: MessageDescription | None, interface: str) -> bool:
+    """Return whether a message may have nothing but a field of this type."""
+    if description is None:
+        return True
+    fields = description.fields
+    return len(fields) == 1 and fields[0].type.nested == interface
+
+
+def _are_alike(context: CheckContext, one: str, other: str) -> bool:
+    """Return whether two types are the same to a behaviour.
+
+    Types of one name in two packages are, if they have the same fields, or if these are not
+    known: the examples of ROS come in several packages.
+    """
+    if one == other:
+        return True
+    if one.rpartition('/')[2] != other.rpartition('/')[2]:
+        return False
+    first, second = _describe(context, one), _describe(context, other)
+    return first is None or second is None or _fields(first) == _fields(second)
+
+
+def _fields(description: MessageDescription) -> list[tuple[str, str]]:
+    return [(field.name, str(field.type)) for field in description.fields]
+
+
+def _describe(context: CheckContext, name: str) -> MessageDescription | None:
+    """Return the description of a message, or of a part of a service or action."""
+    whole, part = _split(name)
+    description = context.catalogue.describe(whole)
+    if isinstance(description, ServiceDescription | ActionDescription) and part:
+        inner = getattr(description, part.lower(), None)
+        return cast('MessageDescription | None', inner)
+    return description if isinstance(description, MessageDescription) else None
+
+
+def _shown(read: Annotation) -> str:
+    return read.builtin or _in_python(read.interface or '')
+
+
+def _in_python(name: str) -> str:
+    """Return `std_srvs/srv/SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
+    whole, part = _split(name)
+    return f'{whole}.{part}' if part else whole
+
+
+def _split(name: str) -> tuple[str, str]:
+    """Return the interface and its part, which is empty for a message."""
+    whole, _, part = name.rpartition('_')
+    return (whole, part) if part in _PARTS else (name, '')

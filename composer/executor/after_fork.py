@@ -1,0 +1,63 @@
+"""What a forked child does with the executors of its parent: it shuts them down and lets them be.
+
+An epoll, an eventfd or a kernel timer is one thing in both processes: what the child reads, sets
+or unregisters, the parent misses. So the child puts new ones under the same numbers
+(`replace_descriptors`). The parent's threads are not in the child, but the locks that they held
+are: `reset_locks` frees them. Nothing is destroyed, because the middleware would have to do that,
+and its threads and locks are in the same state.
+
+A child that was forked in a callback ends when that callback does.
+"""
+
+import os
+import sys
+import traceback
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import Any, NoReturn
+
+
+def replace_descriptors(descriptors: Iterable[int], new: int) -> None:
+    """Make `descriptors` duplicates of `new`."""
+    for descriptor in descriptors:
+        os.dup2(new, descriptor, inheritable=False)
+
+
+def reset_locks(owners: Iterable[Any]) -> None:
+    """Free the locks that are attributes of `owners`, whichever thread held them."""
+    for owner in owners:
+        for value in vars(owner).values():
+            # What the standard library's modules call in a child.
+            with suppress(AttributeError):
+                value._at_fork_reinit()  # noqa: SLF001
+
+
+def end_child(error: BaseException | None = None) -> NoReturn:
+    """End this process, a forked child, as Python ends a program.
+
+    Args:
+        error: What the callback that forked it raised.
+    """
+    code = 0
+    # The child may have broken anything; it must end all the same.
+    with suppress(Exception):
+        code = _exit_code(error)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(Exception):
+            stream.flush()
+    os._exit(code & 0xFF)
+
+
+def _exit_code(error: BaseException | None) -> int:
+    """Print `error` as Python does, and return the exit code that it leads to."""
+    code = error.code if isinstance(error, SystemExit) else None
+    if code is None and (error is None or isinstance(error, SystemExit)):
+        return 0
+    if isinstance(code, int):
+        return code
+    with suppress(Exception):
+        if code is None:
+            traceback.print_exception(error)
+        else:
+            print(code, file=sys.stderr)  # noqa: T201 (as Python does)
+    return 1

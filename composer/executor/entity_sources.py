@@ -1,0 +1,254 @@
+"""Timers, subscriptions, services and clients as event sources."""
+
+import threading
+from time import monotonic_ns
+from typing import Any
+
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import HistoryPolicy
+from rclpy.subscription import Subscription
+
+from composer.executor import c_bindings
+from composer.executor.after_fork import end_child
+from composer.executor.event_poller import UNKNOWN_COUNT, EventFd
+from composer.executor.event_source import NOTHING, EventSource, MissedCounts
+
+_LATE_SHARE = 0.1
+_MIN_LATE_NS = 1_000_000
+"""A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its time.
+
+A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms unless
+that was set: beside it, timers with short periods are late indeed.
+"""
+
+
+class TimerSource(EventSource):
+    """A timer: due at its deadline, or when its ROS clock gets there; its events are resets."""
+
+    watch = staticmethod(c_bindings.watch_timer_reset)
+    __slots__ = ('_clock', '_late', '_rearming', '_skipped', 'deadline_ns')
+
+    def open(self, shared: EventFd | None = None) -> None:
+        """See the base class."""
+        self._rearming = threading.Lock()
+        self._late = 0
+        self._skipped = 0
+        self.deadline_ns: int | None = None
+        self._clock = None
+        self._listen(shared)
+        self._clock = self.parts.deadlines.follow(self.entity.clock, self)
+        self.rearm()
+
+    def close(self) -> None:
+        """See the base class."""
+        self.parts.deadlines.set(self, None)
+        if self._clock is not None:
+            self.parts.deadlines.unfollow(self._clock, self)
+        super().close()
+
+    def on_events(self, count: int) -> None:  # noqa: ARG002
+        """Find out when the timer is due, for it was reset."""
+        self.rearm()
+
+    def on_deadline(self) -> None:
+        """Queue the source; `run` asks rcl whether the timer is due."""
+        self.parts.scheduler.set_ready(self)
+
+    def rearm(self) -> None:
+        """Find out when the timer is due next."""
+        with self._rearming:
+            self._rearm()
+
+    def _rearm(self) -> None:
+        try:
+            handle = self.entity.handle
+            with handle:
+                until_ns = handle.time_until_next_call()
+        except InvalidHandle:
+            return
+        clock = self._clock
+        if until_ns is None or not self.alive:
+            self.parts.deadlines.set(self, None)
+        elif until_ns <= 0:
+            self.parts.scheduler.set_ready(self)
+        elif clock is not None and clock.clock.ros_time_is_active:
+            self.parts.deadlines.set(self, None)
+        else:
+            self.parts.deadlines.set(self, monotonic_ns() + until_ns)
+
+    def run(self) -> Any:
+        """See the base class."""
+        timer = self.entity
+        try:
+            handle = timer.handle
+            with handle:
+                due = self._call(handle)
+        except InvalidHandle:
+            return NOTHING
+        self.rearm()
+        if not due:
+            return NOTHING
+        callback = timer.callback
+        result = callback()
+        return result if result is not None and self._is_async(callback) else None
+
+    def missed_counts(self) -> MissedCounts:
+        """See the base class."""
+        return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
+
+    def _call(self, handle: Any) -> bool:
+        """Tell rcl that the tick begins, and count what was missed; False if it is not due."""
+        begin_ns = monotonic_ns()
+        until_ns = handle.time_until_next_call()
+        if until_ns is None or until_ns > 0:
+            return False
+        handle.call_timer()
+        next_until_ns = handle.time_until_next_call()
+        period_ns = handle.get_timer_period()
+        if next_until_ns is None or not period_ns:
+            return True
+        if -until_ns > _MIN_LATE_NS and -until_ns > _LATE_SHARE * period_ns:
+            self._late += 1
+        # rcl sets the next tick to the next multiple of the period that has not passed.
+        advance_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
+        self._skipped += max(0, advance_ns // period_ns - 1)
+        return True
+
+
+class SubscriptionSource(EventSource):
+    """A subscription.
+
+    If fewer messages can be taken than came, newer ones have pushed the others out of the queue.
+    `_taken` counts a take from before it begins until it finds nothing: so one under way in
+    another thread, as in reentrant groups, does not count as an overrun.
+    """
+
+    rank = 1
+    watch = staticmethod(c_bindings.watch_subscription)
+    __slots__ = ('_arrived', '_overruns', '_taken')
+
+    def open(self, shared: EventFd | None = None) -> None:
+        """See the base class."""
+        self._arrived = 0
+        self._taken = 0
+        self._overruns = 0
+        super().open(shared)
+
+    def on_events(self, count: int) -> None:
+        """See the base class."""
+        if count < UNKNOWN_COUNT:
+            self._arrived += count
+        super().on_events(count)
+
+    def missed_counts(self) -> MissedCounts:
+        """See the base class."""
+        profile = self.entity.qos_profile
+        if profile.history == HistoryPolicy.KEEP_LAST and profile.depth:
+            # A queue that never runs empty: the middleware holds no more than its depth.
+            self._note_overruns(self._arrived - self._taken - profile.depth)
+        return MissedCounts(overruns=self._overruns)
+
+    def _note_overruns(self, count: int) -> None:
+        # A message may be taken right before its event comes, which makes one count too low.
+        self._overruns = max(self._overruns, count)
+
+    def run(self) -> Any:
+        """See the base class."""
+        entity = self.entity
+        revision = self.revision
+        arrived = self._arrived
+        self._taken += 1
+        handle = entity.handle
+        try:
+            with handle:
+                taken = handle.take_message(entity.msg_type, entity.raw)
+        except InvalidHandle:
+            return NOTHING
+        if taken is None:
+            self._taken -= 1
+            self._note_overruns(arrived - self._taken)
+            self.parts.scheduler.set_empty(self, revision)
+            return NOTHING
+        callback = entity.callback
+        if entity._callback_type is Subscription.CallbackType.MessageOnly:  # noqa: SLF001
+            result = callback(taken[0])
+        else:
+            result = callback(*taken)
+        return result if result is not None and self._is_async(callback) else None
+
+
+class ClientSource(EventSource):
+    """A service client.
+
+    Whoever spins until the response is there stops then. So what came with it or before it runs
+    first, once: rclpy executes tasks and messages before responses.
+    """
+
+    rank = 2
+    watch = staticmethod(c_bindings.watch_client)
+    __slots__ = ('_has_yielded',)
+
+    def open(self, shared: EventFd | None = None) -> None:
+        """See the base class."""
+        self._has_yielded = False
+        super().open(shared)
+
+    def run(self) -> Any:
+        """See the base class."""
+        parts = self.parts
+        self._has_yielded = not self._has_yielded and (
+            parts.poller.peek() or bool(parts.scheduler.count_tasks())
+        )
+        if self._has_yielded:
+            parts.scheduler.add_events(self, 1)
+            return NOTHING
+        revision = self.revision
+        try:
+            handle = self.entity.handle
+            with handle:
+                header, response = handle.take_response(self.entity.srv_type.Response)
+        except InvalidHandle:
+            return NOTHING
+        if header is None:
+            parts.scheduler.set_empty(self, revision)
+            return NOTHING
+        try:
+            future = self.entity.get_pending_request(header.request_id.sequence_number)
+        except KeyError:
+            return NOTHING  # The request was given up.
+        future._set_executor(parts.executor)  # noqa: SLF001
+        future.set_result(response)
+        return None
+
+
+class ServiceSource(EventSource):
+    """A service."""
+
+    rank = 3
+    watch = staticmethod(c_bindings.watch_service)
+    __slots__ = ()
+
+    def run(self) -> Any:
+        """See the base class."""
+        revision = self.revision
+        service = self.entity
+        try:
+            handle = service.handle
+            with handle:
+                request, header = handle.service_take_request(service.srv_type.Request)
+        except InvalidHandle:
+            return NOTHING
+        if header is None:
+            self.parts.scheduler.set_empty(self, revision)
+            return NOTHING
+        callback = service.callback
+        response = callback(request, service.srv_type.Response())
+        if self.parts.executor.is_forked:
+            end_child()
+        if self._is_async(callback):
+            return self._respond(response, header)
+        service.send_response(response, header)
+        return None
+
+    async def _respond(self, response: Any, header: Any) -> None:
+        self.entity.send_response(await response, header)

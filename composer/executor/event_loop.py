@@ -1,0 +1,246 @@
+"""The leader's loop, and how what it finds is executed: callbacks, coroutines and tasks.
+
+`await future` in rclpy is a generator that yields until the future is done; rclpy's executors
+resume it over and over. Here the future tells when it is done. A coroutine that yields for another
+reason is resumed at once, then at growing intervals.
+"""
+
+import types
+from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic
+from typing import Any
+
+from rclpy.task import Future, Task
+
+from composer.executor.deadlines import DelayedCall
+from composer.executor.entity_registry import EntityRegistry
+from composer.executor.event_source import NOTHING, EventSource, ExecutorParts
+from composer.executor.scheduler import ScheduledTask
+from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
+
+_RETRY_SEC = 0.001
+_FUTURE_AWAIT = Future.__await__.__code__
+
+
+class EventLoop:
+    """What the leader does, whichever worker leads: look for events and execute what is ready.
+
+    Args:
+        parts: The parts of the executor.
+        registry: Compared with the nodes when it is stale.
+        execute: Executes what the scheduler started.
+        on_error: Receives what the loop itself raised.
+        on_end: Called when a worker stops leading.
+    """
+
+    def __init__(
+        self,
+        parts: ExecutorParts,
+        registry: EntityRegistry,
+        execute: Callable[[Any], bool],
+        on_error: Callable[[BaseException], None],
+        on_end: Callable[[], None],
+    ) -> None:
+        self.workers = WorkerThreads(self._lead, on_error)
+        self._parts = parts
+        self._registry = registry
+        self._execute = execute
+        self._on_error = on_error
+        self._on_end = on_end
+        self._refresh_later: DelayedCall | None = None
+
+    def _lead(self, me: Worker) -> None:
+        """Lead until nobody spins, or another worker leads."""
+        workers, scheduler, poller = self.workers, self._parts.scheduler, self._parts.poller
+        try:
+            while workers.is_leader(me, self._is_spinning):
+                if self._execute_ready(me) or scheduler.running:
+                    if poller.peek() or not self._is_idle():
+                        continue
+                    if scheduler.running:
+                        workers.let_standby_sleep(me)
+                if workers.leader is me:
+                    poller.wait_if(self._is_idle, None)
+        except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
+            scheduler.is_spinning = False
+            workers.is_leader(me, self._is_spinning)
+            self._on_error(error)
+        self._on_end()
+
+    def _execute_ready(self, me: Worker) -> bool:
+        """Execute about what is ready now; False if there is no more, or `me` was replaced."""
+        workers, scheduler = self.workers, self._parts.scheduler
+        registry, execute = self._registry, self._execute
+        left = len(scheduler) or 1
+        tasks_follow = True
+        while left:
+            if registry.is_stale:
+                self._refresh()
+            work = scheduler.start_next()
+            if work is None:
+                return False
+            workers.begin_callback(me)
+            if work.slow:
+                workers.hand_over(me)
+            execute(work)
+            work.slow = monotonic() - me.busy_since > TAKEOVER_SEC
+            me.busy_since = 0.0
+            if workers.leader is not me:
+                return False
+            left -= 1
+            if not left and tasks_follow:
+                # As in rclpy, tasks run before what has come since they were created.
+                left = scheduler.count_tasks()
+                tasks_follow = False
+        return True
+
+    def _refresh(self) -> None:
+        rest_sec = self._registry.rest_sec()
+        if not rest_sec:
+            self._registry.refresh()
+        elif self._refresh_later is None:
+            self._refresh_later = DelayedCall(self._parts.deadlines, rest_sec, self._end_rest)
+
+    def _end_rest(self) -> None:
+        self._refresh_later = None
+
+    def _is_idle(self) -> bool:
+        return not (
+            (self._registry.is_stale and self._refresh_later is None)
+            or self._parts.deadlines.jumped
+            or not self._parts.scheduler.is_spinning
+            or self._parts.scheduler.has_work()
+        )
+
+    def _is_spinning(self) -> bool:
+        return self._parts.scheduler.is_spinning
+
+
+class CallbackRunner:
+    """Executes what the scheduler started, and resumes what was suspended."""
+
+    def __init__(self, parts: ExecutorParts) -> None:
+        self._executor = parts.executor
+        self._scheduler = parts.scheduler
+        self._deadlines = parts.deadlines
+        self._paused: set[ScheduledTask] = set()
+
+    def execute(self, work: Any) -> bool:
+        """Execute a source or a task; returns False if there was nothing to take."""
+        if isinstance(work, EventSource):
+            return self._execute_source(work)
+        self._execute_task(work)
+        return True
+
+    def resume_paused(self) -> None:
+        """Resume at once the tasks that await nothing known."""
+        for task in tuple(self._paused):
+            self._resume(task)
+
+    def _execute_source(self, source: EventSource) -> bool:
+        outcome: Any = NOTHING
+        suspended = False
+        begun = source.group.unrestricted
+        try:
+            begun = begun or source.entity.callback_group.beginning_execution(source.entity)
+            if begun:
+                outcome = source.run()
+                if outcome is not None and outcome is not NOTHING:
+                    suspended = self._begin(outcome, source)
+        except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
+            outcome = None
+            self._executor.report(error)
+        finally:
+            if begun and not suspended:
+                self._end_execution(source)
+            if begun or outcome is None:
+                self._scheduler.finish(source, suspended=suspended)
+            else:
+                self._defer(source)
+        return outcome is not NOTHING
+
+    def _defer(self, source: EventSource) -> None:
+        """Try again: the group is held by another executor, or has rules of its own.
+
+        One that refuses for long sets `wakes_executor`, and then wakes the executor itself.
+        """
+        self._scheduler.defer(source)
+        group = source.entity.callback_group
+        if not getattr(group, 'wakes_executor', False):
+            DelayedCall(self._deadlines, _RETRY_SEC, self._scheduler.retry_deferred)
+        elif group.can_execute(source.entity):
+            # It changed its mind before the source was deferred.
+            self._scheduler.retry_deferred()
+
+    def _end_execution(self, source: EventSource) -> None:
+        if not source.group.unrestricted:
+            source.entity.callback_group.ending_execution(source.entity)
+
+    def _begin(self, coroutine: Any, source: EventSource) -> bool:
+        """Run `coroutine` up to its first suspension; returns True if there is one."""
+        try:
+            coroutine.send(None)
+        except StopIteration:
+            return False
+        self._suspend(ScheduledTask(Task(coroutine, executor=self._executor), source))
+        return True
+
+    def _execute_task(self, scheduled: ScheduledTask) -> None:
+        task = scheduled.task
+        suspended = False
+        try:
+            task()
+            suspended = not (task.done() or task.cancelled())
+            error = None if suspended else task.exception()
+            if error is not None:
+                self._executor.report(error)
+        except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
+            self._executor.report(error)
+        finally:
+            if suspended:
+                self._suspend(scheduled)
+            elif scheduled.source is not None:
+                self._end_execution(scheduled.source)
+            self._scheduler.finish(scheduled.source, suspended=suspended)
+
+    def _suspend(self, task: ScheduledTask) -> None:
+        future = _awaited_future(task.task)
+        if future is not None:
+            future.add_done_callback(ImmediateCallback(lambda: self._scheduler.add_task(task)))
+            return
+        pause_sec = task.next_pause()
+        if not pause_sec:
+            self._scheduler.add_task(task)
+            return
+        self._paused.add(task)
+        DelayedCall(self._deadlines, pause_sec, lambda: self._resume(task))
+
+    def _resume(self, task: ScheduledTask) -> None:
+        with suppress(KeyError):
+            self._paused.remove(task)
+            self._scheduler.add_task(task)
+
+
+class ImmediateCallback:
+    """A done callback of a future that the executor calls at once, in whichever thread it is."""
+
+    __slots__ = ('_function',)
+
+    def __init__(self, function: Callable[[], None]) -> None:
+        self._function = function
+
+    def __call__(self, _: Any) -> None:
+        """Call the function, whichever future is done."""
+        self._function()
+
+
+def _awaited_future(task: Any) -> Any:
+    """Return the rclpy future that the coroutine of `task` awaits, None if not known."""
+    awaiting = task._handler  # noqa: SLF001
+    while awaiting is not None:
+        if isinstance(awaiting, types.GeneratorType) and awaiting.gi_code is _FUTURE_AWAIT:
+            frame = awaiting.gi_frame
+            return None if frame is None else frame.f_locals.get('self')
+        awaiting = getattr(awaiting, 'cr_await', None) or getattr(awaiting, 'gi_yieldfrom', None)
+    return None

@@ -1,0 +1,294 @@
+"""What is ready to run, and which callbacks may run at the same time.
+
+A source is queued at most once, so its messages keep their order. A source whose group is busy is
+parked with the group and comes back, one at a time, when the group is free. Nothing is taken out
+of the middleware before it can run: what waits longer than the QoS depth allows is dropped there.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+from weakref import WeakKeyDictionary
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.exceptions import InvalidHandle
+
+from composer.executor.event_poller import UNKNOWN_COUNT
+
+_MIN_PAUSE_SEC = 0.0005
+_MAX_PAUSE_SEC = 0.01
+
+
+class Group:
+    """The state of one callback group in one executor."""
+
+    __slots__ = ('__weakref__', 'active', 'exclusive', 'parked', 'reentrant', 'unrestricted')
+
+    def __init__(self, callback_group: Any) -> None:
+        self.exclusive = isinstance(callback_group, MutuallyExclusiveCallbackGroup)
+        self.reentrant = isinstance(callback_group, ReentrantCallbackGroup)
+        # A subclass may have rules of its own.
+        self.unrestricted = type(callback_group) is ReentrantCallbackGroup
+        self.active = False
+        self.parked: deque[QueuedSource] = deque()
+
+
+class QueuedSource(Protocol):
+    """An entity as the scheduler sees it.
+
+    Attributes:
+        alive: Whether the executor still listens to it.
+        queued: Whether it is in a queue, parked or running.
+        pending: How many events it still has to take.
+        revision: Grows with every event, which tells whether one came meanwhile.
+    """
+
+    group: Group
+    node: Any
+    alive: bool
+    queued: bool
+    pending: int
+    revision: int
+
+
+class ScheduledTask:
+    """A task, or the rest of a callback that awaits something.
+
+    `source` is the entity whose callback it is; it is resumed only while the executor has `node`.
+    """
+
+    __slots__ = ('node', 'pause_sec', 'slow', 'source', 'task')
+
+    def __init__(self, task: Any, source: Any = None) -> None:
+        self.task = task
+        self.source = source
+        self.node = None if source is None else source.node
+        self.pause_sec = 0.0
+        self.slow = False
+
+    def is_orphan(self) -> bool:
+        """Tell whether its node has been destroyed."""
+        if self.node is None:
+            return False
+        try:
+            with self.node.handle:
+                return False
+        except InvalidHandle:
+            return True
+
+    def next_pause(self) -> float:
+        """Return how long to wait before a coroutine is resumed that awaits nothing known."""
+        pause = self.pause_sec
+        self.pause_sec = min(_MAX_PAUSE_SEC, max(_MIN_PAUSE_SEC, 2 * pause))
+        return pause
+
+
+class Scheduler:
+    """The queues of one executor. They change only under `lock`, and nothing is called under it.
+
+    Args:
+        max_running: How many callbacks may run at the same time.
+        wake: Makes the threads that wait for events look again.
+
+    Attributes:
+        running: How many callbacks have begun and not ended.
+        waiting: How many of these wait for others, and do not count against `max_running`.
+        is_spinning: Whether callbacks may begin, because a thread spins.
+        is_closed: Whether no callback begins any more.
+    """
+
+    def __init__(self, max_running: int, wake: Callable[[], None]) -> None:
+        self.lock = threading.RLock()  # A finalizer may create a task.
+        self.running = 0
+        self.waiting = 0
+        self.is_spinning = False
+        self.is_closed = False
+        self._max_running = max_running
+        self._wake = wake
+        self._ready: deque[QueuedSource] = deque()
+        self._tasks: list[ScheduledTask] = []
+        self._new_tasks: list[ScheduledTask] = []
+        self._tasks_without_node: list[ScheduledTask] = []
+        self._deferred: list[QueuedSource] = []
+        self._nodes: set[Any] = set()
+        self._prefers_tasks = True
+        self._groups: WeakKeyDictionary[Any, Group] = WeakKeyDictionary()
+
+    def __len__(self) -> int:
+        return len(self._ready) + len(self._tasks) + len(self._new_tasks)
+
+    def count_tasks(self) -> int:
+        """Return how many tasks could run now."""
+        return len(self._tasks) + len(self._new_tasks)
+
+    def has_work(self) -> bool:
+        """Tell whether something is ready, and one more callback may run."""
+        return len(self) > 0 and self._has_free_slot()
+
+    def _has_free_slot(self) -> bool:
+        return self.running - self.waiting < self._max_running
+
+    def group_of(self, callback_group: Any) -> Group:
+        """Return the state of `callback_group`."""
+        with self.lock:
+            group = self._groups.get(callback_group)
+            if group is None:
+                group = self._groups[callback_group] = Group(callback_group)
+            return group
+
+    def add_events(self, source: QueuedSource, count: int) -> None:
+        """Add `count` to what `source` has to take."""
+        with self.lock:
+            source.revision += 1
+            if source.pending < UNKNOWN_COUNT:
+                source.pending += count
+            if source.alive and not source.queued:
+                source.queued = True
+                self._ready.append(source)
+        self._wake()
+
+    def set_ready(self, source: QueuedSource) -> None:
+        """Make `source` run once, however often this is called before it does."""
+        with self.lock:
+            source.revision += 1
+            source.pending = 1
+            if source.alive and not source.queued:
+                source.queued = True
+                self._ready.append(source)
+        self._wake()
+
+    def set_empty(self, source: QueuedSource, revision: int) -> None:
+        """Note that `source` had nothing left to take when it was at `revision`."""
+        with self.lock:
+            if source.revision == revision:
+                source.pending = 0
+
+    def add_task(self, task: ScheduledTask) -> None:
+        """Queue a task."""
+        with self.lock:
+            self._new_tasks.append(task)
+        self._wake()
+
+    def set_nodes(self, nodes: set[Any]) -> None:
+        """Set the nodes whose suspended callbacks may be resumed."""
+        with self.lock:
+            self._nodes = set(nodes)
+            tasks, self._tasks_without_node = self._tasks_without_node, []
+        # Those of destroyed nodes are dropped, which runs their `finally:` blocks.
+        kept = [task for task in tasks if not task.is_orphan()]
+        with self.lock:
+            self._new_tasks += kept
+
+    def start_next(self, *, alone: bool = False) -> Any:
+        """Return a source or a task to execute now, or None; `finish` must follow.
+
+        With `alone`, also while nobody spins: for the one callback of `spin_once`.
+        """
+        with self.lock:
+            if self.is_closed or not (alone or self.is_spinning) or not self._has_free_slot():
+                return None
+            if not (self._tasks or self._new_tasks):
+                work: Any = self._next_source()
+            elif self._prefers_tasks:
+                work = self._next_task() or self._next_source()
+            else:
+                work = self._next_source() or self._next_task()
+            if work is not None:
+                self.running += 1
+            return work
+
+    def finish(self, source: QueuedSource | None, *, suspended: bool = False) -> None:
+        """Note that what was started has run; `source` frees its group unless it is suspended."""
+        with self.lock:
+            self.running -= 1
+            if source is not None and not suspended:
+                self._release(source)
+
+    def defer(self, source: QueuedSource) -> None:
+        """Undo the start of `source`, because its group refused; `retry_deferred` requeues it."""
+        with self.lock:
+            self.running -= 1
+            source.pending += 1
+            source.queued = True
+            self._deferred.append(source)
+            group = source.group
+            group.active = False
+            if group.parked:
+                self._ready.append(group.parked.popleft())
+
+    def retry_deferred(self) -> None:
+        """Queue the sources again whose groups have refused them."""
+        if self._deferred:
+            with self.lock:
+                self._ready += self._deferred
+                self._deferred = []
+            self._wake()
+
+    def add_waiting(self, number: int) -> None:
+        """Count so many more callbacks as waiting: others run in their places."""
+        with self.lock:
+            self.waiting += number
+        self._wake()
+
+    def close(self) -> None:
+        """Start nothing any more."""
+        with self.lock:
+            self.is_closed = True
+            self.is_spinning = False
+
+    def reset_after_fork(self, running: int) -> None:
+        """Start nothing any more; `running` of the running callbacks are in this process."""
+        self.is_closed = True
+        self.is_spinning = False
+        self.running = running
+        self.waiting = 0
+
+    def _release(self, source: QueuedSource) -> None:
+        group = source.group
+        if group.exclusive or not group.reentrant:
+            group.active = False
+            if source.pending and source.alive:
+                group.parked.append(source)
+            else:
+                source.queued = False
+            if group.parked:
+                self._ready.append(group.parked.popleft())
+
+    def _next_source(self) -> QueuedSource | None:
+        while self._ready:
+            source = self._ready.popleft()
+            group = source.group
+            if not source.alive or not source.pending:
+                source.queued = False
+                if group.parked and not group.active:
+                    self._ready.append(group.parked.popleft())
+                continue
+            if not group.exclusive:
+                source.pending -= 1
+                if group.reentrant and source.pending:
+                    self._ready.append(source)
+                elif group.reentrant:
+                    source.queued = False
+            elif group.active:
+                group.parked.append(source)
+                continue
+            else:
+                group.active = True
+                source.pending -= 1
+            self._prefers_tasks = True
+            return source
+        return None
+
+    def _next_task(self) -> ScheduledTask | None:
+        """Return the newest of the oldest batch, as rclpy's executors do."""
+        if not self._tasks:
+            self._tasks, self._new_tasks = self._new_tasks, []
+        while self._tasks:
+            task = self._tasks.pop()
+            if task.node is not None and task.node not in self._nodes:
+                self._tasks_without_node.append(task)
+                continue
+            self._prefers_tasks = False
+            return task
+        return None

@@ -1,0 +1,146 @@
+"""Provide the interface packages that a system names: installed, cached, or built now."""
+
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
+from composer.errors import ComposerError
+from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
+from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.packages import (
+    used_packages,
+)
+
+Origin: TypeAlias = Literal['installed', 'cached', 'built']
+
+
+class ModuleTakenError(ComposerError):
+    """Python already has another module of an interface package's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProvidedPackage:
+    """An interface package that can be imported.
+
+    Attributes:
+        package: its name.
+        prefix: where it is, for an `InterfaceCatalogue`.
+        origin: whether it was `installed`, `cached` by an earlier start, or `built` now.
+    """
+
+    package: str
+    prefix: Path
+    origin: Origin
+
+
+def provide_packages(
+    packages: Iterable[PackageDefinitions],
+    progress: Callable[[str], None],
+) -> list[ProvidedPackage]:
+    """Make interface packages importable, and build those that are neither installed nor cached.
+
+    Args:
+        packages: definitions without errors, each package after those that it uses.
+        progress: gets a short line about each step that takes long.
+
+    Raises:
+        DefinitionsDifferError: a package is installed with other definitions.
+        BuildToolsMissingError: the system lacks what building needs.
+        BuildError: a generator or compiler failed.
+        CacheError: the cache cannot be written.
+        ModuleTakenError: another Python module has a package's name.
+    """
+    provider = _Provider(ament_prefixes(), progress)
+    return [provider.provide(definitions) for definitions in packages]
+
+
+class _Provider:
+    """Provides packages in order, knowing those before."""
+
+    def __init__(self, prefixes: Sequence[Path], progress: Callable[[str], None]) -> None:
+        self._prefixes = prefixes
+        self._progress = progress
+        self._places: dict[str, Path] = {}
+        self._keys: dict[str, str] = {}
+
+    def provide(self, definitions: PackageDefinitions) -> ProvidedPackage:
+        installed = find_package(definitions.package, self._prefixes, INTERFACE_INDEX)
+        if installed is not None:
+            # Imported here, as the builder below: a cached start must not pay for it.
+            from composer.interfaces.definitions.differences import require_same
+
+            require_same(definitions, installed)
+            return ProvidedPackage(definitions.package, installed, 'installed')
+        return self._provide_built(definitions)
+
+    def _provide_built(self, definitions: PackageDefinitions) -> ProvidedPackage:
+        package = definitions.package
+        used = used_packages(definitions)
+        keys = {name: key for name, key in self._keys.items() if name in used}
+        key = compute_key(definitions, self._prefixes, keys)
+        origin: Origin = 'cached'
+
+        def build(folder: BuildFolder) -> None:
+            nonlocal origin
+            origin = 'built'
+            self._build(definitions, folder)
+
+        place = provide_cached(
+            f'{package}-{key}',
+            build,
+            lambda: self._progress(f'{package}: waiting for another start that builds it'),
+        )
+        make_importable(package, place)
+        self._places[package], self._keys[package] = place, key
+        return ProvidedPackage(package, place, origin)
+
+    def _build(self, definitions: PackageDefinitions, folder: BuildFolder) -> None:
+        from composer.interfaces.build.builder import Dependencies, build_package
+
+        count = len(definitions.interfaces)
+        interfaces = '1 interface' if count == 1 else f'{count} interfaces'
+        self._progress(f'{definitions.package}: building {interfaces} ...')
+        start = time.monotonic()
+        build_package(
+            definitions,
+            folder.path,
+            Dependencies(self._prefixes, self._places),
+            descriptors=[folder.descriptor],
+        )
+        duration_sec = time.monotonic() - start
+        self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
+
+
+def make_importable(package: str, prefix: Path) -> None:
+    """Have `import package` find the package in a prefix, now and in modules imported later.
+
+    Raises:
+        ModuleTakenError: another module of that name is found first.
+    """
+    folder = prefix / 'python'
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+        importlib.invalidate_caches()
+    origin = _find_origin(package)
+    if origin != folder / package / '__init__.py':
+        message = (
+            f'the interface package {package!r} cannot be imported: '
+            f'{origin or "another package"} has that name'
+        )
+        raise ModuleTakenError(
+            message,
+            help='rename one of them; if the definitions changed since the package was imported, '
+            'start again',
+        )
+
+
+def _find_origin(package: str) -> Path | None:
+    loaded = sys.modules.get(package)
+    spec = loaded.__spec__ if loaded else find_spec(package)
+    return Path(spec.origin) if spec and spec.origin else None

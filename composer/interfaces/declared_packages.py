@@ -1,0 +1,119 @@
+"""The interface packages that a file declares: read once, for checks and for a start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import diagnostic_at
+from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from composer.diagnostics import Diagnostic
+    from composer.interfaces.definitions.package_folder import PackageDefinitions
+    from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import SystemSpec
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredPackages:
+    """The interface packages that a file declares, and the types that its system can use.
+
+    Attributes:
+        catalogue: Describes the types of installed and of declared packages.
+        folders: The folder of each package that the system needs.
+        definitions: What the folders define, each package after those that it uses; `None` if
+            they were not read.
+        unreadable: The packages with errors; nothing is known of their types.
+        findings: These errors.
+    """
+
+    catalogue: InterfaceCatalogue
+    folders: Mapping[str, Path] = field(default_factory=dict)
+    definitions: Sequence[PackageDefinitions] | None = None
+    unreadable: frozenset[str] = frozenset()
+    findings: Sequence[Diagnostic] = ()
+
+
+def load_declared(system: LoadedSystem, installed: InterfaceCatalogue) -> DeclaredPackages:
+    """Read the definitions of the packages that a file declares.
+
+    Without any installed interface package, which is without ROS, only the folders are checked.
+    """
+    needed = _folders_of(system.spec)
+    # Nodes that are left out are checked too, which needs their types.
+    folders = _folders_of(system.unused) | needed
+    if not folders:
+        return DeclaredPackages(installed)
+    catalogue = InterfaceCatalogue()
+    absent = {package: folder for package, folder in folders.items() if not _is_folder(folder)}
+    findings = [
+        diagnostic_at(
+            system.positions.value(('interfaces', package)),
+            'unknown-interfaces',
+            f"there is no folder '{folder}' with the definitions of '{package}'",
+        )
+        for package, folder in absent.items()
+    ]
+    present = {package: folder for package, folder in folders.items() if package not in absent}
+    if not present or not catalogue.available:
+        return DeclaredPackages(catalogue, needed, None, frozenset(absent), findings)
+    definitions, errors = _load_folders(present, catalogue, system)
+    for package in definitions:
+        for description in package.interfaces.values():
+            catalogue.add(description)
+    unreadable = frozenset(folders if errors else absent)
+    return DeclaredPackages(catalogue, needed, definitions, unreadable, [*findings, *errors])
+
+
+def provide_declared(declared: DeclaredPackages, progress: Callable[[str], None]) -> Sequence[str]:
+    """Make the packages that a file declares importable, and build those that are not installed.
+
+    Returns:
+        Their names.
+
+    Raises:
+        ComposerError: A package cannot be provided; the help says what to install or change.
+    """
+    if not declared.folders:
+        return ()
+    # Most files declare no packages, and should not pay for these imports.
+    from composer.interfaces.build.provision import provide_packages
+    from composer.interfaces.definitions.packages import load_packages
+
+    definitions = declared.definitions
+    if definitions is None:
+        definitions = load_packages(declared.folders, declared.catalogue)
+    needed = [each for each in definitions if each.package in declared.folders]
+    return [provided.package for provided in provide_packages(needed, progress)]
+
+
+def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:
+    return {package: Path(folder) for package, folder in spec.interfaces.items()} if spec else {}
+
+
+def _load_folders(
+    folders: Mapping[str, Path], catalogue: InterfaceCatalogue, system: LoadedSystem
+) -> tuple[list[PackageDefinitions], Sequence[Diagnostic]]:
+    """Return what the folders define, or nothing and the errors."""
+    from composer.interfaces.definitions.packages import DefinitionsError, load_packages
+
+    try:
+        return load_packages(folders, catalogue), ()
+    except DefinitionsError as error:
+        return [], error.diagnostics
+    except ComposerError as error:
+        span = system.positions.key(('interfaces',))
+        return [], [diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)]
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:
+        # The path is too long, or a folder on it cannot be searched.
+        return False

@@ -1,0 +1,95 @@
+"""An external process and its runs: its state, how it ended, and whether it is started again."""
+
+from __future__ import annotations
+
+import queue
+import signal
+import threading
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from composer.processes.backoff import Backoff
+
+if TYPE_CHECKING:
+    from composer.language.specs import ProcessSpec
+
+
+@dataclass(slots=True)
+class ProcessRun:
+    """One run of a process.
+
+    Attributes:
+        number: Identifies the run in requests to the reaper and in its answers.
+        output_ended: Set when no process holds its output open any more.
+        code: The exit code, or a signal's number, negative; `None` while it runs.
+        answer: The reaper's answer to the request to start it.
+        gone: Set when nothing of its process group is left.
+    """
+
+    number: int
+    process: ExternalProcess
+    output_ended: threading.Event
+    code: int | None = None
+    answer: queue.SimpleQueue[dict[str, Any]] = field(default_factory=queue.SimpleQueue)
+    gone: threading.Event = field(default_factory=threading.Event)
+    was_killed: bool = False
+
+
+class ExternalProcess:
+    """A process of the system.
+
+    Attributes:
+        run: The last one; `None` before the first.
+        restarts: How often it was started again.
+        is_done: Whether it has ended for good.
+    """
+
+    def __init__(self, spec: ProcessSpec) -> None:
+        self.spec = spec
+        self.run: ProcessRun | None = None
+        self.restarts = 0
+        self.is_done = False
+        # A process that keeps dying is started again ever more slowly, as nodes are.
+        self.backoff = Backoff(least_sec=spec.restart_delay_sec)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it runs, or has ended with exit code 0."""
+        return self.run is not None and self.run.code in (None, 0)
+
+    @property
+    def state(self) -> str:
+        """Its state in words."""
+        if self.run is None:
+            return 'it has not been started'
+        return 'it runs' if self.run.code is None else f'it {describe_end(self.run.code)}'
+
+    def is_restarted(self, code: int) -> bool:
+        """Return whether it is started again after it has ended with this code."""
+        most = self.spec.most_restarts
+        return self._may_restart(code) and (most is None or self.restarts < most)
+
+    def describe_limit(self, code: int) -> str:
+        """Return that it has used up its restarts; an empty string if that is not the reason."""
+        most = self.spec.most_restarts
+        if not (most and self._may_restart(code)):
+            return ''
+        return f', and was started again {"once" if most == 1 else f"{most} times"} already'
+
+    def _may_restart(self, code: int) -> bool:
+        restart = self.spec.restart
+        return restart == 'always' or (restart == 'on_failure' and code != 0)
+
+
+def describe_end(code: int) -> str:
+    """Return how a process has ended, as in `has ended with exit code 1`.
+
+    Args:
+        code: The exit code, or a signal's number, negative.
+    """
+    if code >= 0:
+        return f'has ended with exit code {code}'
+    try:
+        return f'was ended by {signal.Signals(-code).name}'
+    except ValueError:
+        return f'was ended by signal {-code}'

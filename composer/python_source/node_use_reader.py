@@ -1,0 +1,207 @@
+"""The uses themselves: what the text of a function does with the node, place by place."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+from typing import TYPE_CHECKING
+
+from composer.python_source.control_flow import WayReader
+from composer.python_source.local_names import is_name
+from composer.python_source.node_uses import ALL_KINDS, NodePass, NodeUse, UseKind
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+_METHODS: dict[str, UseKind] = {
+    'publish': 'publisher',
+    'call': 'service client',
+    'call_async': 'service client',
+    'send_goal': 'action client',
+}
+# Attributes of `composer.Node` through which nothing that a file declares is reached by name.
+_HARMLESS = {'name', 'logger', 'now', 'state', 'own_state', 'shutdown', 'set_parameters'}
+# What a mapping has itself, so that `node.parameters.get` is no parameter.
+_OF_MAPPINGS = {'get', 'items', 'keys', 'values'}
+
+
+class UseReader(WayReader):
+    """Notes what each place does with the node, and what is known of the way there.
+
+    Args:
+        texts: The names that are a text for good, as `find_texts` tells.
+
+    The others are as in `WayReader`.
+    """
+
+    def __init__(
+        self,
+        node_name: str,
+        local: set[str],
+        chosen: set[str],
+        run: Collection[str],
+        texts: Mapping[str, str],
+    ) -> None:
+        super().__init__(node_name, local, chosen, run)
+        self._texts = texts
+        self.uses: list[NodeUse] = []
+        self.passes: list[NodePass] = []
+        self.open_kinds: set[UseKind] = set()
+        self.reads_others = False
+        self.reaches_ros = False
+        self._awaited: ast.AST | None = None
+
+    def visit_Name(self, node: ast.Name) -> None:
+        """Anything else than what the other methods know may do anything with the node."""
+        if node.id == self.node_name:
+            self.open_kinds |= ALL_KINDS
+
+    def visit_Attribute(self, node: ast.Attribute) -> None:
+        """`node.parameters.x`, and attributes that are not called."""
+        if self._is_parameters(node.value):
+            if isinstance(node.ctx, ast.Load) and node.attr not in _OF_MAPPINGS:
+                self._use('parameter', node.attr, node)
+            else:
+                self.open_kinds.add('parameter')
+        elif not is_name(node.value, self.node_name):
+            self.visit(node.value)
+        elif node.attr in _METHODS:
+            self.open_kinds.add(_METHODS[node.attr])
+        elif node.attr in ('parameters', 'ros'):
+            self.open_kinds.add('parameter')
+            self.reaches_ros |= node.attr == 'ros'
+        elif node.attr == 'get_parameters':
+            self.reads_others = True
+        elif node.attr not in _HARMLESS:
+            self.open_kinds |= ALL_KINDS
+
+    def visit_Subscript(self, node: ast.Subscript) -> None:
+        """`node.parameters['x']`."""
+        name = self._text(node.slice)
+        if name is not None and self._is_parameters(node.value) and _is_load(node):
+            self._use('parameter', name, node.slice)
+        else:
+            self.generic_visit(node)
+
+    def visit_Compare(self, node: ast.Compare) -> None:
+        """`'x' in node.parameters` uses it, and copes without."""
+        name = self._text(node.left)
+        if name is not None and len(node.ops) == 1 and self._is_parameters(node.comparators[0]):
+            self._use('parameter', name, node.left, is_optional=True, has_default=True)
+        else:
+            self.generic_visit(node)
+
+    def visit_Await(self, node: ast.Await) -> None:
+        """What is awaited is waited for."""
+        self._awaited = node.value
+        self.visit(node.value)
+
+    def visit_Call(self, node: ast.Call) -> None:
+        """`node.publish('x', …)` and the like, `node.parameters.get('x')`, `helper(node)`."""
+        function = node.func
+        if isinstance(function, ast.Attribute) and is_name(function.value, self.node_name):
+            self._visit_method(node, function)
+        elif (
+            isinstance(function, ast.Attribute)
+            and function.attr == 'get'
+            and self._is_parameters(function.value)
+        ):
+            self._visit_get(node)
+        elif isinstance(function, ast.Name) and function.id not in self.local:
+            self._visit_pass(node, function.id)
+        else:
+            self.generic_visit(node)
+
+    def _visit_method(self, node: ast.Call, function: ast.Attribute) -> None:
+        kind = _METHODS.get(function.attr)
+        arguments = [*node.args, *(keyword.value for keyword in node.keywords)]
+        if kind is None:
+            self.visit_Attribute(function)
+        else:
+            by_keyword = [each.value for each in node.keywords if each.arg == 'name']
+            named = next(iter([*node.args, *by_keyword]), None)
+            name = self._text(named)
+            if name is None or named is None:
+                self.open_kinds.add(kind)
+            else:
+                waits = function.attr != 'call_async' or self._awaited is node
+                self._use(kind, name, named, waits=waits)
+                arguments.remove(named)
+        for argument in arguments:
+            self.visit(argument)
+
+    def _visit_get(self, node: ast.Call) -> None:
+        name = self._text(node.args[0]) if node.args else None
+        if name is None:
+            self.open_kinds.add('parameter')
+        else:
+            has_default = len(node.args) + len(node.keywords) > 1
+            self._use('parameter', name, node.args[0], is_optional=True, has_default=has_default)
+        for argument in (*node.args[1:], *(keyword.value for keyword in node.keywords)):
+            self.visit(argument)
+
+    def _visit_pass(self, node: ast.Call, function: str) -> None:
+        places: list[tuple[int | str, ast.expr]] = list(enumerate(node.args))
+        places += [(each.arg or '', each.value) for each in node.keywords]
+        # Behind `*arguments` no position is known.
+        is_plain = not any(isinstance(argument, ast.Starred) for argument in node.args)
+        may_be_helper = is_plain and not hasattr(builtins, function)
+        for position, value in places:
+            if may_be_helper and position != '' and is_name(value, self.node_name):
+                self.passes.append(
+                    NodePass(
+                        function,
+                        position,
+                        is_certain=not self.doubts,
+                        is_guarded=bool(self.guards),
+                        is_awaited=self._awaited is node,
+                        waits=not self.depth,
+                    )
+                )
+            else:
+                self.visit(value)
+
+    def _text(self, node: ast.expr | None) -> str | None:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            return node.value
+        return self._texts.get(node.id) if isinstance(node, ast.Name) else None
+
+    def _is_parameters(self, node: ast.expr) -> bool:
+        return (
+            isinstance(node, ast.Attribute)
+            and node.attr == 'parameters'
+            and is_name(node.value, self.node_name)
+        )
+
+    def _use(
+        self,
+        kind: UseKind,
+        name: str,
+        at: ast.expr,
+        *,
+        is_optional: bool = False,
+        has_default: bool = False,
+        waits: bool = False,
+    ) -> None:
+        end = at.end_col_offset or 0
+        length = len(at.id) if isinstance(at, ast.Name) else len(name)
+        is_bare = isinstance(at, ast.Attribute | ast.Name)
+        line, column = at.end_lineno or 1, end - length + is_bare
+        self.uses.append(
+            NodeUse(
+                kind,
+                name,
+                line,
+                column,
+                length,
+                is_optional=is_optional,
+                has_default=has_default,
+                is_certain=not self.doubts,
+                is_guarded=bool(self.guards),
+                waits=waits and not self.depth,
+            )
+        )
+
+
+def _is_load(node: ast.Subscript) -> bool:
+    return isinstance(node.ctx, ast.Load)

@@ -1,0 +1,235 @@
+"""`composer.Node`: what a behaviour sees of its node."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from composer.entity_kinds import KIND_OF_SECTION
+from composer.errors import ComposerError
+from composer.names import did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from types import SimpleNamespace
+
+    import rclpy.node
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+    from rclpy.time import Time
+
+    from composer.runtime.nodes.goals import Goal
+    from composer.runtime.nodes.remote_parameters import RemoteParameters
+
+# A message, a mapping of (nested) fields, or the bare value of a message with one field.
+Payload: TypeAlias = Any
+
+
+class Publish(Protocol):
+    """Publishes payloads on one topic."""
+
+    def __call__(self, payload: Payload) -> None:
+        """Convert the payload to the publisher's type, and publish it."""
+
+
+class UndeclaredError(ComposerError):
+    """A behaviour asks for something that its node does not declare in the file."""
+
+
+class UndeclaredParameterError(UndeclaredError, KeyError, AttributeError):
+    """A behaviour asks for a parameter that its node does not declare in the file.
+
+    As a `KeyError` and an `AttributeError` it lets `in`, `get` and `getattr` do what they promise.
+    """
+
+    __str__ = Exception.__str__
+
+
+class Parameters(Mapping[str, Any]):
+    """The values of a node's parameters, as they are now.
+
+    `parameters.speed` and `parameters['speed']` are the same; names with dots, and those that a
+    mapping has itself (`keys`, `get`, …), need the second form.
+    """
+
+    def __init__(self, ros: rclpy.node.Node) -> None:
+        self._ros = ros
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a parameter's value: a bool, int, float, str or a list of these."""
+        if not self._ros.has_parameter(name):
+            message = f"node '{self._ros.get_name()}' has no parameter '{name}'"
+            raise UndeclaredParameterError(message, help=did_you_mean(name, self, 'it has'))
+        value = self._ros.get_parameter_or(name).value
+        return value.tolist() if hasattr(value, 'tolist') else value
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a parameter's value."""
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return self[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the declared parameters."""
+        return iter(self._ros.list_parameters([], 0).names)
+
+    def __len__(self) -> int:
+        """Return how many parameters there are."""
+        return len(list(iter(self)))
+
+
+class Node:
+    """A node, as its behaviours see it.
+
+    Attributes:
+        name: The node's name, without its namespace.
+        parameters: The values of its parameters, always those of now.
+        state: What the behaviours of the node share; starts as the file's `state:`. Behaviours of
+            one callback group never run at the same time, so it needs no lock.
+        own_state: What the behaviour of one timer, subscription, service or action keeps for
+            itself from call to call; empty at the start. Two uses of a behaviour in one node have
+            one each; the goals of an action share theirs.
+        ros: The rclpy node beneath, for what is not here.
+    """
+
+    __slots__ = (
+        '_entities',
+        '_remote_parameters',
+        '_shutdown',
+        'name',
+        'own_state',
+        'parameters',
+        'ros',
+        'state',
+    )
+
+    def __init__(
+        self,
+        ros: rclpy.node.Node,
+        state: SimpleNamespace,
+        entities: Mapping[str, Mapping[str, Any]],
+        remote_parameters: RemoteParameters,
+        shutdown: Callable[[int], None],
+    ) -> None:
+        self.name: str = ros.get_name()
+        self.ros = ros
+        self.state = state
+        self.own_state: dict[str, Any] = {}
+        self.parameters = Parameters(ros)
+        self._entities = entities
+        self._remote_parameters = remote_parameters
+        self._shutdown = shutdown
+
+    def with_own_state(self) -> Node:
+        """Return the same node with an `own_state` of its own; for Composer itself."""
+        node = copy.copy(self)
+        node.own_state = {}
+        return node
+
+    @property
+    def logger(self) -> RcutilsLogger:
+        """The node's ROS logger."""
+        return self.ros.get_logger()
+
+    def now(self) -> Time:
+        """Return the time of the node's clock: simulated if `use_sim_time` is set."""
+        return self.ros.get_clock().now()
+
+    def publish(self, name: str, payload: Payload) -> None:
+        """Publish on one of the node's declared publishers.
+
+        Args:
+            name: The publisher's name in the file.
+            payload: A message, a mapping of (nested) fields, or the bare value if the message
+                has one field.
+
+        Raises:
+            UndeclaredError: The node declares no such publisher.
+            PayloadError: The payload does not fit the publisher's type.
+        """
+        self._entity('publishers', name)(payload)
+
+    def call(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Any:
+        """Call a service and return its response; works in any behaviour.
+
+        Args:
+            name: The service client's name in the file.
+            payload: The request.
+            timeout: How long to wait for the server and its response, in seconds; `None` for
+                no end.
+
+        Raises:
+            UndeclaredError: The node declares no such service client.
+            PayloadError: The payload does not fit the request.
+            ServiceNotAvailableError: No server appeared in time.
+            CallTimeoutError: The server did not answer in time.
+            ServiceFailedError: The server is in this system, and its behaviour raised.
+        """
+        client = self._entity('service_clients', name)
+        return client.call({} if payload is None else payload, timeout)
+
+    async def call_async(
+        self,
+        name: str,
+        payload: Payload = None,
+        timeout: float | None = 5.0,  # noqa: ASYNC109 - as in `call`; rclpy's loop has no scopes
+    ) -> Any:
+        """As `call`, for `async def` behaviours: no thread is held while it waits."""
+        client = self._entity('service_clients', name)
+        return await client.call_async({} if payload is None else payload, timeout)
+
+    def send_goal(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Goal:
+        """Send a goal and return it once the server has accepted it.
+
+        Args:
+            name: The action client's name in the file.
+            payload: The goal.
+            timeout: How long to wait for the server and its answer, in seconds; `None` for no
+                end.
+
+        Raises:
+            UndeclaredError: The node declares no such action client.
+            PayloadError: The payload does not fit the goal.
+            ActionNotAvailableError: No server appeared in time.
+            GoalTimeoutError: The server did not answer in time.
+            GoalRejectedError: The server refused the goal.
+        """
+        client = self._entity('action_clients', name)
+        goal: Goal = client.send_goal({} if payload is None else payload, timeout)
+        return goal
+
+    def set_parameters(
+        self, node_name: str, values: Mapping[str, Any], timeout: float | None = 5.0
+    ) -> None:
+        """Set parameters of another node; a relative name lies in this node's namespace.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear within `timeout` seconds.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It refused; the message has its reasons.
+        """
+        self._remote_parameters.set(node_name, values, timeout)
+
+    def get_parameters(
+        self, node_name: str, names: Iterable[str], timeout: float | None = 5.0
+    ) -> dict[str, Any]:
+        """Return the values of another node's parameters, `None` for one that is not set.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear within `timeout` seconds.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It has no such parameters.
+        """
+        return self._remote_parameters.get(node_name, names, timeout)
+
+    def shutdown(self, code: int = 0) -> None:
+        """End the whole system with this exit code; it stops after this behaviour has returned."""
+        self._shutdown(code)
+
+    def _entity(self, section: str, name: str) -> Any:
+        entities = self._entities[section]
+        entity = entities.get(name)
+        if entity is None:
+            message = f"node '{self.name}' declares no {KIND_OF_SECTION[section].noun} '{name}'"
+            raise UndeclaredError(message, help=did_you_mean(name, entities, 'it declares'))
+        return entity

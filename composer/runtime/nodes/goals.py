@@ -1,0 +1,105 @@
+"""Goals as behaviours see them: what `node.send_goal` returns."""
+
+from __future__ import annotations
+
+import queue
+from typing import TYPE_CHECKING, Any
+
+from action_msgs.msg import GoalStatus
+
+from composer.errors import GoalTimeoutError
+from composer.runtime.behaviours.waits import stopping_error
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
+
+_STATUS_NAMES = {
+    GoalStatus.STATUS_UNKNOWN: 'unknown',
+    GoalStatus.STATUS_ACCEPTED: 'accepted',
+    GoalStatus.STATUS_EXECUTING: 'executing',
+    GoalStatus.STATUS_CANCELING: 'canceling',
+    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
+    GoalStatus.STATUS_CANCELED: 'canceled',
+    GoalStatus.STATUS_ABORTED: 'aborted',
+}
+
+# What a wait for feedback gets when a stop is requested.
+_STOPPED = object()
+
+
+class Goal:
+    """A goal that a server has accepted.
+
+    Attributes:
+        heard: The feedback that has come, then `None` when the goal has ended.
+    """
+
+    def __init__(self, name: str, waits: ThreadWaits, coroutine_waits: CoroutineWaits) -> None:
+        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._name = name
+        self._waits = waits
+        self._coroutine_waits = coroutine_waits
+        self._handle: Any = None
+        self.result_future: Any = None
+
+    def begin(self, handle: Any) -> None:
+        """Take the handle of the accepted goal, and ask for its result."""
+        self._handle = handle
+        self.result_future = handle.get_result_async()
+
+    @property
+    def status(self) -> str:
+        """How the goal is: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
+        if self.result_future.done():
+            return _STATUS_NAMES[self.result_future.result().status]
+        return 'executing'
+
+    @property
+    def feedback(self) -> Iterator[Any]:
+        """The feedback messages as they come, until the goal has ended; each comes once.
+
+        Raises:
+            SystemStoppingError: A stop was requested while it waited for the next one.
+        """
+        while (message := self._next_feedback()) is not None:
+            yield message
+        self.heard.put(None)
+
+    def _next_feedback(self) -> Any:
+        waking = self._waits.stop.waking(lambda: self.heard.put(_STOPPED))
+        with waking, self._waits.make_room():
+            message = self.heard.get()
+        if message is _STOPPED:
+            raise stopping_error()
+        return message
+
+    def cancel(self, timeout: float | None = 5.0) -> bool:
+        """Ask the server to cancel the goal; return whether it agreed.
+
+        Raises:
+            GoalTimeoutError: It did not answer within `timeout` seconds.
+        """
+        future = self._handle.cancel_goal_async()
+        if not self._waits.until_done(future, timeout):
+            message = f"the server of '{self._name}' did not answer the request to cancel"
+            raise GoalTimeoutError(message)
+        return bool(future.result().goals_canceling)
+
+    def result(self, timeout: float | None = None) -> Any:
+        """Wait for the end of the goal, and return its result message; `status` says how it ended.
+
+        Raises:
+            GoalTimeoutError: It did not end within `timeout` seconds.
+            SystemStoppingError: A stop was requested while it waited.
+        """
+        if not self._waits.until_done(self.result_future, timeout):
+            message = f"the goal of '{self._name}' did not end within {timeout:g} s"
+            raise GoalTimeoutError(message)
+        return self.result_future.result().result
+
+    async def result_async(self) -> Any:
+        """As `result`, without holding a thread while it waits."""
+        await self._coroutine_waits.until_done(self.result_future, None)
+        return self.result_future.result().result

@@ -1,0 +1,126 @@
+"""The parameters of other nodes, through their parameter services."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from composer.errors import (
+    CallTimeoutError,
+    ParametersRefusedError,
+    ServiceNotAvailableError,
+)
+from composer.names import join_names
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+    from rclpy.callback_groups import CallbackGroup
+    from rclpy.node import Node
+
+    from composer.runtime.behaviours.waits import ThreadWaits
+
+
+class RemoteParameters:
+    """Gets and sets parameters of any node of the graph.
+
+    Args:
+        ros: The node that asks.
+        namespace: Where relative names of nodes lie.
+        group: The callback group of its clients.
+        without_services: The full names of the system's nodes without parameter services.
+    """
+
+    def __init__(
+        self,
+        ros: Node,
+        namespace: str,
+        waits: ThreadWaits,
+        group: CallbackGroup,
+        without_services: Collection[str],
+    ) -> None:
+        self._ros = ros
+        self._namespace = namespace
+        self._waits = waits
+        self._group = group
+        self._without_services = without_services
+        self._clients: dict[str, Any] = {}
+
+    def set(self, node_name: str, values: Mapping[str, Any], timeout_sec: float | None) -> None:
+        """Set parameters of a node.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear in time, or has no such services.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It refused; the message has its reasons.
+        """
+        parameters = [
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]
+        request = SetParameters.Request(parameters=parameters)
+        response = self._call(node_name, SetParameters, 'set_parameters', request, timeout_sec)
+        refusals = [
+            f"'{name}': {result.reason}"
+            for name, result in zip(values, response.results, strict=True)
+            if not result.successful
+        ]
+        if refusals:
+            message = f"node '{node_name}' refused {'; '.join(refusals)}"
+            raise ParametersRefusedError(message)
+
+    def get(
+        self, node_name: str, names: Iterable[str], timeout_sec: float | None
+    ) -> dict[str, Any]:
+        """Return the values of a node's parameters; `None` for one that is not set.
+
+        Raises:
+            ServiceNotAvailableError: The node did not appear in time, or has no such services.
+            CallTimeoutError: It did not answer in time.
+            ParametersRefusedError: It has no such parameters.
+        """
+        wanted = list(names)
+        request = GetParameters.Request(names=wanted)
+        response = self._call(node_name, GetParameters, 'get_parameters', request, timeout_sec)
+        if len(response.values) != len(wanted):
+            message = f"node '{node_name}' does not have all of {', '.join(wanted)}"
+            raise ParametersRefusedError(message)
+        values = map(parameter_value_to_python, response.values)
+        return dict(zip(wanted, values, strict=True))
+
+    def _call(
+        self, node_name: str, kind: Any, service: str, request: Any, timeout_sec: float | None
+    ) -> Any:
+        full_name = node_name
+        if not node_name.startswith('/'):
+            full_name = join_names(self._namespace, node_name)
+        if full_name in self._without_services:
+            message = f"node '{full_name}' has no parameter services"
+            advice = "write 'parameter_services: true' where the file declares it"
+            raise ServiceNotAvailableError(message, help=advice)
+        client = self._client(kind, join_names(full_name, service))
+        begun = monotonic()
+        waits = self._waits
+        if not waits.until_true(client.service_is_ready, timeout_sec):
+            message = f"no node '{full_name}' with parameter services appeared in time"
+            raise ServiceNotAvailableError(message)
+        future = client.call_async(request)
+        left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
+        try:
+            if not waits.until_done(future, left):
+                message = f"node '{full_name}' did not answer in time"
+                raise CallTimeoutError(message)
+        finally:
+            if not future.done():
+                client.remove_pending_request(future)
+        return future.result()
+
+    def _client(self, kind: Any, service: str) -> Any:
+        # A client is kept: to make one and find its server takes longer than the call.
+        if service not in self._clients:
+            self._clients[service] = self._ros.create_client(
+                kind, service, callback_group=self._group
+            )
+        return self._clients[service]

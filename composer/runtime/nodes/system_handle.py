@@ -1,0 +1,72 @@
+"""What the nodes of a system share."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rclpy.context import Context
+
+    from composer.language.specs import OnError, QosSpec
+    from composer.runtime.health.statistics import HealthRegistry
+    from composer.runtime.stop_request import StopRequest
+    from composer.runtime.system_executor import SystemExecutor
+    from composer.yaml_text.positions import SourceMap
+
+
+class ServiceFailures:
+    """When the behaviour of a service last raised an error, by the service's full name.
+
+    A client in the same system that times out can then tell its caller why.
+    """
+
+    def __init__(self) -> None:
+        self._times: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    def note(self, service: str) -> None:
+        """Note that a request got no response because the behaviour raised an error."""
+        with self._lock:
+            self._times[service] = monotonic()
+
+    def since(self, service: str, begun: float) -> bool:
+        """Return whether the service failed after `begun`, a time of `time.monotonic`."""
+        with self._lock:
+            return self._times.get(service, float('-inf')) >= begun
+
+
+@dataclass(frozen=True, slots=True)
+class SystemHandle:
+    """What nodes need of the system that they belong to.
+
+    Attributes:
+        positions: Where the parts of the system were written.
+        profiles: The named QoS profiles of the file.
+        functions: The behaviours, by their names.
+        ros_arguments: The arguments after `--ros-args` of the command line.
+        act_on_error: Takes a node's full name and what to do after an error in it.
+        shutdown: Ends the system with an exit code.
+        executor: Runs the callbacks of all nodes.
+        stop: The request to stop the system.
+        failures: Which services failed lately.
+        without_parameter_services: The full names of the nodes that have none.
+        health: The health of the system's entities; `None` measures nothing.
+    """
+
+    context: Context
+    positions: SourceMap
+    profiles: Mapping[str, QosSpec]
+    functions: Mapping[str, Callable[..., Any]]
+    ros_arguments: Sequence[str]
+    act_on_error: Callable[[str, OnError], None]
+    shutdown: Callable[[int], None]
+    executor: SystemExecutor
+    stop: StopRequest
+    failures: ServiceFailures
+    without_parameter_services: frozenset[str]
+    health: HealthRegistry | None

@@ -1,0 +1,133 @@
+"""What `on_error` says is done when a behaviour raises; above all, nodes are restarted."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from composer.errors import ComposerError
+from composer.processes.backoff import Backoff
+from composer.runtime.logs import system_logger
+from composer.runtime.stop import stop_node
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from composer.language.specs import OnError
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.system_handle import SystemHandle
+    from composer.runtime.start import NodeStarter
+
+_GONE_SEC = 2.0
+
+
+class ErrorPolicy:
+    """Does what `on_error` says when a behaviour raises.
+
+    Args:
+        restart: Rebuilds the node of this name.
+        shutdown: Ends the system with this exit code.
+    """
+
+    def __init__(self, restart: Callable[[str], None], shutdown: Callable[[int], None]) -> None:
+        self._restart = restart
+        self._shutdown = shutdown
+        self._backoffs: dict[str, Backoff] = {}
+        self._restarting: set[str] = set()
+        self._lock = threading.Lock()
+        self._stopped = threading.Event()
+
+    def act(self, node: str, on_error: OnError) -> None:
+        """Do what `on_error` says about an error of a node."""
+        if on_error == 'shutdown':
+            self._shutdown(1)
+        elif on_error == 'restart':
+            with self._lock:
+                if node in self._restarting:
+                    return
+                self._restarting.add(node)
+            # The behaviour that raised is one of the node's callbacks: it must end first.
+            threading.Thread(
+                target=self._restart_later, args=(node,), name=f'restart-{node}', daemon=True
+            ).start()
+
+    def stop(self) -> None:
+        """Restart no more nodes."""
+        self._stopped.set()
+
+    def _restart_later(self, node: str) -> None:
+        backoff = self._backoffs.setdefault(node, Backoff())
+        stopped = self._stopped.wait(backoff.next_delay_sec())
+        with self._lock:
+            self._restarting.discard(node)
+        if not stopped:
+            self._restart(node)
+
+
+class NodeRestarter:
+    """Rebuilds nodes, one at a time.
+
+    Args:
+        nodes: The nodes of the system, by their full names.
+        timeout_sec: How long the behaviours of a node get to end.
+
+    Attributes:
+        lock: Held while a node is rebuilt, so that nobody stops half of one.
+    """
+
+    def __init__(
+        self,
+        nodes: Mapping[str, LiveNode],
+        starter: NodeStarter,
+        services: SystemHandle,
+        timeout_sec: float,
+    ) -> None:
+        self.lock = threading.Lock()
+        self._nodes = nodes
+        self._starter = starter
+        self._services = services
+        self._timeout_sec = timeout_sec
+
+    def restart(self, full_name: str) -> None:
+        """Rebuild a node: its entities, parameters and state are as at the start again.
+
+        One that hangs goes on as it is. If the new one cannot start, that is an error of the
+        node, after which it is restarted again.
+        """
+        with self.lock:
+            old = self._nodes[full_name]
+            if self._services.stop.is_set or not self._end(old):
+                return
+            try:
+                self._build(old)
+            except ComposerError as error:
+                system_logger.error(f'restart: {error}')
+                self._services.act_on_error(full_name, 'restart')
+                return
+        system_logger.warn(f"node '{old.spec.key}' was restarted")
+
+    def _end(self, node: LiveNode) -> bool:
+        """Remove a node; return whether a new one may take its place."""
+        stop, executor, name = self._services.stop, self._services.executor, node.spec.key
+        has_ended = stop_node(node, self._timeout_sec, lambda: stop.is_set)
+        if stop.is_set:
+            return False
+        if not has_ended:
+            executor.wake()
+            hanging = ', '.join(call.owner for call in node.ledger.running())
+            system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
+            return False
+        executor.remove_node(node.ros)
+        node.destroy()
+        if not node.ros.wait_until_gone(_GONE_SEC):
+            system_logger.warn(
+                f"node '{name}': something still holds an entity of the node before its "
+                'restart, so its log may be missing on /rosout'
+            )
+        return True
+
+    def _build(self, old: LiveNode) -> None:
+        node = self._starter.create(old.spec)
+        self._services.executor.add_node(node.ros)
+        self._starter.run_on_start(node)
+        self._starter.open([node])

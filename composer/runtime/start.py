@@ -1,0 +1,84 @@
+"""How nodes start: their entities come up, `on_start` runs, then the behaviours may be called."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rclpy.exceptions import InvalidHandle
+
+from composer.errors import StartError
+from composer.runtime.behaviours.tracebacks import represent
+from composer.runtime.entities.creators import create_entities
+from composer.runtime.nodes.live_node import LiveNode, create_live_node
+
+if TYPE_CHECKING:
+    from composer.language.specs import NodeSpec
+    from composer.runtime.nodes.system_handle import SystemHandle
+
+_POLL_SEC = 0.05
+
+
+class NodeStarter:
+    """Creates and starts the nodes of a system, at its start and anew.
+
+    Args:
+        nodes: Takes each node that is created, by its full name.
+    """
+
+    def __init__(self, nodes: dict[str, LiveNode], services: SystemHandle) -> None:
+        self._nodes = nodes
+        self._services = services
+
+    def create(self, spec: NodeSpec) -> LiveNode:
+        """Create a node with all its entities; none of its behaviours is called yet.
+
+        Raises:
+            StartError: It, or one of them, cannot be created.
+        """
+        try:
+            node = create_live_node(spec, self._services)
+        except Exception as error:
+            message = f"node '{spec.key}' cannot be created: {error}"
+            raise StartError(message) from error
+        self._nodes[spec.full_name] = node
+        create_entities(node)
+        return node
+
+    def run_on_start(self, node: LiveNode) -> None:
+        """Call a node's `on_start`, and wait for its end or for a stop of the system.
+
+        Raises:
+            StartError: It raised.
+        """
+        hook = node.spec.on_start
+        if self._services.stop.is_set:
+            return
+        node.has_begun = True
+        if hook is None:
+            return
+        failures: list[BaseException] = []
+        call = node.hook('on_start', hook, failures.append)
+        done = threading.Event()
+        task = self._services.executor.create_task(call.as_callback(), node.behaviour_node)
+        task.add_done_callback(lambda _task: done.set())
+        while not done.wait(_POLL_SEC) and not self._services.stop.is_set:
+            pass
+        if failures:
+            # What has not begun has nothing to stop.
+            node.has_begun = False
+            message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
+            raise StartError(message) from failures[0]
+        node.gate.serves = not self._services.stop.is_set
+        self._services.executor.wake()
+
+    def open(self, nodes: list[LiveNode]) -> None:
+        """Let the behaviours of nodes that have started be called."""
+        for node in nodes:
+            node.gate.open()
+            for timer in node.timers:
+                with suppress(InvalidHandle):
+                    # `on_start` may have destroyed it.
+                    timer.reset()
+        self._services.executor.wake()

@@ -1,0 +1,161 @@
+"""How nodes stop: nothing new begins, what waits half-way is ended, `on_stop` is heard."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import suppress
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from rclpy.exceptions import InvalidHandle
+
+from composer.python_source.modules import FunctionKind
+from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.logs import system_logger
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.runtime.nodes.live_node import LiveNode
+
+_POLL_SEC = 0.05
+
+
+def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
+    """Let all behaviours end, at the same time in all nodes.
+
+    A node's `on_stop` is called when its behaviours have ended, and after half the time if they
+    have not: what must be switched off is switched off even beside a callback that hangs.
+    Services of nodes without an `on_stop` answer until all of them have ended.
+
+    Returns:
+        Whether all of them ended in time; the stacks of those that did not have been logged.
+    """
+    deadline = monotonic() + timeout_sec
+    for node in nodes:
+        node.gate.is_open = False
+        _cancel_timers(node)
+    ends = [_End(node, timeout_sec) for node in reversed(nodes) if _has_an_end(node)]
+    for end in ends:
+        end.wait(deadline)
+    for node in nodes:
+        node.gate.close()
+    ended = [_wait_until_idle(node, deadline) for node in nodes]
+    return all(ended) and all(end.is_over for end in ends)
+
+
+def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) -> bool:
+    """Let one node end so that it can be built anew.
+
+    Args:
+        gives_up: Whether that is not wanted any more.
+
+    Returns:
+        Whether it has ended. If only `on_stop` has not, the node stays closed; if one of its
+        behaviours hangs, nothing has been done to it.
+    """
+    node.gate.close()
+    if not _wait_for(node.ledger.wait_until_idle, timeout_sec, gives_up):
+        node.gate.open()
+        return False
+    _cancel_timers(node)
+    if _has_an_end(node):
+        ended = threading.Event()
+
+        def end() -> None:
+            _end(node, timeout_sec)
+            ended.set()
+
+        threading.Thread(target=end, daemon=True).start()
+        _wait_for(ended.wait, timeout_sec, gives_up)
+    # It is not stopped twice.
+    node.has_begun = False
+    node.at_stop.clear()
+    return node.ledger.wait_until_idle(0.0)
+
+
+def _wait_for(
+    wait: Callable[[float], bool], timeout_sec: float, gives_up: Callable[[], bool]
+) -> bool:
+    deadline = monotonic() + timeout_sec
+    while not wait(_POLL_SEC):
+        if gives_up() or monotonic() > deadline:
+            return False
+    return True
+
+
+class _End:
+    """The end of one node, in a thread of its own if there can be one.
+
+    There is none where the process has all threads that it may have, and one that begins may
+    break off at once, at a tracing function that a behaviour has set for all of them.
+
+    Attributes:
+        is_over: Whether it has come to its end.
+    """
+
+    def __init__(self, node: LiveNode, timeout_sec: float) -> None:
+        self.is_over = False
+        self._has_begun = False
+        self._node = node
+        self._timeout_sec = timeout_sec
+        self._thread: threading.Thread | None = None
+        with suppress(RuntimeError):
+            thread = threading.Thread(target=self._run, daemon=True)
+            thread.start()
+            self._thread = thread
+
+    def wait(self, deadline: float) -> None:
+        """Wait until it is over, or until a time of `time.monotonic`."""
+        if self._thread is not None:
+            self._thread.join(max(deadline - monotonic(), 0.0))
+        if self._thread is None or not (self._has_begun or self._thread.is_alive()):
+            self._run()
+
+    def _run(self) -> None:
+        self._has_begun = True
+        _end(self._node, self._timeout_sec)
+        self.is_over = True
+
+
+def _has_an_end(node: LiveNode) -> bool:
+    return bool(node.at_stop) or (node.spec.on_stop is not None and node.has_begun)
+
+
+def _cancel_timers(node: LiveNode) -> None:
+    for timer in node.timers:
+        with suppress(InvalidHandle):
+            # A behaviour may have destroyed it.
+            timer.cancel()
+
+
+def _end(node: LiveNode, timeout_sec: float) -> None:
+    node.ledger.wait_until_idle(timeout_sec / 2)
+    for one in node.at_stop:
+        one.close(timeout_sec)
+    node.gate.serves = False
+    node.waits.allow()
+    hook = node.spec.on_stop
+    if hook is None or not node.has_begun:
+        return
+    call = node.hook('on_stop', hook)
+    if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
+        done = threading.Event()
+        task = node.services.executor.create_task(
+            call.as_callback(FunctionKind.COROUTINE), node.behaviour_node
+        )
+        task.add_done_callback(lambda _task: done.set())
+        done.wait(timeout_sec)
+    else:
+        call.run(node.behaviour_node)
+
+
+def _wait_until_idle(node: LiveNode, deadline: float) -> bool:
+    if node.ledger.wait_until_idle(max(deadline - monotonic(), 0.0)):
+        return True
+    for call in node.ledger.running():
+        system_logger.error(
+            f"node '{node.spec.key}': {call.owner} did not end in time; it is at\n"
+            f'{call.format_stack()}'
+        )
+    return False

@@ -1,0 +1,67 @@
+"""The interpreter's switch interval is short while an executor spins, and only then."""
+
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.context import Context
+
+from composer.executor import ComposerExecutor
+from composer.executor.switch_interval import INTERVAL_SEC, ShortSwitchInterval
+
+DEADLINE_SEC = 40.0
+
+
+@pytest.fixture(autouse=True)
+def interval_is_pythons_own():
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(0.005)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_the_interval_is_short_until_the_last_user_has_left():
+    interval = ShortSwitchInterval()
+    interval.add_user()
+    interval.add_user()
+    interval.remove_user()
+    assert sys.getswitchinterval() == INTERVAL_SEC
+    interval.remove_user()
+    assert sys.getswitchinterval() == 0.005
+
+
+def test_a_shorter_interval_is_left_alone():
+    sys.setswitchinterval(0.0005)
+    interval = ShortSwitchInterval()
+    interval.add_user()
+    assert sys.getswitchinterval() == 0.0005
+    interval.remove_user()
+    assert sys.getswitchinterval() == 0.0005
+
+
+def test_an_interval_that_was_set_meanwhile_is_left_alone():
+    interval = ShortSwitchInterval()
+    interval.add_user()
+    sys.setswitchinterval(0.02)
+    interval.remove_user()
+    assert sys.getswitchinterval() == 0.02
+    interval.add_user()
+    interval.remove_user()
+    assert sys.getswitchinterval() == 0.02
+
+
+@pytest.mark.ros
+def test_callbacks_run_with_the_short_interval_and_the_end_of_spin_restores_it(domain_id):
+    context = Context()
+    context.init(domain_id=domain_id)
+    executor = ComposerExecutor(context=context)
+    seen = []
+    task = executor.create_task(lambda: seen.append(sys.getswitchinterval()))
+    executor.spin_until_future_complete(task, DEADLINE_SEC)
+    assert seen == [INTERVAL_SEC]
+    assert sys.getswitchinterval() == 0.005
+    executor.shutdown()
+    context.try_shutdown()
+    context.destroy()

@@ -1,0 +1,178 @@
+import fcntl
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from building import WriteDefinitions
+
+from composer.ament import ament_prefixes
+from composer.interfaces.build import cache
+from composer.interfaces.build.build_cache import (
+    BuildFolder,
+    CacheError,
+    compute_key,
+    provide_cached,
+)
+from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'home'))
+    return cache.find_cache()
+
+
+def build(folder: BuildFolder) -> None:
+    (folder.path / 'file').write_text('built')
+
+
+def refuse(_: BuildFolder) -> None:
+    pytest.fail('built again')
+
+
+def no_wait() -> None:
+    pytest.fail('waited')
+
+
+def test_a_relative_cache_home_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('XDG_CACHE_HOME', 'relative')
+    assert cache.find_cache() == Path.home() / '.cache/composer/interfaces'
+
+
+def test_a_package_is_built_once(home: Path) -> None:
+    place = provide_cached('one', build, no_wait)
+    assert place == home / 'one'
+    assert provide_cached('one', refuse, no_wait) == place
+    assert (place / 'file').read_text() == 'built'
+    assert sorted(path.name for path in home.iterdir()) == ['one', 'one.lock']
+
+
+def test_a_failed_build_leaves_nothing(home: Path) -> None:
+    def fail(folder: BuildFolder) -> None:
+        build(folder)
+        raise KeyError
+
+    with pytest.raises(KeyError):
+        provide_cached('one', fail, no_wait)
+    assert [path.name for path in home.iterdir()] == ['one.lock']
+    provide_cached('one', build, no_wait)
+
+
+def test_what_a_killed_build_left_is_removed(home: Path) -> None:
+    for name in ('one', 'other', 'living'):
+        (home / f'{name}.partial').mkdir(parents=True)
+        (home / f'{name}.partial' / 'half').touch()
+    with (home / 'living.lock').open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        place = provide_cached('one', build, no_wait)
+    assert [path.name for path in place.iterdir()] == ['file']
+    assert [path.name for path in home.glob('*.partial')] == ['living.partial']
+
+
+def test_who_waits_for_a_build_uses_it(home: Path) -> None:
+    home.mkdir(parents=True)
+    lock = os.open(home / 'one.lock', os.O_RDWR | os.O_CREAT)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+
+    def finish_the_other_build() -> None:
+        (home / 'one').mkdir()
+        os.close(lock)
+
+    assert provide_cached('one', refuse, finish_the_other_build) == home / 'one'
+
+
+def test_a_lock_is_held_as_long_as_a_program_of_the_build_has_it(home: Path) -> None:
+    kept = -1
+
+    def keep(folder: BuildFolder) -> None:
+        nonlocal kept
+        kept = os.dup(folder.descriptor)
+        raise KeyError
+
+    with pytest.raises(KeyError):
+        provide_cached('one', keep, no_wait)
+    waited = []
+
+    def end_the_program() -> None:
+        waited.append(True)
+        os.close(kept)
+
+    assert provide_cached('one', build, end_the_program) == home / 'one'
+    assert waited == [True]
+
+
+def test_a_cache_that_cannot_be_written_is_an_error(home: Path) -> None:
+    home.parent.parent.mkdir(parents=True)
+    home.parent.write_text('in the way')
+    with pytest.raises(CacheError) as caught:
+        provide_cached('one', build, no_wait)
+    assert str(caught.value).startswith('the cache of built interface packages cannot be written')
+    assert caught.value.help == 'make room there, or name another folder in XDG_CACHE_HOME'
+
+
+@pytest.fixture
+def definitions(write_definitions: WriteDefinitions) -> PackageDefinitions:
+    return load_definitions('robots', write_definitions({'msg/A.msg': 'std_msgs/Header a\n'}))
+
+
+@pytest.mark.ros
+def test_equal_definitions_have_equal_keys_wherever_they_are(
+    definitions: PackageDefinitions,
+    tmp_path: Path,
+) -> None:
+    moved = replace(definitions, folder=tmp_path)
+    prefixes = ament_prefixes()
+    assert compute_key(moved, prefixes, {}) == compute_key(definitions, prefixes, {})
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'package': 'others'},
+        {'sources': {'msg/A.msg': 'std_msgs/Header b\n'}},
+        {'sources': {'msg/B.msg': 'std_msgs/Header a\n'}},
+    ],
+)
+def test_other_definitions_have_another_key(
+    definitions: PackageDefinitions,
+    changes: Mapping[str, object],
+) -> None:
+    prefixes = ament_prefixes()
+    changed = replace(definitions, **changes)  # type: ignore[arg-type]
+    assert compute_key(changed, prefixes, {}) != compute_key(definitions, prefixes, {})
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('package', ['rclpy', 'rosidl_generator_c', 'std_msgs'])
+def test_another_release_of_ros_or_of_a_used_package_makes_another_key(
+    definitions: PackageDefinitions,
+    tmp_path: Path,
+    package: str,
+) -> None:
+    prefixes = [tmp_path, *ament_prefixes()]
+    before = compute_key(definitions, prefixes, {})
+    manifest = tmp_path / 'share' / package / 'package.xml'
+    manifest.parent.mkdir(parents=True)
+    manifest.write_text('<version>99.0.0</version>')
+    assert compute_key(definitions, prefixes, {}) != before
+
+
+@pytest.mark.ros
+def test_python_numpy_builder_and_used_builds_make_another_key(
+    definitions: PackageDefinitions,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    prefixes = ament_prefixes()
+    keys = {compute_key(definitions, prefixes, {}), compute_key(definitions, prefixes, {'a': '1'})}
+    for name, value in (
+        ('BUILDER_FORMAT', 99),
+        ('EXTENSION_SUFFIXES', ['.other.so']),
+        ('_numpy_version', lambda: '99'),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(cache, name, value)
+            keys.add(compute_key(definitions, prefixes, {}))
+    assert len(keys) == 5

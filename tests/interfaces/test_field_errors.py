@@ -1,0 +1,77 @@
+import pytest
+
+from composer.interfaces.field_errors import (
+    describe_value,
+    format_field_error,
+    format_path,
+    no_message,
+    unknown_field,
+)
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [
+        (None, 'None'),
+        (5, 'int 5'),
+        (True, 'bool True'),
+        ('fast', "str 'fast'"),
+        ({'x': 1}, "dict {'x': 1}"),
+    ],
+)
+def test_a_value_is_described_by_type_and_content(value: object, text: str) -> None:
+    assert describe_value(value) == text
+
+
+def test_an_integer_that_python_refuses_to_print_is_described_by_its_size() -> None:
+    assert describe_value(10**5000) == 'an integer of 16610 bits'
+
+
+def test_a_long_value_is_shortened() -> None:
+    assert len(describe_value('x' * 10_000)) < 100
+    assert len(describe_value(list(range(10_000)))) < 100
+
+
+def test_an_array_is_described_without_its_content() -> None:
+    np = pytest.importorskip('numpy')
+    assert describe_value(np.zeros((2, 3))) == 'ndarray of float64, shape (2, 3)'
+    assert describe_value(np.int8(5)) == 'int8 np.int8(5)'
+
+
+def test_a_path_is_written_as_code() -> None:
+    assert format_path(()) == ''
+    assert format_path(('pose', 'position', 'x')) == 'pose.position.x'
+    assert format_path(('points', 3, 'y')) == 'points[3].y'
+
+
+def test_an_error_names_message_and_field() -> None:
+    assert format_field_error('a/msg/B', ('c', 0), 'wrong') == 'a/msg/B: c[0]: wrong'
+    assert format_field_error('a/msg/B', (), 'a/msg/B has no field') == 'a/msg/B has no field'
+
+
+def test_an_unknown_field_is_answered_with_the_nearest_and_all() -> None:
+    near = unknown_field('a/msg/B', 'liner', ['linear', 'angular'])
+    assert (near.rule, str(near), near.help) == (
+        'unknown-field',
+        "a/msg/B has no field 'liner'",
+        "did you mean 'linear'? its fields are linear, angular",
+    )
+    assert unknown_field('a/msg/B', 5, ['x', 'y']).help == 'its fields are x, y'
+    assert unknown_field('a/msg/B', 'x', []).help == 'it has no fields'
+
+
+def test_what_is_no_message_is_answered_with_its_fields() -> None:
+    error = no_message('a/msg/B', 5, ['x', 'y'])
+    assert (error.rule, str(error), error.help) == (
+        'field-type',
+        'expected a/msg/B, got int 5',
+        'give its fields by name: x, y',
+    )
+    assert no_message('a/msg/B', 5, []).help == 'it has no fields: write {}'
+
+
+def test_the_path_of_an_error_grows_from_the_inside() -> None:
+    error = unknown_field('a/msg/B', 'x', [])
+    assert error.path == ()
+    assert error.within(3).within('points') is error
+    assert error.path == ('points', 3)

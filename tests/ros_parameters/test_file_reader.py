@@ -1,0 +1,227 @@
+"""ROS's own parameter files: what is read, what is wrong with it and where, and who gets it."""
+
+import textwrap
+
+import pytest
+
+from composer.ros_parameters.file_reader import parse_parameter_file
+from composer.ros_parameters.node_patterns import find_pattern_fault, matches_pattern
+from composer.ros_parameters.overrides import find_overrides, parse_command_line
+from composer.ros_parameters.rcl_values import parse_override
+
+
+def parse(text):
+    return parse_parameter_file(textwrap.dedent(text).lstrip('\n'), 'p.yaml')
+
+
+def values_of(*texts, node='/robot/arm'):
+    files = [parse(text) for text in texts]
+    assert [fault for file in files for fault in file.faults] == []
+    return {name: entry.value for name, entry in find_overrides(files, node).items()}
+
+
+def test_nested_names_are_joined_with_dots():
+    text = """
+        robot:
+          arm:
+            ros__parameters:
+              speed: 1.5
+              grip: {force: 3, pads: {left: on}}
+              joint.limits: [1, 2]
+        """
+    assert values_of(text) == {
+        'speed': 1.5,
+        'grip.force': 3,
+        'grip.pads.left': True,
+        'joint.limits': [1, 2],
+    }
+
+
+def test_a_namespace_may_have_parameters_after_its_nodes():
+    text = """
+        /robot:
+          arm: {ros__parameters: {a: 1}}
+          ros__parameters: {b: 1}
+        """
+    assert (values_of(text), values_of(text, node='/robot')) == ({'a': 1}, {'b': 1})
+
+
+def test_quotes_and_the_tag_of_texts_keep_numbers_texts():
+    text = """
+        /**:
+          ros__parameters: {a: "5", b: 'true', c: !!str 5, d: !!int "5", e: 5}
+        """
+    assert values_of(text) == {'a': '5', 'b': 'true', 'c': '5', 'd': '5', 'e': 5}
+
+
+def test_several_documents_are_read_as_one():
+    text = """
+        /**: {ros__parameters: {a: 1, b: 1, c: {d: x}}}
+        ---
+        robot:
+          arm: {ros__parameters: {b: 2}}
+        ...
+        ---
+        /robot/arm: {ros__parameters: {c.e: [1.5]}}
+        """
+    assert values_of(text) == {'a': 1, 'b': 2, 'c.d': 'x', 'c.e': [1.5]}
+
+
+@pytest.mark.parametrize('document', ['', '~', 'a', '[1]'])
+def test_a_document_that_is_no_mapping_is_refused(document):
+    file = parse_parameter_file(f'/**: {{ros__parameters: {{a: 1}}}}\n--- {document}\n', 'p.yaml')
+    (fault,) = file.faults
+    assert fault.message == "a value stands here, and no 'ros__parameters' above it"
+
+
+def test_a_value_knows_its_place():
+    entry = parse('/**:\n  ros__parameters:\n    sub:\n      list: [1, 22]\n').entries[0]
+    assert entry.name == 'sub.list'
+    assert str(entry.pattern_span) == 'p.yaml:1:1'
+    assert str(entry.key_span) == 'p.yaml:4:7'
+    assert str(entry.value_span) == 'p.yaml:4:13'
+    assert [span.text for span in entry.spans] == ['1', '22']
+
+
+@pytest.mark.parametrize('text', ['', '# nothing\n', '/**: {}\n', '/**: {ros__parameters: {}}\n'])
+def test_a_file_may_hold_nothing(text):
+    file = parse_parameter_file(text, 'p.yaml')
+    assert (file.entries, file.faults) == ((), ())
+
+
+FAULTS = {
+    'a: 1': ("1:4 a value stands here, and no 'ros__parameters' above it"),
+    '- a': ("1:1 a value stands here, and no 'ros__parameters' above it"),
+    'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is no key of parameter files",
+    'a:\n  ros__parameterss: {b: 1}': "2:3 'ros__parameterss' is taken as 'ros__parameters'",
+    'ros__parameters: {b: 1}': "1:1 'ros__parameters' stands below the name of a node",
+    'a: {ros__parameters: 5}': "1:22 'ros__parameters' is a mapping of parameters",
+    'a: {ros__parameters: }': "1:22 'ros__parameters' is a mapping of parameters",
+    'a: {ros__parameters: {b: }}': "1:26 'b' has no value",
+    'a: {ros__parameters: {b: [1, ~]}}': (
+        '1:30 a list has one type: this is a string, and the first item an integer'
+    ),
+    'a: {ros__parameters: {b: [on, 1]}}': (
+        '1:31 a list has one type: this is an integer, and the first item a bool'
+    ),
+    'a: {ros__parameters: {b: [[1]]}}': '1:27 a list of parameters holds no lists',
+    'a: {ros__parameters: {b: [{c: 1}]}}': '1:27 a list of parameters holds no mappings',
+    'a: {ros__parameters: {b: {}}}': (
+        "1:23 'b' is an empty mapping, and ROS misreads what follows one"
+    ),
+    'a: {ros__parameters: {b: 1}, c: {ros__parameters: {d: 1}}}': (
+        "1:5 ROS misreads the names that follow 'ros__parameters'"
+    ),
+    'a: {ros__parameters: {b: {c.d: {e: 1}, f: 2}}}': (
+        "1:27 after 'c.d', ROS takes what follows to belong to a part of it"
+    ),
+    'a: {b/c: {ros__parameters: {d: 1}}, e: {ros__parameters: {d: 1}}}': (
+        "1:5 after 'b/c', ROS takes the names that follow to be in another namespace"
+    ),
+    'a: {ros__parameters: {b: 1, b: {c: 2}}}': (
+        "1:23 'b' has a value and, elsewhere, names below it"
+    ),
+    'a: {ros__parameters: {b: &x 1, c: *x}}': (
+        '1:35 ROS takes no aliases here: write what *x stands for'
+    ),
+    'a-b: {ros__parameters: {c: 1}}': (
+        "1:1 'a-b': a node name has only letters, digits and underscores"
+    ),
+    '/ar*: {ros__parameters: {c: 1}}': (
+        "1:1 '/ar*': a node name has only letters, digits and underscores; "
+        "'*' and '**' stand alone between slashes"
+    ),
+    'a: {ros__parameters: {"": 1}}': '1:23 a key is a text, and nothing stands here',
+    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key is a text, and this is a list or a mapping',
+}
+
+
+@pytest.mark.parametrize(('text', 'said'), FAULTS.items())
+def test_what_ros_refuses_or_misreads_is_a_finding(text, said):
+    (fault,) = parse_parameter_file(text, 'p.yaml').faults
+    assert f'{fault.span.line}:{fault.span.column} {fault.message}' == said
+    assert fault.rule == 'bad-parameter-file'
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'a:\n  ros__parameters:\n    speed:=1.5\n',
+        'a:\n  ros__parameters:\n    b: 1\n    speed:=1.5\n',
+        'a:\n  ros__parameters:\n    speed:=1.5\n    b: 1\n',
+    ],
+)
+def test_an_assignment_of_the_command_line_is_explained(text):
+    (fault,) = parse_parameter_file(text, 'p.yaml').faults
+    assert fault.help == "write 'speed: 1.5', ':=' is for command lines"
+
+
+def test_what_is_no_yaml_is_a_finding_in_its_line():
+    (fault,) = parse_parameter_file('/**:\n  ros__parameters: {a: [1\n', 'p.yaml').faults
+    assert (fault.rule, fault.file) == ('yaml-syntax', 'p.yaml')
+
+
+PATTERNS = {
+    '/**': True,
+    '/*': False,
+    '/*/*': True,
+    '/robot/*': True,
+    '/robot/**': True,
+    '/**/arm': True,
+    '/*/arm': True,
+    'arm': False,
+    'robot/arm': True,
+    '/robot/arm': True,
+    '/robot/**/arm': True,
+    '/robot/*/arm': False,
+    '/**/robot/**/arm/**': True,
+    '**': True,
+    '*': False,
+    '/robot/leg': False,
+    '/**/**': True,
+    '/*/*/*': False,
+}
+
+
+@pytest.mark.parametrize(('pattern', 'matches'), PATTERNS.items())
+def test_wildcards_match_as_they_do_in_ros(pattern, matches):
+    assert find_pattern_fault(pattern) is None
+    assert matches_pattern(pattern, '/robot/arm') is matches
+
+
+@pytest.mark.parametrize('pattern', ['/', '//', '/a//b', '/a/', '/a b', '/1a', '/a*/b', '/a/***'])
+def test_what_names_no_node_is_refused(pattern):
+    assert find_pattern_fault(pattern) is not None
+
+
+def test_many_wildcards_are_matched_in_no_time():
+    assert matches_pattern('/**/*' * 500 + '/**', '/' + '/'.join('abcdefgh')) is False
+
+
+def test_later_files_win():
+    first = '/**: {ros__parameters: {a: 1, b: 1}}'
+    assert values_of(first, '/**: {ros__parameters: {b: 2}}') == {'a': 1, 'b': 2}
+
+
+def test_the_last_name_that_matches_wins_however_special_it_is():
+    special, wild = 'robot/arm: {ros__parameters: {a: 1}}\n', '/**: {ros__parameters: {a: 2}}\n'
+    assert values_of(special + wild) == {'a': 2}
+    assert values_of(wild + special) == {'a': 1}
+    assert values_of(wild + special, wild.replace('2', '3')) == {'a': 1}
+
+
+def test_of_two_types_the_one_counts_that_comes_first():
+    for text in ('/**: {ros__parameters: {a: 1, a: x}}', '/**: {ros__parameters: {a: x, a: 1}}'):
+        assert values_of(text) == {'a': 1}
+
+
+def test_parameters_of_the_command_line_have_the_types_of_files():
+    arguments = ['-p', 'a:=0x10', '-r', 'x:=y', '--param', 'b.c:=[1.5, 2.0]', '-p', 'd:=']
+    arguments += ['-p', 'arm:e:=on', '-p', 'leg:f:=1', '-p', 'g:=[]', '-p', 'h:={i: 1}']
+    assert parse_command_line(arguments, '/arm') == {
+        'a': (16, 'integer'),
+        'b.c': ([1.5, 2.0], 'double_array'),
+        'e': (True, 'bool'),
+    }
+    assert 'e' not in parse_command_line(arguments, '/robot/arm')
+    assert parse_override('[1, a]') is None

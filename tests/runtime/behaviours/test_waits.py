@@ -1,0 +1,44 @@
+"""Waits of behaviours beside a stop of the system."""
+
+from contextlib import nullcontext
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.task import Future
+
+from composer.errors import SystemStoppingError
+from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
+from composer.runtime.stop_request import StopRequest
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def waits():
+    return ThreadWaits(nullcontext, StopRequest())
+
+
+def test_a_wait_without_an_end_does_not_begin_when_the_system_stops(waits):
+    waits.stop.make()
+    with pytest.raises(SystemStoppingError):
+        waits.until_done(Future(), None)
+
+
+def test_nor_does_one_of_a_coroutine(waits):
+    waits.stop.make()
+    with pytest.raises(SystemStoppingError):
+        CoroutineWaits(None, waits).until_done(Future(), None).send(None)
+
+
+def test_one_with_an_end_does_for_what_must_be_switched_off(waits):
+    waits.stop.make()
+    assert not waits.until_done(Future(), 0.01)
+
+
+def test_what_is_done_is_returned_all_the_same(waits):
+    waits.stop.make()
+    future = Future()
+    future.set_result(1)
+    assert waits.until_done(future, None)

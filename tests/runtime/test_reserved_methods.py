@@ -1,0 +1,158 @@
+"""Behaviours that end what belongs to the system, or what is their own."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import rclpy
+
+def destroy_node(node):
+    node.ros.destroy_node()
+
+def shutdown_default(node):
+    rclpy.shutdown()
+
+def shutdown_context(node):
+    node.ros.context.shutdown()
+
+def shutdown_by_name(node):
+    rclpy.shutdown(context=node.ros.context)
+
+def try_shutdown_context(node):
+    node.ros.context.try_shutdown()
+
+def shutdown_executor(node):
+    node.ros.executor.shutdown()
+
+def spin(node):
+    rclpy.spin_once(node.ros, timeout_sec=0.1)
+
+async def destroy_node_async(node):
+    node.ros.destroy_node()
+
+def destroy_own_timer(node):
+    node.logger.info('destroying')
+    for timer in list(node.ros.timers):
+        node.ros.destroy_timer(timer)
+
+def destroy_all(node):
+    node.logger.info('destroying')
+    for destroy, entities in (
+        (node.ros.destroy_timer, node.ros.timers),
+        (node.ros.destroy_subscription, node.ros.subscriptions),
+        (node.ros.destroy_publisher, node.ros.publishers),
+        (node.ros.destroy_service, node.ros.services),
+        (node.ros.destroy_client, node.ros.clients),
+    ):
+        for entity in list(entities):
+            destroy(entity)
+
+def destroy_for_sure(node):
+    from rclpy.node import Node
+
+    node.logger.info('destroying')
+    Node.destroy_node(node.ros)
+
+def shutdown_for_sure(node):
+    from rclpy.context import Context
+
+    Context.shutdown(node.ros.context)
+
+def live(node):
+    node.logger.info('alive')
+
+def hear(node, message):
+    pass
+"""
+
+SYSTEM = """
+version: 1
+nodes:
+  bad:
+    publishers: {{words: std_msgs/msg/String}}
+    subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: 'parts:hear'}}}}
+    service_clients: {{ask: std_srvs/srv/Trigger}}
+    timers: {{fail: {{period: 0.05, behaviour: 'parts:{behaviour}'}}}}
+    on_stop: parts:live
+  good:
+    timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}
+    on_stop: parts:live
+"""
+
+
+@pytest.mark.parametrize(
+    ('behaviour', 'error'),
+    [
+        (
+            'destroy_node',
+            'the node belongs to the system, so a behaviour cannot call destroy_node()',
+        ),
+        (
+            'destroy_node_async',
+            'the node belongs to the system, so a behaviour cannot call destroy_node()',
+        ),
+        (
+            'shutdown_context',
+            'the context belongs to the system, so a behaviour cannot call shutdown()',
+        ),
+        (
+            'shutdown_by_name',
+            'the context belongs to the system, so a behaviour cannot call shutdown()',
+        ),
+        (
+            'try_shutdown_context',
+            'the context belongs to the system, so a behaviour cannot call try_shutdown()',
+        ),
+        (
+            'shutdown_executor',
+            'the executor belongs to the system, so a behaviour cannot call shutdown()',
+        ),
+    ],
+)
+def test_a_behaviour_cannot_end_what_belongs_to_the_system(compose, behaviour, error):
+    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
+    child.wait_for_line(
+        f"[ERROR] [bad]: timer 'fail' (system.yaml:8) raised ReservedMethodError: {error}"
+    )
+    child.wait_for_line('help: to end the system call node.shutdown()')
+    alive = len(child.matching('[good]: alive'))
+    child.wait_for_line('[good]: alive', times=alive + 10)
+    child.wait_for_line(' more times, last: ReservedMethodError')
+    assert child.stop() == 0
+
+    assert len(child.matching('Traceback')) == 1
+
+
+@pytest.mark.parametrize('behaviour', ['shutdown_default', 'spin'])
+def test_the_default_context_is_not_that_of_the_system(compose, behaviour):
+    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
+    child.wait_for_line("[ERROR] [bad]: timer 'fail' (system.yaml:8) raised ")
+    alive = len(child.matching('[good]: alive'))
+    child.wait_for_line('[good]: alive', times=alive + 10)
+
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize('behaviour', ['destroy_own_timer', 'destroy_all', 'destroy_for_sure'])
+def test_others_live_on_when_a_behaviour_destroys_what_its_node_has(compose, behaviour):
+    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
+    child.wait_for_line('destroying')
+    alive = len(child.matching('[good]: alive'))
+    child.wait_for_line('[good]: alive', times=alive + 20)
+    assert child.stop() == 0
+
+    assert len(child.matching('[bad]: alive')) == 1
+    assert not child.matching('Traceback')
+    assert not child.matching('[ERROR]')
+
+
+def test_a_system_whose_ros_was_shut_down_says_so_and_ends(compose):
+    child = compose(SYSTEM.format(behaviour='shutdown_for_sure'), CODE)
+
+    assert child.wait() == 1
+    assert child.matching('[ERROR] [composer]: the ROS context was shut down, so the system ends')
+    assert child.matching('[good]: alive')
+    assert not child.matching('Traceback')
