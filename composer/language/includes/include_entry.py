@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, is_in_package, list_neighbours, resolve_path
-from composer.names import did_you_mean, find_namespace_fault
+from composer.names import find_namespace_fault
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -129,7 +130,7 @@ def _locate_file(text: str, place: Span) -> Path:
     path = resolve_path(text, place.source.folder)
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{shown_path(path)}'"
-        raise PathError(message, help=did_you_mean(path.name, list_neighbours(path), 'there are'))
+        raise PathError(message, help=suggest(path.name, list_neighbours(path), 'there are'))
     return path
 
 

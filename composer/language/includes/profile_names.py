@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import BUILTIN_PROFILES
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -88,7 +88,7 @@ def drop_unknown_profiles(system: LoadedSystem) -> None:
                 span,
                 'unknown-qos-profile',
                 f"no QoS profile is called '{name}'",
-                help=did_you_mean(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
+                help=suggest(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
             )
             system.diagnostics.append(finding)
         del holder[key]

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from composer.language.loaded_system import PARTS
 from composer.language.parsing.entry_parser import Data, parse_entries, parse_qos
 from composer.language.parsing.node_parser import parse_node
-from composer.language.parsing.process_parser import parse_process, write_scalar
+from composer.language.parsing.process_parser import parse_process
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
     QosSpec,
     SystemSpec,
 )
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from composer.language.loaded_system import LoadedSystem
@@ -59,7 +60,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
         nodes=parse_entries(data, (), 'nodes', parse_node),
         environment=MappingProxyType(
-            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+            {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
         processes=parse_entries(data, (), 'processes', parse_process),
     )
