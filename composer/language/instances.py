@@ -9,7 +9,7 @@ from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.expressions.filling import FilledDocument
 from composer.language.arguments import ArgumentSpec, find_argument_faults, read_arguments
 from composer.language.paths import resolve_paths
-from composer.schema.structure import check_structure, is_sound, mend_outer_keys
+from composer.schema.structure import check_structure, correct_outer_keys, is_sound
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -108,7 +108,7 @@ def read_instance(
     if document.data is None:
         return None
     positions = document.positions.copy()
-    written, misspelt = mend_outer_keys(document.data, positions)
+    written, misspelt = correct_outer_keys(document.data, positions)
     declared = read_arguments(written)
     faults = list(_check_arguments(declared, positions))
     sound = not faults and is_sound({'args': document.data.get('args', {})})
