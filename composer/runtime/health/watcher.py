@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from composer.runtime.behaviours.tracebacks import format_fault
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Watcher:
             try:
                 self._look()
             except Exception as error:  # noqa: BLE001 - one fault must not leave the system unwatched
-                self._report(format_fault(error))
+                self._report(format_internal_error(error))
 
     def _report(self, fault: str) -> None:
         if fault not in self._faults:
