@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.schema.violations import Violation
+    from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key, SourceMap
 
 # Editors accept an expression in place of a value; here, expressions are evaluated already.
@@ -39,59 +40,46 @@ _OUTER_SECTIONS = {
 _DEPTH_OF_ENTRIES = 3
 
 
-def check_structure(
-    data: dict[str, Any],
-    positions: SourceMap,
-    failed: Sequence[DataPath] = (),
-    sampled: Sequence[DataPath] = (),
-) -> tuple[dict[str, Any], frozenset[DataPath], list[Diagnostic]]:
-    """Check data against the schema.
+def check_structure(document: Document) -> None:
+    """Check the data of a document against the schema, and drop what is not valid.
 
-    A misspelt key is reported and then read as the one that was meant, so that what lies below
-    it is checked in the same run; `positions` follow it.
-
-    Args:
-        data: They are not changed.
-        failed: The paths of expressions that could not be evaluated; they are dropped.
-        sampled: The paths of sample values; if they are wrong, they are dropped without a finding.
-
-    Returns:
-        The valid part of the data, the paths that were dropped, and the findings. Of data with
-        more than a thousand findings nothing is left.
+    What was dropped before, because its expression could not be evaluated, is removed as well. A
+    misspelt key is reported and then read as the nearest known one: what stands below it is
+    checked in the same run. Sample values that are not valid are dropped without a finding. Of
+    data with more than a thousand findings nothing is left.
     """
-    failed = [_entry_of(path) for path in failed]
+    positions, data = document.positions, document.data or {}
+    failed = [_entry_of(path) for path in document.dropped]
     if failed or not _schema().is_valid(data):
         data = _copied(data)
     _remove_entries(data, failed)
     findings = _correct_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
-    samples = set(sampled)
     violations = _find_violations(data)
     missing = {violation.path for violation in violations if violation.rule == 'missing-key'}
     for violation in violations:
         # A key that is missing twice, for its entry and for another key, is reported once.
         known = violation.path in incomplete or (violation.path and violation.path[:-1] in missing)
-        if violation.path not in samples and not (violation.rule == 'missing-key' and known):
+        if violation.path not in document.sampled_paths and not (
+            violation.rule == 'missing-key' and known
+        ):
             findings.append(violation.diagnostic(positions))
+    document.diagnostics += findings
     if len(findings) >= MAX_FINDINGS:
-        return dict(_REQUIRED), frozenset(), findings
-    return data, frozenset([*failed, *_drop_invalid(data, violations)]), findings
+        document.data, document.dropped = dict(_REQUIRED), set()
+    else:
+        document.data, document.dropped = data, {*failed, *_drop_invalid(data, violations)}
 
 
-def correct_outer_keys(
-    data: dict[str, Any], positions: SourceMap
-) -> tuple[dict[str, Any], list[Diagnostic]]:
-    """Correct misspelt keys that count before the check against the schema.
+def correct_outer_keys(document: Document) -> None:
+    """Correct misspelt keys that are read before the check against the schema.
 
     These are the keys of the file, of the declarations of arguments, and `foreach` and `when`.
-
-    Returns:
-        The data, copied if a key is corrected, and the findings.
     """
-    if all(map(_is_known, _outer_keys(data))):
-        return data, []
-    corrected = _copied(data)
-    return corrected, _correct_keys(corrected, positions, _is_outer)
+    data = document.data or {}
+    if not all(map(_is_known, _outer_keys(data))):
+        document.data = _copied(data)
+        document.diagnostics += _correct_keys(document.data, document.positions, _is_outer)
 
 
 def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,8 @@ from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from jsonschema.exceptions import ValidationError
 
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -25,8 +27,9 @@ _TYPE_WORDS = {
 _LONGEST_SHOWN = 40
 
 # The values for missing keys of an entry. Checks skip them: their paths count as dropped.
-_STAND_INS = {kind.noun: kind.stand_in for kind in ENTITY_KINDS} | {
-    'condition': {'topic': 'unknown'}
+_STAND_INS: dict[str, Mapping[str, Any]] = {
+    **{kind.noun: kind.stand_in for kind in ENTITY_KINDS},
+    'condition': {'topic': 'unknown'},
 }
 
 

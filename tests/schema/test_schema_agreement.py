@@ -202,7 +202,9 @@ def test_no_period_is_endless(key, number):
 
 
 def test_a_keyword_that_the_compiler_does_not_know_is_refused():
-    with pytest.raises(ValueError, match=re.escape("the schema compiler does not know the keywords ['maxLength']")):
+    with pytest.raises(
+        ValueError, match=re.escape("the schema compiler does not know the keywords ['maxLength']")
+    ):
         SchemaCompiler({}).compile({'type': 'string', 'maxLength': 3})
 
 
