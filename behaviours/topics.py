@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import StrictUndefined
 
 from composer.errors import ComposerError
+from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.limits import Budget
 from composer.expressions.sandbox import Sandbox
 
@@ -125,7 +126,7 @@ def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, 
     Raises:
         TransformError: An expression is none, or has no value.
     """
-    sandbox = node.own_state.setdefault('sandbox', Sandbox(undefined=StrictUndefined))
+    sandbox = node.own_state.setdefault('sandbox', Sandbox())
     # What may be done is bounded for each message.
     sandbox.budget = Budget()
     scope = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
@@ -141,7 +142,7 @@ def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, 
 
 def _evaluate(sandbox: Sandbox, expression: str, scope: Mapping[str, Any], path: str) -> Any:
     try:
-        value = sandbox.evaluate(str(expression), scope)
+        value = evaluate_expression(sandbox, str(expression), scope)
         if isinstance(value, StrictUndefined):
             # Any use of it says which name there is not.
             str(value)

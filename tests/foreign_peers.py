@@ -15,12 +15,15 @@ from rclpy.action import ActionClient, ActionServer, GoalResponse
 from rclpy.parameter import Parameter
 
 from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.definitions.packages import load_packages
 
 DEADLINE_SEC = 40.0
 FOLDER = Path(__file__).resolve().parent.parent / 'interfaces'
 PACKAGES = ('example_interfaces', 'action_tutorials_interfaces')
 
-provide_packages({name: FOLDER / name for name in PACKAGES}, print)
+folders = {name: FOLDER / name for name in PACKAGES}
+provide_packages(load_packages(folders, InterfaceCatalogue()), print)
 
 from action_msgs.msg import GoalInfo  # noqa: E402
 from action_msgs.srv import CancelGoal  # noqa: E402

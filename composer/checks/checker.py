@@ -28,19 +28,20 @@ from composer.checks.processes import (
 from composer.checks.references import check_publish, check_qos, check_types
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared_packages import describe_declared
+from composer.interfaces.declared_packages import load_declared
 from composer.language.pipeline import LoadedSystem, load_system
 from composer.python_source.behaviour_uses import UseReader
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.rules import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
+FurtherCheck: TypeAlias = 'Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]]'
 SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
 
 NODE_RULES: tuple[CheckRule, ...] = (
@@ -69,42 +70,48 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
 _MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
 
 
-def create_context(
-    system: LoadedSystem, installed: InterfaceCatalogue
-) -> tuple[CheckContext | None, list[Diagnostic]]:
-    """Return what the rules look at, and what is wrong with the interfaces that a file declares.
-
-    The context is `None` if the file could not be read at all.
-    """
+def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> CheckContext | None:
+    """Return what the rules look at, or `None` if the file could not be read at all."""
     if system.spec is None:
-        return None, []
-    catalogue, unreadable, findings = describe_declared(system, installed)
+        return None
+    interfaces = load_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.files))
-    uses = UseReader(modules)
-    return CheckContext(system, system.spec, catalogue, modules, uses, unreadable), findings
+    return CheckContext(system, system.spec, interfaces, modules, UseReader(modules))
 
 
 def check_system(
-    system: LoadedSystem,
-    catalogue: InterfaceCatalogue,
-    further: Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]] | None = None,
+    system: LoadedSystem, catalogue: InterfaceCatalogue, further: FurtherCheck | None = None
 ) -> list[Diagnostic]:
-    """Return all that is wrong with a system, by its place in the file.
+    """Return the findings in a system, by their places in the file.
 
     Args:
-        further: What else is to be checked; it is given what was found so far.
+        further: A check to apply after the others; it gets their findings.
     """
-    context, declared = create_context(system, catalogue)
-    found = list(_apply_rules(context)) if context else []
-    samples = _by_line(system.sampled)
+    return check_in_context(system, create_context(system, catalogue), further)
+
+
+def check_in_context(
+    system: LoadedSystem, context: CheckContext | None, further: FurtherCheck | None = None
+) -> list[Diagnostic]:
+    """Return the findings in a system as `check_system` does, for a context that exists.
+
+    Args:
+        context: What `create_context` returned for the system.
+    """
+    found: list[Diagnostic] = []
+    declared: Sequence[Diagnostic] = ()
+    unchecked: set[Need] = set() if further else {'import'}
+    if context:
+        declared = context.interfaces.findings
+        unchecked |= set() if context.catalogue.available else {'interfaces'}
+        found += _apply_rules(context)
     if context and further:
+        samples = _by_line(system.sampled)
         more = further(context, found)
         found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias, or a file included twice, is wrong once.
     every = [*system.diagnostics, *declared, *found]
     once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
-    unchecked: set[Need] = set() if catalogue.available else {'interfaces'}
-    unchecked |= set() if further else {'import'}
     heard = apply_ignore_comments(
         once.values(), system.positions.source, None if system.diagnostics else unchecked
     )

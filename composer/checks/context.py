@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic, Remarks, Span
     from composer.interfaces.catalogue import InterfaceCatalogue
+    from composer.interfaces.declared_packages import DeclaredPackages
     from composer.language.pipeline import LoadedSystem
     from composer.language.specs import EndSpec, SystemSpec
     from composer.python_source.behaviour_uses import UseReader
@@ -24,17 +25,20 @@ class CheckContext:
     """A system and what there is to hold it against.
 
     Attributes:
+        interfaces: The types of the system, and the errors in the packages that it declares.
         uses: Reads what behaviours do with their nodes.
-        unreadable: The interface packages of the file that something was wrong with; it has been
-            reported, and nothing is known of their types.
     """
 
     system: LoadedSystem
     spec: SystemSpec
-    catalogue: InterfaceCatalogue
+    interfaces: DeclaredPackages
     modules: ModuleFinder
     uses: UseReader
-    unreadable: frozenset[str] = frozenset()
+
+    @property
+    def catalogue(self) -> InterfaceCatalogue:
+        """What describes the types of the system."""
+        return self.interfaces.catalogue
 
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing only because its own fault was reported already."""

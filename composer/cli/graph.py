@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.checks.checker import check_system, create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.cli.output import show_findings, write_file
 from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
@@ -44,9 +44,8 @@ def graph(
     """
     format_name = format_name or _format_of(output)
     system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
-    catalogue = InterfaceCatalogue()
-    findings = check_system(system, catalogue)
-    context, _ = create_context(system, catalogue)
+    context = create_context(system, InterfaceCatalogue())
+    findings = check_in_context(system, context)
     if context is None:
         show_findings(findings)
         return ExitCode.FAILED

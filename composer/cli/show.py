@@ -129,7 +129,7 @@ def final_values(node: NodeSpec) -> dict[str, tuple[str, Any]]:
 
 
 def _check_parameters(system: LoadedSystem) -> list[Diagnostic]:
-    context, _ = create_context(system, InterfaceCatalogue())
+    context = create_context(system, InterfaceCatalogue())
     found = check_parameter_files(context) if context else ()
     return list(dict.fromkeys([*system.diagnostics, *found]))
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from composer.checks.checker import check_system, create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import leave_out_silenced
 from composer.cli.import_check import import_behaviours
 from composer.cli.output import show_findings
@@ -16,15 +16,15 @@ from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import provide_declared
 from composer.language.arguments import describe_arguments
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import SystemSpec
 
 _NO_ROS_HELP = (
     "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
@@ -53,9 +53,8 @@ def up(
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
     system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
-    catalogue = InterfaceCatalogue()
-    findings = check_system(system, catalogue)
-    if _report(findings) or system.spec is None:
+    context = create_context(system, InterfaceCatalogue())
+    if _report(check_in_context(system, context)) or context is None:
         return ExitCode.FAILED
     if importlib.util.find_spec('rclpy') is None:
         message = 'cannot run without ROS 2: this Python has no rclpy'
@@ -63,28 +62,24 @@ def up(
     from composer.runtime.environment import check_middleware, environment_set
 
     # ROS reads it when it is imported.
-    with environment_set(system.spec.environment):
-        check_middleware(system.spec.environment)
-        return _run(system, system.spec, catalogue, ros_arguments, log_levels)
+    with environment_set(context.spec.environment):
+        check_middleware(context.spec.environment)
+        return _run(context, ros_arguments, log_levels)
 
 
-def _run(
-    system: LoadedSystem,
-    spec: SystemSpec,
-    catalogue: InterfaceCatalogue,
-    ros_arguments: Sequence[str],
-    log_levels: Sequence[str],
-) -> int:
+def _run(context: CheckContext, ros_arguments: Sequence[str], log_levels: Sequence[str]) -> int:
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.run import run_system
 
-    provide_declared(system, lambda line: click.echo(line, err=True))
+    system = context.system
+    provide_declared(context.interfaces, lambda line: click.echo(line, err=True))
     with project_on_path(project_search_path(system.files)):
-        functions, findings = _import(system, catalogue)
-        if _report(findings):
+        functions, findings = import_behaviours(context)
+        # The check has already reported comments that silence nothing.
+        if _report(leave_out_silenced(findings, system.positions.source)):
             return ExitCode.FAILED
         return run_system(
-            spec,
+            context.spec,
             system.positions,
             functions,
             ros_arguments=ros_arguments,
@@ -98,18 +93,6 @@ def describe_file_arguments(paths: Sequence[Path]) -> str:
     if system.spec is None:
         return 'the file cannot be read'
     return describe_arguments(system.arguments)
-
-
-def _import(
-    system: LoadedSystem, catalogue: InterfaceCatalogue
-) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
-    """Import the behaviours; return the functions, and findings that are not silenced."""
-    context, _ = create_context(system, catalogue)
-    if context is None:
-        return {}, []
-    functions, findings = import_behaviours(context)
-    # The check has already reported comments that silence nothing.
-    return functions, leave_out_silenced(findings, system.positions.source)
 
 
 def _report(findings: list[Diagnostic]) -> bool:

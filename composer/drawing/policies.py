@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.language.qos import BUILTIN_PROFILES, DEFAULT_PROFILE, QosError, resolve_qos
+from composer.language.qos import (
+    BUILTIN_PROFILES,
+    DEFAULT_PROFILE,
+    INFINITE,
+    QosError,
+    format_policy_value,
+    resolve_qos,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from composer.language.specs import QosSpec
 
-_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 # Their values say which policy is meant.
 _SPEAKING = ('reliability', 'durability', 'history')
 
@@ -29,7 +35,7 @@ def differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) ->
     except QosError:
         return {}
     usual = BUILTIN_PROFILES[DEFAULT_PROFILE]
-    return {key: value for key, value in policies.items() if value != usual.get(key, 'infinite')}
+    return {key: value for key, value in policies.items() if value != usual.get(key, INFINITE)}
 
 
 def describe_policies(policies: Mapping[str, Any]) -> str:
@@ -40,5 +46,4 @@ def describe_policies(policies: Mapping[str, Any]) -> str:
 def _describe(key: str, value: Any) -> str:
     if key in _SPEAKING and value not in ('system_default', 'best_available'):
         return str(value)
-    unit = ' s' if key in _DURATIONS and not isinstance(value, str) else ''
-    return f'{key.replace("_", " ")} {value}{unit}'
+    return f'{key.replace("_", " ")} {format_policy_value(key, value)}'

@@ -38,5 +38,6 @@ Callbacks, takes and waits run under none.
 
 from composer.executor.composer_executor import ComposerExecutor
 from composer.executor.event_source import MissedCounts
+from composer.executor.wait_set_thread import checked_seldom
 
-__all__ = ['ComposerExecutor', 'MissedCounts']
+__all__ = ['ComposerExecutor', 'MissedCounts', 'checked_seldom']

@@ -218,7 +218,7 @@ def _halt_all() -> None:
         executor.halt()
 
 
-# In a forked child: what would be destroyed if nothing referred to it.
+# In a forked child: what only the parent may destroy, and so must stay referenced.
 _kept_for_parent: list[Any] = []
 
 

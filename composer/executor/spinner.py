@@ -61,19 +61,17 @@ class Spinner:
     """
 
     def __init__(self, executor: Any, max_running: int, guard: Any, sigint_guard: Any) -> None:
-        self.parts = ExecutorParts(executor, max_running)
-        self.poller = self.parts.poller
-        self.scheduler = self.parts.scheduler
+        parts = ExecutorParts(executor, max_running)
+        self.poller = parts.poller
+        self.scheduler = parts.scheduler
         self.notifier = Notifier()
         self.is_shutdown = False
         self.wait_set_thread = WaitSetThread(guard, sigint_guard, executor.context, self)
-        self.registry = EntityRegistry(self.parts, self.wait_set_thread)
-        loop = EventLoop(
-            self.parts, self.registry, self.execute, self.report, self.notifier.notify
-        )
+        self.registry = EntityRegistry(parts, self.wait_set_thread)
+        loop = EventLoop(parts, self.registry, self._execute, self.report, self.notifier.notify)
         self.workers = loop.workers
         self._executor = executor
-        self._runner = CallbackRunner(self.parts)
+        self._runner = CallbackRunner(parts)
         self._spinning = 0
         self._spinning_once = 0
         self._count_lock = threading.Lock()
@@ -91,7 +89,7 @@ class Spinner:
         self._errors.append(error)
         self.notifier.notify()
 
-    def raise_error(self) -> None:
+    def _raise_error(self) -> None:
         """Raise the oldest error that was reported and not raised yet."""
         if self._errors:
             raise self._errors.popleft()
@@ -101,8 +99,7 @@ class Spinner:
         self.poller.wake()
         self.notifier.notify()
 
-    def is_alive(self) -> bool:
-        """Tell whether there is anything to spin for."""
+    def _is_alive(self) -> bool:
         return not self.is_shutdown and self.is_context_valid()
 
     def is_context_valid(self) -> bool:
@@ -118,19 +115,19 @@ class Spinner:
 
     def spin_until(self, condition: Callable[[], bool], timeout_sec: float | None) -> None:
         """Let workers execute callbacks until `condition()`, an error, a timeout or the end."""
-        self.raise_error()
+        self._raise_error()
         self._start_spinning()
         try:
             self.notifier.wait_for(
-                lambda: bool(self._errors) or condition() or not self.is_alive(), timeout_sec
+                lambda: bool(self._errors) or condition() or not self._is_alive(), timeout_sec
             )
         finally:
             self._stop_spinning()
-        self.raise_error()
+        self._raise_error()
 
     def spin_once(self, condition: Callable[[], bool], timeout_sec: float | None) -> None:
         """Let a worker execute one callback; stop waiting for one when `condition()`."""
-        self.raise_error()
+        self._raise_error()
         if timeout_sec is not None and timeout_sec < 0:
             timeout_sec = None
         deadline = None if timeout_sec is None else monotonic() + timeout_sec
@@ -138,9 +135,9 @@ class Spinner:
         with self._count_lock:
             self._spinning_once += 1
         try:
-            if self.is_alive():
+            if self._is_alive():
                 self._look_at_everything()
-            while self.is_alive() and not condition() and not self._run_one():
+            while self._is_alive() and not condition() and not self._run_one():
                 left = None if deadline is None else deadline - monotonic()
                 if left is not None and left <= 0:
                     break
@@ -151,9 +148,9 @@ class Spinner:
             self.wait_set_thread.remove_user()
             if self.is_shutdown:
                 self.notifier.notify()
-        self.raise_error()
+        self._raise_error()
 
-    def execute(self, work: Any) -> bool:
+    def _execute(self, work: Any) -> bool:
         """Execute what the scheduler started; False if there was nothing to take."""
         ran = self._runner.execute(work)
         if len(self.scheduler):
@@ -184,12 +181,12 @@ class Spinner:
 
     def reset_after_fork(self) -> None:
         """Be shut down: this is a forked child, and all of this belongs to its parent."""
-        parts = (self.wait_set_thread, self.registry, self.workers)
+        others = (self.wait_set_thread, self.registry, self.workers)
         reset_locks((self, self._executor, self.scheduler, self.poller, self.poller.deadlines))
-        reset_locks((self.notifier, *parts))
+        reset_locks((self.notifier, *others))
         self.is_shutdown = True
         self.scheduler.reset_after_fork(int(self.workers.is_in_callback()))
-        for part in (self.poller, *parts):
+        for part in (self.poller, *others):
             part.reset_after_fork()
 
     def _start_spinning(self) -> None:
@@ -228,9 +225,9 @@ class Spinner:
     def _run_one(self) -> bool:
         """Have a worker run one callback, if one is ready, and wait a little for its end."""
         while (work := self.scheduler.start_next(alone=True)) is not None:
-            job = _OneCallback(self.execute, work)
+            job = _OneCallback(self._execute, work)
             self.workers.run(job)
-            if job.has_run(TAKEOVER_SEC if getattr(work, 'slow', False) else GRACE_SEC):
+            if job.has_run(TAKEOVER_SEC if work.slow else GRACE_SEC):
                 return True
         return False
 
@@ -254,7 +251,7 @@ class Spinner:
             self.registry.is_stale
             or self.poller.deadlines.jumped
             or self.scheduler.has_work()
-            or not self.is_alive()
+            or not self._is_alive()
         )
 
 

@@ -2,17 +2,17 @@
 
 It waits for SIGINT and SIGTERM (through rclpy's guard condition), the nodes' guard conditions and
 waitables of unknown kinds. It does not wait for QoS events, because a wait set with an event of a
-subscription wakes up for each of its messages. It checks them from time to time: those with
-callbacks of the user often, those with rclpy's default callbacks (which log incompatible QoS)
-seldom, but soon after entities were created or destroyed. An entity that was ready is left out of
-the wait set until it has run.
+subscription wakes up for each of its messages. It checks them from time to time: often in general,
+but seldom those with rclpy's default callbacks, which log incompatible QoS, and with callbacks
+marked `checked_seldom`; these are checked soon after entities were created or destroyed. An entity
+that was ready is left out of the wait set until it has run.
 """
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
@@ -38,6 +38,21 @@ _FLUSH_SEC = 1.0
 # context is checked again and again.
 _SIGNAL_SEC = 10.0
 _SIGNAL_POLL_SEC = 0.005
+
+_Callback = TypeVar('_Callback', bound=Callable[..., Any])
+
+
+def checked_seldom(callback: _Callback) -> _Callback:
+    """Mark a callback of QoS events that need not run at once; a decorator."""
+    marked: Any = callback
+    marked.is_checked_seldom = True
+    return callback
+
+
+def _is_checked_seldom(callback: Any) -> bool:
+    # The module defines rclpy's default callbacks.
+    is_default = getattr(callback, '__module__', '') == 'rclpy.event_handler'
+    return is_default or getattr(callback, 'is_checked_seldom', False)
 
 
 class Owner(Protocol):
@@ -117,8 +132,8 @@ class WaitSetThread:
         self._closing = False
         self._users = 0
         self._waited_for: set[WaitSetSource] = set()
-        self._user_events = _QosEventChecks(0.02, 1.0, 0.01)
-        self._default_events = _QosEventChecks(0.1, 30.0, 0.002)
+        self._often = _QosEventChecks(0.02, 1.0, 0.01)
+        self._seldom = _QosEventChecks(0.1, 30.0, 0.002)
         self._signalled_until = 0.0
         self._wait_set: tuple[tuple[int, ...], Any] | None = None
 
@@ -161,7 +176,7 @@ class WaitSetThread:
 
     def check_events_soon(self) -> None:
         """Check all QoS events a few times in the next moments: entities have come or gone."""
-        used = [checks for checks in (self._default_events, self._user_events) if checks.sources]
+        used = [checks for checks in (self._seldom, self._often) if checks.sources]
         for checks in used:
             checks.run_soon()
         if used:
@@ -203,10 +218,8 @@ class WaitSetThread:
     def _sources_like(self, source: WaitSetSource) -> set[WaitSetSource]:
         if not isinstance(source.entity, EventHandler):
             return self._waited_for
-        name = getattr(source.entity.callback, '__name__', '')
-        return (
-            self._default_events if name.startswith('_default_') else self._user_events
-        ).sources
+        callback = source.entity.callback
+        return (self._seldom if _is_checked_seldom(callback) else self._often).sources
 
     def _run(self) -> None:
         try:
@@ -291,7 +304,7 @@ class WaitSetThread:
 
     def _timeout_sec(self, max_sec: float | None) -> float | None:
         now = monotonic()
-        ends = [c.due for c in (self._user_events, self._default_events) if c.sources]
+        ends = [c.due for c in (self._often, self._seldom) if c.sources]
         if max_sec is not None:
             ends.append(now + max_sec)
         if now < self._signalled_until:
@@ -302,7 +315,7 @@ class WaitSetThread:
         now = monotonic()
         due = [
             checks
-            for checks in (self._user_events, self._default_events)
+            for checks in (self._often, self._seldom)
             if checks.sources and checks.due <= now
         ]
         if not due:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import diagnostic_at
 from composer.expressions import is_variable_name
 from composer.expressions.filling import MAX_ENTRIES, SECTIONS
-from composer.expressions.templates import Filler
+from composer.expressions.templates import TemplateEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -49,19 +49,19 @@ def expand_document(
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
     """
-    filler = Filler(values, positions, samples, origins)
+    evaluator = TemplateEvaluator(values, positions, samples, origins)
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
     plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
-    filled = filler.fill_mapping(plain, ()) | ignored
+    filled = evaluator.evaluate_mapping(plain, ()) | ignored
     limit = _limit_of(filled)
     for section in SECTIONS:
         if isinstance(data.get(section), dict):
-            expansion = _Expansion(filler, section, limit)
+            expansion = _Expansion(evaluator, section, limit)
             filled[section] = expansion.expand(data[section])
         elif section in data:
-            filled[section] = filler.fill(data[section], (section,))
-    filler.filled.data = filled
-    return filler.filled
+            filled[section] = evaluator.evaluate(data[section], (section,))
+    evaluator.filled.data = filled
+    return evaluator.filled
 
 
 def _limit_of(data: Mapping[str, Any]) -> int:
@@ -73,9 +73,9 @@ def _limit_of(data: Mapping[str, Any]) -> int:
 class _Expansion:
     """Expands the entries of one section."""
 
-    def __init__(self, filler: Filler, section: str, limit: int) -> None:
-        self._filler = filler
-        self._filled = filler.filled
+    def __init__(self, evaluator: TemplateEvaluator, section: str, limit: int) -> None:
+        self._evaluator = evaluator
+        self._filled = evaluator.filled
         self._section = section
         self._limit = limit
         self._entries: dict[str, Any] = {}
@@ -84,7 +84,7 @@ class _Expansion:
     def expand(self, data: dict[str, Any]) -> dict[str, Any]:
         for written, entry in data.items():
             if not _is_conditional(entry):
-                self._add(self._filler, written, entry, is_left_out=False, is_repeated=False)
+                self._add(self._evaluator, written, entry, is_left_out=False, is_repeated=False)
                 continue
             path = (self._section, written)
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
@@ -94,12 +94,12 @@ class _Expansion:
                 self._filled.failed.append(path)
                 continue
             before = len(self._filled.faults)
-            for filler in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
+            for evaluator in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
                 if len(self._entries) >= self._limit:
                     self._report_limit(path)
                     return self._entries
-                holds = self._holds(filler, entry.get(_WHEN, True), (*path, _WHEN))
-                self._add(filler, written, body, is_left_out=not holds, is_repeated=is_repeated)
+                holds = self._holds(evaluator, entry.get(_WHEN, True), (*path, _WHEN))
+                self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
                 before = -1
             if len(self._filled.faults) > before >= 0:
                 # It is missing for a fault, not for having no values.
@@ -107,10 +107,16 @@ class _Expansion:
         return self._entries
 
     def _add(
-        self, filler: Filler, written: str, body: Any, *, is_left_out: bool, is_repeated: bool
+        self,
+        evaluator: TemplateEvaluator,
+        written: str,
+        body: Any,
+        *,
+        is_left_out: bool,
+        is_repeated: bool,
     ) -> None:
         written_path = (self._section, written)
-        key = filler.fill_key(written_path)
+        key = evaluator.evaluate_key(written_path)
         path = (self._section, key)
         if key in self._entries:
             if path in self._filled.left_out:
@@ -122,33 +128,33 @@ class _Expansion:
                 return
         if key != written:
             self._graft(path, written)
-        self._entries[key] = filler.fill(body, path)
+        self._entries[key] = evaluator.evaluate(body, path)
         if is_left_out:
             self._filled.left_out.add(path)
 
     def _graft(self, path: DataPath, written: str) -> None:
         if self._branches is None:
-            self._branches = self._filler.positions.branches((self._section,))
-        self._filler.positions.graft(path, self._branches[written])
+            self._branches = self._evaluator.positions.branches((self._section,))
+        self._evaluator.positions.graft(path, self._branches[written])
 
     def _scopes(
-        self, foreach: Any, path: DataPath, filler: Filler | None = None
-    ) -> Iterator[Filler]:
-        """Yield a filler for each combination of the variables' values, the last one fastest."""
-        filler = filler or self._filler
+        self, foreach: Any, path: DataPath, evaluator: TemplateEvaluator | None = None
+    ) -> Iterator[TemplateEvaluator]:
+        """Yield an evaluator for each combination of values, the last variable's fastest."""
+        evaluator = evaluator or self._evaluator
         if not isinstance(foreach, dict):
             self._report(path, f"{_FOREACH} is a mapping, as in 'foreach: {{i: [1, 2]}}'")
             return
         if not foreach:
-            yield filler
+            yield evaluator
             return
         name, *others = foreach
         at = (*path, name)
         if not is_variable_name(name):
             self._report(at, f"'{name}' cannot stand in an expression as a name")
             return
-        values = filler.fill(foreach[name], at)
-        is_sample = filler.is_sampled(at)
+        values = evaluator.evaluate(foreach[name], at)
+        is_sample = evaluator.is_sampled(at)
         if not isinstance(values, list):
             if at not in self._filled.failed:
                 self._report(at, f"'{name}' takes a list of values, not {values!r}")
@@ -156,11 +162,11 @@ class _Expansion:
             values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:
-            inner = filler.within(name, value, _FOREACH, is_sample=is_sample)
+            inner = evaluator.within(name, value, _FOREACH, is_sample=is_sample)
             yield from self._scopes(rest, path, inner)
 
-    def _holds(self, filler: Filler, condition: Any, path: DataPath) -> bool:
-        holds = filler.fill(condition, path)
+    def _holds(self, evaluator: TemplateEvaluator, condition: Any, path: DataPath) -> bool:
+        holds = evaluator.evaluate(condition, path)
         if path in self._filled.failed:
             return False
         if not isinstance(holds, bool):
@@ -170,16 +176,16 @@ class _Expansion:
 
     def _report(self, path: DataPath, message: str) -> None:
         rule = 'bad-when' if path[2] == _WHEN else 'bad-foreach'
-        span = self._filler.positions.value(path)
+        span = self._evaluator.positions.value(path)
         self._filled.faults.append(diagnostic_at(span, rule, message))
 
     def _report_duplicate(self, key: str, path: DataPath, *, is_repeated: bool) -> None:
         if not is_repeated:
-            self._filler.report_duplicate(key, path, (self._section, key))
+            self._evaluator.report_duplicate(key, path, (self._section, key))
             return
         self._filled.faults.append(
             diagnostic_at(
-                self._filler.positions.key(path),
+                self._evaluator.positions.key(path),
                 'duplicate-key',
                 f"foreach makes more than one '{key}'",
                 help=f'use its variables in the name, as in "{key}_{{{{ i }}}}"',
@@ -189,7 +195,7 @@ class _Expansion:
     def _report_limit(self, path: DataPath) -> None:
         self._filled.faults.append(
             diagnostic_at(
-                self._filler.positions.key((*path, _FOREACH)),
+                self._evaluator.positions.key((*path, _FOREACH)),
                 'too-many-entries',
                 f'there are more than {self._limit:,} entries in {self._section}',
                 help="if that is meant, raise 'max_nodes' at the top of the file",

@@ -20,27 +20,25 @@ from jinja2 import (
 )
 from jinja2.exceptions import SecurityError
 
-from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
-from composer.names import did_you_mean, suggest
+from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
+from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Mapping
 
+    from composer.diagnostics import Span
     from composer.yaml_text.positions import DataPath, SourceMap
 
-_OPEN = '{{'
-_CLOSE = '}}'
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
-# Farther on, an undefined name is not sought: its finding shows the whole scalar.
-_LONGEST_SEARCHED = 1000
-_MOST_LINES_SEARCHED = 100
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
 
 
-class Filler:
+class TemplateEvaluator:
     """Evaluates the expressions of one document.
 
     Args:
@@ -62,12 +60,12 @@ class Filler:
         self._origins = origins or {}
         self._values = values
         self._samples = frozenset(samples)
-        self._sandbox = Sandbox(undefined=StrictUndefined)
+        self._sandbox = Sandbox()
 
-    def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Filler:
-        """Return a filler with one more name in scope, for the same document."""
+    def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> TemplateEvaluator:
+        """Return an evaluator with one more name in scope, for the same document."""
         samples = self._samples | {name} if is_sample else self._samples - {name}
-        inner = Filler(
+        inner = TemplateEvaluator(
             {**self._values, name: value},
             self.positions,
             samples,
@@ -77,33 +75,33 @@ class Filler:
         inner._sandbox = self._sandbox
         return inner
 
-    def fill(self, data: Any, path: DataPath) -> Any:
+    def evaluate(self, data: Any, path: DataPath) -> Any:
         """Return data with the values of all expressions in place."""
         if isinstance(data, dict):
-            return self.fill_mapping(data, path)
+            return self.evaluate_mapping(data, path)
         if isinstance(data, list):
-            return [self.fill(item, (*path, index)) for index, item in enumerate(data)]
-        if isinstance(data, str) and _OPEN in data:
+            return [self.evaluate(item, (*path, index)) for index, item in enumerate(data)]
+        if isinstance(data, str) and OPEN in data:
             return self._evaluate(data, path)
         return data
 
-    def fill_mapping(self, data: dict[str, Any], path: DataPath) -> dict[str, Any]:
+    def evaluate_mapping(self, data: dict[str, Any], path: DataPath) -> dict[str, Any]:
         """Return a mapping with the values of the expressions in its keys and values in place."""
         filled: dict[str, Any] = {}
         for written, value in data.items():
-            key = self.fill_key((*path, written))
+            key = self.evaluate_key((*path, written))
             if key != written and (key in data or key in filled):
                 self.report_duplicate(key, (*path, written), (*path, key))
                 continue
             if key != written:
                 self.positions.move((*path, written), (*path, key))
-            filled[key] = self.fill(value, (*path, key))
+            filled[key] = self.evaluate(value, (*path, key))
         return filled
 
-    def fill_key(self, path: DataPath) -> str:
+    def evaluate_key(self, path: DataPath) -> str:
         """Return the key at the end of a path with the values of its expressions in place."""
         written = str(path[-1])
-        if _OPEN not in written:
+        if OPEN not in written:
             return written
         return str(_as_text(self._evaluate(written, path, is_key=True)))
 
@@ -115,7 +113,7 @@ class Filler:
         span = self.positions.key(path) if is_key else self.positions.value(path)
         sampled = False
         try:
-            expressions = list(_find_expressions(text, self._sandbox))
+            expressions = list(find_expressions(text, self._sandbox))
             names = self._names_in(text, expressions)
             self.filled.notes[path] = self._note(names)
             sampled = not self._samples.isdisjoint(names)
@@ -145,14 +143,14 @@ class Filler:
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
         scope = {'here': str(span.source.folder.resolve()), **self._values}
-        return _as_data(self._sandbox.evaluate(_code(text, expression), scope))
+        return _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
 
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
         for expression in expressions:
             # What is wrong with it is said when it is evaluated.
             with suppress(TemplateError):
-                names |= self._sandbox.names_in(_code(text, expression))
+                names |= self._sandbox.names_in(code_of(text, expression))
         return frozenset(names)
 
     def _note(self, names: frozenset[str]) -> str:
@@ -165,13 +163,13 @@ class Filler:
         ):
             name = found.group(1)
             scope = {*self._values, 'here', *self._sandbox.globals}
-            declared = self._values or suggest(name, scope)
-            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
+            declared = self._values or find_nearest(name, scope)
+            listed = 'in scope are' if declared else None
             return diagnostic_at(
-                _locate(name, span),
+                locate_name(name, span),
                 'undefined-name',
                 f"'{name}' is not defined",
-                help=help_text or "declare it as an argument, under 'args'",
+                help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
@@ -185,33 +183,6 @@ class Filler:
                 related=[Related('it stands here too', self.positions.key(other))],
             )
         )
-
-
-def _find_expressions(text: str, sandbox: Sandbox) -> Iterator[slice]:
-    """Yield where each `{{ … }}` is, braces included; the first that has no end raises."""
-    start = text.find(_OPEN)
-    while start >= 0:
-        stop = start + len(_OPEN) + sandbox.measure(text[start + len(_OPEN) :]) + len(_CLOSE)
-        yield slice(start, stop)
-        start = text.find(_OPEN, stop)
-
-
-def _code(text: str, expression: slice) -> str:
-    return text[expression.start + len(_OPEN) : expression.stop - len(_CLOSE)]
-
-
-def _locate(name: str, span: Span) -> Span:
-    """Return where a name stands in an expression of a scalar, which may go over several lines."""
-    pattern = re.compile(rf'\{{\{{(?:(?!\}}\}}).)*?(?<![\w.])({re.escape(name)})(?!\w)')
-    if _OPEN in span.text:
-        found = pattern.search(span.text[:_LONGEST_SEARCHED])
-        start = span.column + found.start(1) if found else 0
-        return Span(span.source, span.line, start, len(name)) if found else span
-    lines = span.source.lines[span.line - 1 : span.line - 1 + _MOST_LINES_SEARCHED]
-    for number, line in enumerate(lines, start=span.line):
-        if found := pattern.search(line[:_LONGEST_SEARCHED]):
-            return Span(span.source, number, found.start(1) + 1, len(name))
-    return span
 
 
 def _describe(error: Exception) -> str:

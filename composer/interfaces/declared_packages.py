@@ -1,7 +1,8 @@
-"""The interface packages that a file declares: described for checks, provided for a start."""
+"""The interface packages that a file declares: read once, for checks and for a start."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,32 +14,41 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from composer.diagnostics import Diagnostic
+    from composer.interfaces.definitions.package_folder import PackageDefinitions
     from composer.language.pipeline import LoadedSystem
     from composer.language.specs import SystemSpec
 
 
-def declared_folders(system: LoadedSystem) -> dict[str, Path]:
-    """Return the folder of each interface package that a system declares."""
-    return _folders_of(system.spec)
+@dataclass(frozen=True, slots=True)
+class DeclaredPackages:
+    """The interface packages that a file declares, and the types that its system can use.
 
-
-def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:
-    return {package: Path(folder) for package, folder in spec.interfaces.items()} if spec else {}
-
-
-def describe_declared(
-    system: LoadedSystem, installed: InterfaceCatalogue
-) -> tuple[InterfaceCatalogue, frozenset[str], list[Diagnostic]]:
-    """Read the packages that a file declares.
-
-    Returns:
-        What describes the types of the system, the packages of which nothing is known because
-        something is wrong with them, and what that is.
+    Attributes:
+        catalogue: Describes the types of installed and of declared packages.
+        folders: The folder of each package that the system needs.
+        definitions: What the folders define, each package after those that it uses; `None` if
+            they were not read.
+        unreadable: The packages with errors; nothing is known of their types.
+        findings: These errors.
     """
-    # What is left out is checked all the same, and needs its types for that.
-    folders = _folders_of(system.unused) | declared_folders(system)
+
+    catalogue: InterfaceCatalogue
+    folders: Mapping[str, Path] = field(default_factory=dict)
+    definitions: Sequence[PackageDefinitions] | None = None
+    unreadable: frozenset[str] = frozenset()
+    findings: Sequence[Diagnostic] = ()
+
+
+def load_declared(system: LoadedSystem, installed: InterfaceCatalogue) -> DeclaredPackages:
+    """Read the definitions of the packages that a file declares.
+
+    Without any installed interface package, which is without ROS, only the folders are checked.
+    """
+    needed = _folders_of(system.spec)
+    # Nodes that are left out are checked too, which needs their types.
+    folders = _folders_of(system.unused) | needed
     if not folders:
-        return installed, frozenset(), []
+        return DeclaredPackages(installed)
     catalogue = InterfaceCatalogue()
     absent = {package: folder for package, folder in folders.items() if not _is_folder(folder)}
     findings = [
@@ -50,53 +60,60 @@ def describe_declared(
         for package, folder in absent.items()
     ]
     present = {package: folder for package, folder in folders.items() if package not in absent}
-    if present and catalogue.available:
-        faults = _describe_folders(present, catalogue, system)
-        absent |= present if faults else {}
-        findings += faults
-    return catalogue, frozenset(absent), findings
-
-
-def _describe_folders(
-    folders: Mapping[str, Path], catalogue: InterfaceCatalogue, system: LoadedSystem
-) -> list[Diagnostic]:
-    """Add what folders define to a catalogue; return what is wrong with it instead, if it is."""
-    # The parser of definitions is slow to import, and most files declare no packages.
-    from composer.interfaces.build.provision import DefinitionsError, load_packages
-
-    try:
-        packages = load_packages(folders)
-    except DefinitionsError as error:
-        return list(error.diagnostics)
-    except ComposerError as error:
-        span = system.positions.key(('interfaces',))
-        return [diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)]
-    for package in packages:
+    if not present or not catalogue.available:
+        return DeclaredPackages(catalogue, needed, None, frozenset(absent), findings)
+    definitions, errors = _load_folders(present, catalogue, system)
+    for package in definitions:
         for description in package.interfaces.values():
             catalogue.add(description)
-    return []
+    unreadable = frozenset(folders if errors else absent)
+    return DeclaredPackages(catalogue, needed, definitions, unreadable, [*findings, *errors])
+
+
+def provide_declared(declared: DeclaredPackages, progress: Callable[[str], None]) -> Sequence[str]:
+    """Make the packages that a file declares importable, and build those that are not installed.
+
+    Returns:
+        Their names.
+
+    Raises:
+        ComposerError: A package cannot be provided; the help says what to install or change.
+    """
+    if not declared.folders:
+        return ()
+    # Most files declare no packages, and should not pay for these imports.
+    from composer.interfaces.build.provision import provide_packages
+    from composer.interfaces.definitions.packages import load_packages
+
+    definitions = declared.definitions
+    if definitions is None:
+        definitions = load_packages(declared.folders, declared.catalogue)
+    needed = [each for each in definitions if each.package in declared.folders]
+    return [provided.package for provided in provide_packages(needed, progress)]
+
+
+def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:
+    return {package: Path(folder) for package, folder in spec.interfaces.items()} if spec else {}
+
+
+def _load_folders(
+    folders: Mapping[str, Path], catalogue: InterfaceCatalogue, system: LoadedSystem
+) -> tuple[list[PackageDefinitions], Sequence[Diagnostic]]:
+    """Return what the folders define, or nothing and the errors."""
+    from composer.interfaces.definitions.packages import DefinitionsError, load_packages
+
+    try:
+        return load_packages(folders, catalogue), ()
+    except DefinitionsError as error:
+        return [], error.diagnostics
+    except ComposerError as error:
+        span = system.positions.key(('interfaces',))
+        return [], [diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)]
 
 
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
     except OSError:
-        # The path is too long, or leads through what may not be searched.
+        # The path is too long, or a folder on it cannot be searched.
         return False
-
-
-def provide_declared(system: LoadedSystem, progress: Callable[[str], None]) -> Sequence[str]:
-    """Make the packages that a file declares importable, building what has to be built.
-
-    Returns:
-        Their names.
-
-    Raises:
-        ComposerError: One of them cannot be provided; its help says what to install or mend.
-    """
-    folders = declared_folders(system)
-    if not folders:
-        return ()
-    from composer.interfaces.build.provision import provide_packages
-
-    return [provided.package for provided in provide_packages(folders, progress)]

@@ -1,4 +1,4 @@
-"""QoS profiles by name, and what a declared one comes to.
+"""QoS profiles by name, and the policies of a declared QoS.
 
 The built-in profiles are those of rmw (`rmw/qos_profiles.h`), with rclpy's names.
 """
@@ -14,6 +14,11 @@ if TYPE_CHECKING:
 
     from composer.language.specs import QosSpec
 
+# Policies that are durations, in seconds; `INFINITE` is no limit.
+DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
+INFINITE = 'infinite'
+NANOSECONDS = 1_000_000_000
+
 DEFAULT_PROFILE = 'default'
 SERVICES_PROFILE = 'services_default'
 
@@ -25,7 +30,7 @@ _DEFAULT = {
     'liveliness': 'system_default',
 }
 
-# Durations that are not named are not limited.
+# Durations that are not named are infinite.
 BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     DEFAULT_PROFILE: _DEFAULT,
     'sensor_data': _DEFAULT | {'depth': 5, 'reliability': 'best_effort'},
@@ -51,12 +56,12 @@ BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     },
 }
 
-# Nobody writes more; the bound keeps thousands of profiles from being followed thousands of times.
+# Nobody writes longer ones; thousands of profiles in a chain would take quadratic time.
 _LONGEST_CHAIN = 50
 
 
 class QosError(ComposerError):
-    """A profile that does not exist, or that leads back to itself.
+    """A profile does not exist, or is based on itself.
 
     Attributes:
         spec: The QoS that names the profile.
@@ -68,18 +73,18 @@ class QosError(ComposerError):
 
 
 class UnknownProfileError(QosError):
-    """No profile of the file or of ROS has the name."""
+    """Neither the file nor ROS has a profile of this name."""
 
 
 def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
-    """Return the policies of a QoS, those of the profiles that it starts from included.
+    """Return the policies of a QoS, including those of the profiles that it is based on.
 
     Args:
         profiles: The named profiles of the file.
 
     Raises:
         UnknownProfileError: A profile does not exist.
-        QosError: A profile leads back to itself.
+        QosError: A profile is based on itself.
     """
     chain = [spec]
     while chain[-1].profile in profiles:
@@ -99,3 +104,10 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
     for link in reversed(chain):
         policies |= link.policies
     return policies
+
+
+def format_policy_value(policy: str, value: Any) -> str:
+    """Return `0.5 s` for a duration, and any other value as it is."""
+    if policy in DURATIONS and not isinstance(value, str):
+        return f'{value:g} s'
+    return str(value)

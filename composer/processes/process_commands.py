@@ -12,8 +12,8 @@ import yaml
 from composer.ament import list_executables
 from composer.errors import StartError
 from composer.language.paths import PathError, resolve_path
-from composer.names import did_you_mean
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -144,7 +144,7 @@ def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str
                 return [str(path.absolute()), *spec.arguments]
         names = [path.name for path in executables]
         message = f"process '{spec.name}': '{spec.package}' has no executable '{spec.executable}'"
-        raise StartError(message, help=did_you_mean(spec.executable or '', names, 'it has'))
+        raise StartError(message, help=suggest(spec.executable, names, 'it has'))
     program = spec.command[0]
     if '/' not in program:
         if shutil.which(program, path=environment.get('PATH', os.defpath)) is None:

@@ -4,7 +4,7 @@ import textwrap
 
 import pytest
 
-from composer.checks.checker import check_system, create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.drawing.picture import build_picture
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
@@ -22,9 +22,8 @@ def draw(tmp_path, monkeypatch):
         for each in layers:
             each.write_text(layer)
         system = load_system(path, layers=layers, set_values=set_values)
-        catalogue = InterfaceCatalogue()
-        findings = check_system(system, catalogue)
-        return build_picture(create_context(system, catalogue)[0], findings)
+        context = create_context(system, InterfaceCatalogue())
+        return build_picture(context, check_in_context(system, context))
 
     return draw
 

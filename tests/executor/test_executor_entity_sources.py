@@ -213,7 +213,10 @@ def test_a_service_can_be_called_from_a_callback_of_another_group(
     answers: list[str] = []
     client = node.create_client(Trigger, 'greet', callback_group=MutuallyExclusiveCallbackGroup())
     node.create_service(
-        Trigger, 'greet', lambda _, r: _filled(r), callback_group=MutuallyExclusiveCallbackGroup()
+        Trigger,
+        'greet',
+        lambda _, r: _with_greeting(r),
+        callback_group=MutuallyExclusiveCallbackGroup(),
     )
     node.create_timer(0.01, lambda: answers.append(client.call(Trigger.Request()).message))
     with spinning(executor):
@@ -221,7 +224,7 @@ def test_a_service_can_be_called_from_a_callback_of_another_group(
     assert set(answers) == {'hello'}
 
 
-def _filled(response: Any) -> Any:
+def _with_greeting(response: Any) -> Any:
     response.message = 'hello'
     return response
 
@@ -232,7 +235,7 @@ def test_an_async_service_and_an_async_caller(node: Any, executor: Any) -> None:
 
     async def serve(_: Any, response: Any) -> Any:
         await gate
-        return _filled(response)
+        return _with_greeting(response)
 
     async def call() -> None:
         timer.cancel()
@@ -251,7 +254,7 @@ def test_an_async_service_and_an_async_caller(node: Any, executor: Any) -> None:
 
 def test_calls_at_once_are_all_answered(node: Any, executor: Any) -> None:
     client = node.create_client(Trigger, 'greet')
-    node.create_service(Trigger, 'greet', lambda _, r: _filled(r))
+    node.create_service(Trigger, 'greet', lambda _, r: _with_greeting(r))
     with spinning(executor):
         assert client.wait_for_service(DEADLINE_SEC)
         calls = [client.call_async(Trigger.Request()) for _ in range(9)]

@@ -75,7 +75,7 @@ def test_a_coroutine_that_yields_is_resumed_by_the_next_spin_once(
     assert steps == [1, 2]
 
 
-def test_a_suspended_callback_goes_on_when_its_node_is_back(
+def test_a_suspended_callback_is_resumed_when_its_node_is_back(
     context: Context,
     executor: Any,
 ) -> None:
@@ -103,7 +103,7 @@ def test_a_suspended_callback_goes_on_when_its_node_is_back(
     assert steps == [1, 2]
 
 
-def test_a_suspended_callback_of_a_destroyed_node_is_let_go_of(
+def test_a_suspended_callback_of_a_destroyed_node_is_dropped(
     node: Any,
     context: Context,
     executor: Any,

@@ -124,7 +124,7 @@ def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
 
 
 @pytest.mark.parametrize('what', ['context', 'executor'])
-def test_spin_once_ends_with_what_ended_right_before_it_waits(
+def test_spin_once_ends_when_the_context_or_executor_ended_right_before_it_waits(
     node: Any, executor: Any, context: Context, monkeypatch: Any, what: str
 ) -> None:
     spinner = executor._spinner
@@ -152,9 +152,9 @@ def test_spin_ends_when_a_signal_ends_the_context_while_events_are_checked(
     check_events = wait_set_thread._check_events
 
     def check_in_vain() -> None:
-        if wait_set_thread._default_events.sources:
+        if wait_set_thread._seldom.sources:
             context.handle.shutdown()  # As rclpy's handler of signals does it.
-            wait_set_thread._default_events.due = 0.0
+            wait_set_thread._seldom.due = 0.0
         check_events()
 
     monkeypatch.setattr(wait_set_thread, '_check_events', check_in_vain)
@@ -203,7 +203,7 @@ def test_a_group_shared_by_two_executors_is_exclusive(executor: Any, context: Co
     assert most == 1
 
 
-def test_the_executor_can_be_forgotten(context: Context) -> None:
+def test_the_executor_can_be_garbage_collected(context: Context) -> None:
     executor = ComposerExecutor(context=context)
     node = rclpy.create_node('node', context=context)
     executor.add_node(node)

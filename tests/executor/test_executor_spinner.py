@@ -1,4 +1,4 @@
-"""`spin`, `spin_once` and their friends keep rclpy's promises."""
+"""`spin`, `spin_once` and the like keep rclpy's promises."""
 
 import asyncio
 import sys

@@ -32,7 +32,7 @@ def test_the_interval_is_short_until_the_last_user_has_left():
     assert sys.getswitchinterval() == 0.005
 
 
-def test_a_shorter_interval_is_left_alone():
+def test_a_shorter_interval_is_not_changed():
     sys.setswitchinterval(0.0005)
     interval = ShortSwitchInterval()
     interval.add_user()
@@ -41,7 +41,7 @@ def test_a_shorter_interval_is_left_alone():
     assert sys.getswitchinterval() == 0.0005
 
 
-def test_an_interval_that_was_set_meanwhile_is_left_alone():
+def test_an_interval_that_was_set_meanwhile_is_not_changed():
     interval = ShortSwitchInterval()
     interval.add_user()
     sys.setswitchinterval(0.02)

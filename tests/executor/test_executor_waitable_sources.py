@@ -46,7 +46,7 @@ def test_a_guard_condition_runs_its_callback(node: Any, executor: Any) -> None:
         node.destroy_guard_condition(guard)
 
 
-def test_a_guard_condition_is_let_go_of_at_once(
+def test_a_destroyed_guard_condition_is_released_at_once(
     node: Any,
     executor: Any,
     monkeypatch: pytest.MonkeyPatch,

@@ -32,7 +32,7 @@ def test_threads_that_have_still_to_begin_count(monkeypatch):
     assert not threads.has_threads()
 
 
-def test_shutdown_leaves_a_waiting_spin_once_what_it_waits_with(node, executor):
+def test_shutdown_keeps_what_a_waiting_spin_once_waits_with(node, executor):
     poller = executor._spinner.poller
     wait, waiting, errors = poller._wait, threading.Event(), []
 

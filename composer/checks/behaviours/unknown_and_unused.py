@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.diagnostics import Related
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
-from composer.names import did_you_mean, suggest
+from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -137,8 +137,9 @@ def _explain_name(
         rule,
         message,
         part=behaviour.function,
-        help=did_you_mean(use.name, getattr(node, section), 'it declares')
-        or f"declare it under '{section}:'",
+        help=suggest(
+            use.name, getattr(node, section), 'it declares', f"declare it under '{section}:'"
+        ),
         related=[Related(f"'{use.name}' is used here", found.place)],
     )
 
@@ -173,7 +174,7 @@ def _meant(node: NodeSpec, used: set[tuple[UseKind, str]]) -> Iterator[tuple[Use
     for kind, name in used:
         declared = getattr(node, _SECTIONS[kind])
         if name and name not in declared and not _is_of_ros(kind, name):
-            near = suggest(name, declared)
+            near = find_nearest(name, declared)
             yield from ((kind, each) for each in (declared if near is None else (near,)))
 
 

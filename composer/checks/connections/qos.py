@@ -6,7 +6,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from composer.language.qos import QosError, resolve_qos
-from composer.language.qos_matching import QosConflict, find_qos_conflicts
+from composer.language.qos_conflicts import QosConflict, find_qos_conflicts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -17,8 +17,8 @@ from composer.errors import ComposerError
 from composer.interfaces.build.compilation import BuildPlan, plan_jobs, write_generation_arguments
 from composer.interfaces.build.jobs import JobError, run_jobs
 from composer.interfaces.build.toolchain import find_toolchain
-from composer.interfaces.definitions.dependencies import used_packages
 from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.packages import used_packages
 
 _SHOWN_LINES = 20
 

@@ -3,44 +3,21 @@
 import importlib
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
-from composer.diagnostics import Diagnostic
 from composer.errors import ComposerError
 from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
-from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions.dependencies import (
-    check_definitions,
-    order_packages,
+from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.interfaces.definitions.packages import (
     used_packages,
 )
-from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
-
-
-class DefinitionsError(ComposerError):
-    """Interface definitions are wrong.
-
-    Attributes:
-        diagnostics: all that is wrong with them.
-    """
-
-    def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
-        """List all findings."""
-        super().__init__('\n'.join(map(_format, diagnostics)))
-        self.diagnostics = tuple(diagnostics)
-
-
-def _format(diagnostic: Diagnostic) -> str:
-    place = diagnostic.span or diagnostic.file
-    text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
-    return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
 
 
 class ModuleTakenError(ComposerError):
@@ -55,55 +32,30 @@ class ProvidedPackage:
         package: its name.
         prefix: where it is, for an `InterfaceCatalogue`.
         origin: whether it was `installed`, `cached` by an earlier start, or `built` now.
-        definitions: what the folder defines.
     """
 
     package: str
     prefix: Path
     origin: Origin
-    definitions: PackageDefinitions
-
-
-def load_packages(folders: Mapping[str, Path]) -> list[PackageDefinitions]:
-    """Read the definitions of packages, each in order after those that it uses.
-
-    Args:
-        folders: the folder of each package's definitions, by its name.
-
-    Raises:
-        ParserMissingError: `rosidl_adapter` is not installed.
-        DefinitionsError: they are wrong, alone or together.
-    """
-    packages = [load_definitions(package, folder) for package, folder in folders.items()]
-    diagnostics = check_definitions(packages, InterfaceCatalogue())
-    if diagnostics:
-        raise DefinitionsError(diagnostics)
-    return order_packages(packages)
 
 
 def provide_packages(
-    folders: Mapping[str, Path],
+    packages: Iterable[PackageDefinitions],
     progress: Callable[[str], None],
 ) -> list[ProvidedPackage]:
-    """Make interface packages importable, building those that are neither installed nor cached.
+    """Make interface packages importable, and build those that are neither installed nor cached.
 
     Args:
-        folders: the folder of each package's definitions, by its name.
-        progress: is told in a short line what takes long.
-
-    Returns:
-        one for each folder, each after those that it uses.
+        packages: definitions without errors, each package after those that it uses.
+        progress: gets a short line about each step that takes long.
 
     Raises:
-        ParserMissingError: `rosidl_adapter` is not installed.
-        DefinitionsError: the definitions are wrong.
         DefinitionsDifferError: a package is installed with other definitions.
         BuildToolsMissingError: the system lacks what building needs.
         BuildError: a generator or compiler failed.
         CacheError: the cache cannot be written.
         ModuleTakenError: another Python module has a package's name.
     """
-    packages = load_packages(folders)
     provider = _Provider(ament_prefixes(), progress)
     return [provider.provide(definitions) for definitions in packages]
 
@@ -124,7 +76,7 @@ class _Provider:
             from composer.interfaces.definitions.differences import require_same
 
             require_same(definitions, installed)
-            return ProvidedPackage(definitions.package, installed, 'installed', definitions)
+            return ProvidedPackage(definitions.package, installed, 'installed')
         return self._provide_built(definitions)
 
     def _provide_built(self, definitions: PackageDefinitions) -> ProvidedPackage:
@@ -146,7 +98,7 @@ class _Provider:
         )
         make_importable(package, place)
         self._places[package], self._keys[package] = place, key
-        return ProvidedPackage(package, place, origin, definitions)
+        return ProvidedPackage(package, place, origin)
 
     def _build(self, definitions: PackageDefinitions, folder: BuildFolder) -> None:
         from composer.interfaces.build.builder import Dependencies, build_package

@@ -1,4 +1,4 @@
-"""Resolved QoS policies → rclpy's `QoSProfile`."""
+"""QoS policies ⇄ rclpy's `QoSProfile`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from composer.language.qos import resolve_qos
+from composer.language.qos import INFINITE, NANOSECONDS, resolve_qos
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,11 +32,10 @@ _BEST_AVAILABLE = {
     'deadline': DeadlineBestAvailable,
     'liveliness_lease_duration': LivelinessLeaseDurationeBestAvailable,
 }
-_NANOSECONDS = 1_000_000_000
 
 
 def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSProfile:
-    """Return the profile that a declared QoS comes to.
+    """Return the profile for a declared QoS.
 
     Args:
         profiles: The named profiles of the file.
@@ -45,13 +44,27 @@ def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSPro
     return QoSProfile(**{key: _convert(key, value) for key, value in policies.items()})
 
 
+def read_policies(profile: QoSProfile) -> dict[str, Any]:
+    """Return the policies of a profile that both ends must agree on, as `resolve_qos` does."""
+    policies: dict[str, Any] = {
+        name: getattr(profile, name).name.lower() for name in _POLICIES if name != 'history'
+    }
+    for name, best_available in _BEST_AVAILABLE.items():
+        duration = getattr(profile, name)
+        if duration == best_available:
+            policies[name] = 'best_available'
+        elif 0 < duration.nanoseconds < Infinite.nanoseconds:
+            policies[name] = duration.nanoseconds / NANOSECONDS
+    return policies
+
+
 def _convert(key: str, value: Any) -> Any:
     if key == 'depth':
         return value
     if key in _POLICIES:
         return _POLICIES[key][value.upper()]
-    if value == 'infinite':
+    if value == INFINITE:
         return Infinite
     if value == 'best_available':
         return _BEST_AVAILABLE[key]
-    return Duration(nanoseconds=round(value * _NANOSECONDS))
+    return Duration(nanoseconds=round(value * NANOSECONDS))

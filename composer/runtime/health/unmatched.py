@@ -1,7 +1,7 @@
-"""Publishers and subscriptions that meet on a topic and cannot talk: told with both ends named.
+"""Reports publishers and subscriptions of one topic that can never match, with both ends named.
 
-That the QoS of two ends differs is an event of ROS, which does not tell the other end; the graph
-does. That their types differ is no event of Fast DDS, and is seen in the graph alone.
+Incompatible QoS is an event of ROS; the graph tells which end it is about. Fast DDS has no event
+for incompatible types, which only the graph shows.
 """
 
 from __future__ import annotations
@@ -11,15 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
-from rclpy.qos import (
-    DurabilityPolicy,
-    LivelinessPolicy,
-    QoSCompatibility,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
 
+from composer.executor import checked_seldom
+from composer.language.qos_conflicts import find_qos_conflicts
 from composer.language.specs import PublisherSpec
+from composer.runtime.entities.qos_profiles import read_policies
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -32,20 +28,13 @@ if TYPE_CHECKING:
     from composer.language.specs import SubscriptionSpec
 
 _PAUSE_SEC = 1.0
-# The graph may learn the name of an end a little later than the event tells of it.
-_MOST_LOOKS = 10
+# The graph may learn the name of an end some time after the event.
+_MOST_CHECKS = 10
 _UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
-
-# What a publisher offers beside what a subscription wants, and cannot give.
-_CONFLICTS = {
-    'reliability': (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE),
-    'durability': (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL),
-    'liveliness': (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC),
-}
 
 
 class TopicEndpoint:
-    """A publisher or subscription of a node, and whom it cannot talk to.
+    """A publisher or subscription of a node, which reports other ends that cannot match it.
 
     Args:
         ros: Its node.
@@ -67,50 +56,50 @@ class TopicEndpoint:
         self._spec = spec
         self._profile = profile
         self._publishes = isinstance(spec, PublisherSpec)
-        self._told: set[tuple[str, str]] = set()
-        self._looks = 0
+        self._reported: set[tuple[str, str]] = set()
+        self._checks_left = 0
         self.topic = ros.resolve_topic_name(spec.topic)
 
     def subscription_events(self) -> SubscriptionEventCallbacks:
-        """Return what rclpy takes for a subscription."""
+        """Return the event callbacks of a subscription."""
         return SubscriptionEventCallbacks(
-            incompatible_qos=self._default_incompatible_qos, use_default_callbacks=False
+            incompatible_qos=self._on_incompatible_qos, use_default_callbacks=False
         )
 
     def publisher_events(self) -> PublisherEventCallbacks:
-        """Return what rclpy takes for a publisher."""
+        """Return the event callbacks of a publisher."""
         return PublisherEventCallbacks(
-            incompatible_qos=self._default_incompatible_qos, use_default_callbacks=False
+            incompatible_qos=self._on_incompatible_qos, use_default_callbacks=False
         )
 
     @property
     def is_due(self) -> bool:
-        """Whether there must be somebody who has not been found."""
-        return self._looks > 0
+        """Whether an end that cannot match was announced and has not been found."""
+        return self._checks_left > 0
 
-    def look(self) -> None:
-        """Find those whom it cannot talk to, and tell of each once."""
+    def check(self) -> None:
+        """Find the ends that cannot match, and report each once."""
         found = False
-        for end in self._others():
+        for end in self._other_ends():
             name = f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-            reason = self._reason(end)
+            reason = self._find_reason(end)
             if reason is None or end.node_name == _UNKNOWN_NAME:
                 continue
             found = True
-            if (name, reason) not in self._told:
-                self._told.add((name, reason))
-                self._tell(name, reason)
-        self._looks = 0 if found else max(self._looks - 1, 0)
+            if (name, reason) not in self._reported:
+                self._reported.add((name, reason))
+                self._report(name, reason)
+        self._checks_left = 0 if found else max(self._checks_left - 1, 0)
 
     def expect(self) -> None:
-        """Look for somebody in the next moments, for there must be one."""
-        self._looks = _MOST_LOOKS
+        """Check a few times: there must be an end that cannot match."""
+        self._checks_left = _MOST_CHECKS
 
-    def _default_incompatible_qos(self, _event: Any) -> None:
-        # The executor looks seldom at handlers of such a name, as at those of rclpy itself.
+    @checked_seldom
+    def _on_incompatible_qos(self, _event: Any) -> None:
         self.expect()
 
-    def _others(self) -> list[TopicEndpointInfo]:
+    def _other_ends(self) -> list[TopicEndpointInfo]:
         get = (
             self.ros.get_subscriptions_info_by_topic
             if self._publishes
@@ -118,7 +107,7 @@ class TopicEndpoint:
         )
         return list(get(self.topic))
 
-    def _tell(self, name: str, reason: str) -> None:
+    def _report(self, name: str, reason: str) -> None:
         kind, what = (
             ('publisher', 'sends nothing to')
             if self._publishes
@@ -127,51 +116,34 @@ class TopicEndpoint:
         owner = f"{kind} '{self._spec.name}' ({self._place})"
         self.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
 
-    def _reason(self, end: TopicEndpointInfo) -> str | None:
-        """Return why nothing passes between this end and another, `None` if it does."""
+    def _find_reason(self, end: TopicEndpointInfo) -> str | None:
+        """Return why another end cannot match this one, `None` if it can."""
         if end.topic_type != self._spec.type:
             return f'its type is {end.topic_type} there, and {self._spec.type} here'
-        here, there = self._profile, end.qos_profile
-        offered, wanted = (here, there) if self._publishes else (there, here)
-        compatibility, text = qos_check_compatible(offered, wanted)
-        if compatibility != QoSCompatibility.ERROR:
-            return None
-        for policy, conflict in _CONFLICTS.items():
-            values = getattr(offered, policy), getattr(wanted, policy)
-            if values == conflict:
-                return self._describe(policy, *(value.name.lower() for value in values))
-        return str(text).removeprefix('ERROR: ').rstrip(';')
-
-    def _describe(self, policy: str, offered: str, wanted: str) -> str:
-        if self._publishes:
-            return (
-                f'{policy} is {offered} here, and {wanted} is wanted there; '
-                f"set 'qos: {{{policy}: {wanted}}}' here, or {offered} there"
-            )
-        return (
-            f'{policy} is {offered} there, and {wanted} is wanted here; '
-            f"set 'qos: {{{policy}: {offered}}}' here, or {wanted} there"
-        )
+        here, there = read_policies(self._profile), read_policies(end.qos_profile)
+        offered, requested = (here, there) if self._publishes else (there, here)
+        conflict = next(find_qos_conflicts(offered, requested), None)
+        return None if conflict is None else conflict.describe_from(publisher=self._publishes)
 
 
 class GraphWatcher(Watcher):
-    """The thread that looks who meets.
+    """The thread that checks endpoints when the graph shows a reason to.
 
     Args:
-        endpoints: Returns the endpoints that there are now.
+        endpoints: Returns the present endpoints.
     """
 
     def __init__(self, endpoints: Callable[[], Iterable[TopicEndpoint]]) -> None:
-        super().__init__('composer-graph', self._look_unless_destroyed, _PAUSE_SEC)
+        super().__init__('composer-graph', self._check_unless_destroyed, _PAUSE_SEC)
         self._endpoints = endpoints
         self._seen: list[tuple[str, list[str]]] = []
 
-    def _look_unless_destroyed(self) -> None:
+    def _check_unless_destroyed(self) -> None:
         # A node may be destroyed meanwhile.
         with suppress(InvalidHandle):
-            self._look_at_graph()
+            self._check_graph()
 
-    def _look_at_graph(self) -> None:
+    def _check_graph(self) -> None:
         endpoints = list(self._endpoints())
         mixed = self._newly_mixed_topics(endpoints)
         for end in endpoints:
@@ -180,7 +152,7 @@ class GraphWatcher(Watcher):
             if end.topic in mixed:
                 end.expect()
             if end.is_due:
-                end.look()
+                end.check()
 
     def _newly_mixed_topics(self, endpoints: list[TopicEndpoint]) -> set[str]:
         """Return the topics with several types, if anything in the graph has changed."""

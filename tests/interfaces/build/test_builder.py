@@ -70,8 +70,11 @@ PROVIDE = """
 import sys
 from pathlib import Path
 from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.definitions.packages import load_packages
 names = sys.argv[1].split(',')
-provided = provide_packages(dict(zip(names, map(Path, sys.argv[2:]))), print)
+folders = dict(zip(names, map(Path, sys.argv[2:])))
+provided = provide_packages(load_packages(folders, InterfaceCatalogue()), print)
 """
 PROVIDE_AND_LOCATE = PROVIDE + 'print(provided[-1].prefix)'
 

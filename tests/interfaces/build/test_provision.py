@@ -10,14 +10,12 @@ import pytest
 from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
 
 from composer.interfaces.build.provision import (
-    DefinitionsError,
     ModuleTakenError,
-    ProvidedPackage,
-    load_packages,
     make_importable,
     provide_packages,
 )
 from composer.interfaces.definitions.differences import DefinitionsDifferError
+from composer.interfaces.definitions.package_folder import load_definitions
 
 pytestmark = pytest.mark.ros
 
@@ -25,8 +23,11 @@ PROVIDE = """
 import sys
 from pathlib import Path
 from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.definitions.packages import load_packages
 folders = {name: Path(folder) for name, folder in zip(sys.argv[1::2], sys.argv[2::2])}
-for each in provide_packages(folders, lambda line: print(line, flush=True)):
+definitions = load_packages(folders, InterfaceCatalogue())
+for each in provide_packages(definitions, lambda line: print(line, flush=True)):
     print(each.package, each.origin)
 """
 StartProvider = Callable[[Path, Path], subprocess.Popen[str]]
@@ -207,25 +208,9 @@ def test_without_a_compiler_the_error_says_what_to_install(
     )
 
 
-def test_wrong_definitions_are_one_error_with_all_findings(
-    write_definitions: WriteDefinitions,
-) -> None:
-    folder = write_definitions({'msg/A.msg': 'strng a\n', 'msg/B.msg': 'std_mgs/Header a\n'})
-    with pytest.raises(DefinitionsError) as caught:
-        load_packages({'robots': folder})
-    assert [each.rule for each in caught.value.diagnostics] == ['unknown-type', 'unknown-package']
-    assert str(caught.value) == (
-        f"{folder}/msg/A.msg:1:1: error[unknown-type]: there is no type 'strng'\n"
-        '  help: did you mean string?\n'
-        f'{folder}/msg/B.msg:1:1: error[unknown-package]: '
-        "there is no interface package 'std_mgs'\n"
-        '  help: did you mean std_msgs/Header?'
-    )
-
-
 def test_an_installed_package_is_used(write_definitions: WriteDefinitions) -> None:
     folder = write_definitions({'msg/Empty.msg': '# Nothing.\n'})
-    [provided] = provide_packages({'std_msgs': folder}, silent)
+    [provided] = provide_packages([load_definitions('std_msgs', folder)], silent)
     assert (provided.package, provided.origin) == ('std_msgs', 'installed')
     assert (provided.prefix / 'share/std_msgs/msg/Empty.json').is_file()
 
@@ -235,19 +220,7 @@ def test_an_installed_package_with_other_definitions_is_an_error(
 ) -> None:
     folder = write_definitions({'msg/String.msg': 'wstring data\n'})
     with pytest.raises(DefinitionsDifferError, match=r'-string data\n\+wstring data'):
-        provide_packages({'std_msgs': folder}, silent)
-
-
-def test_provided_packages_are_described(
-    write_definitions: WriteDefinitions,
-    monkeypatch: pytest.MonkeyPatch,
-    shared_cache: Path,
-) -> None:
-    monkeypatch.setenv('XDG_CACHE_HOME', str(shared_cache))
-    monkeypatch.setattr(sys, 'path', list(sys.path))
-    [provided] = provide_packages({'robots_to_describe': write_definitions(ROBOTS)}, silent)
-    assert isinstance(provided, ProvidedPackage)
-    assert list(provided.definitions.interfaces) == ['robots_to_describe/msg/Robot']
+        provide_packages([load_definitions('std_msgs', folder)], silent)
 
 
 @pytest.fixture

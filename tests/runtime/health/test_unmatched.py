@@ -37,12 +37,12 @@ def test_ends_with_other_qos_are_named_with_what_to_do_about_it(compose, peer):
 
     child.wait_for_line(
         "[WARN] [robot.ears]: subscription 'scan' (system.yaml:7) gets nothing from '/peer': "
-        'reliability is best_effort there, and reliable is wanted here; '
+        'reliability: best_effort is offered there, reliable is requested here; '
         "set 'qos: {reliability: best_effort}' here, or reliable there"
     )
     child.wait_for_line(
         "[WARN] [mouth]: publisher 'words' (system.yaml:10) sends nothing to '/peer': "
-        'reliability is best_effort here, and reliable is wanted there; '
+        'reliability: best_effort is offered here, reliable is requested there; '
         "set 'qos: {reliability: reliable}' here, or best_effort there"
     )
 
@@ -78,11 +78,11 @@ def test_two_nodes_that_meet_by_a_rule_of_the_command_line_are_both_told(compose
 
     child.wait_for_line(
         "[WARN] [ears]: subscription 'map' (system.yaml:6) gets nothing from '/mouth': "
-        'durability is volatile there, and transient_local is wanted here; '
+        'durability: volatile is offered there, transient_local is requested here; '
     )
     child.wait_for_line(
         "[WARN] [mouth]: publisher 'words' (system.yaml:8) sends nothing to '/ears': "
-        'durability is volatile here, and transient_local is wanted there; '
+        'durability: volatile is offered here, transient_local is requested there; '
     )
 
 

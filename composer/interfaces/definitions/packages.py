@@ -1,14 +1,20 @@
-"""Do the messages that definitions use exist, and does none of them contain itself?"""
+"""The definitions of several packages: read, checked against each other, and put in order."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions.package_folder import PackageDefinitions, TypeReference
+from composer.interfaces.definitions.package_folder import (
+    PackageDefinitions,
+    TypeReference,
+    load_definitions,
+)
 from composer.interfaces.definitions.statement_rules import list_primitive_types, translate_type
 from composer.interfaces.descriptions import ActionDescription, ServiceDescription
-from composer.names import suggest
+from composer.spelling import did_you_mean, find_nearest
 
 # What services and actions consist of beside their own parts (rosidl_parser.definition).
 SERVICE_PACKAGES = frozenset({'builtin_interfaces', 'service_msgs'})
@@ -16,6 +22,45 @@ ACTION_PACKAGES = SERVICE_PACKAGES | {'action_msgs', 'unique_identifier_msgs'}
 
 # Where a message is looked for whose package was forgotten.
 _COMMON = ('builtin_interfaces', 'std_msgs', 'geometry_msgs', 'sensor_msgs', 'nav_msgs')
+
+
+class DefinitionsError(ComposerError):
+    """Interface definitions have errors.
+
+    Attributes:
+        diagnostics: all of them.
+    """
+
+    def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
+        """List all findings."""
+        super().__init__('\n'.join(map(_format, diagnostics)))
+        self.diagnostics = tuple(diagnostics)
+
+
+def _format(diagnostic: Diagnostic) -> str:
+    place = diagnostic.span or diagnostic.file
+    text = f'{place}: error[{diagnostic.rule}]: {diagnostic.message}'
+    return f'{text}\n  help: {diagnostic.help}' if diagnostic.help else text
+
+
+def load_packages(
+    folders: Mapping[str, Path], catalogue: InterfaceCatalogue
+) -> list[PackageDefinitions]:
+    """Read the definitions of packages, each in order after those that it uses.
+
+    Args:
+        folders: the folder of each package's definitions, by its name.
+        catalogue: what is installed.
+
+    Raises:
+        ParserMissingError: `rosidl_adapter` is not installed.
+        DefinitionsError: they have errors, alone or together.
+    """
+    packages = [load_definitions(package, folder) for package, folder in folders.items()]
+    diagnostics = check_definitions(packages, catalogue)
+    if diagnostics:
+        raise DefinitionsError(diagnostics)
+    return order_packages(packages)
 
 
 def used_packages(definitions: PackageDefinitions) -> frozenset[str]:
@@ -94,13 +139,13 @@ def order_packages(packages: Iterable[PackageDefinitions]) -> list[PackageDefini
 
 def _unknown_package(reference: TypeReference, options: Iterable[str]) -> Diagnostic:
     package, _, name = reference.message.partition('/')
-    nearest = suggest(package, options)
+    nearest = find_nearest(package, options)
     install = 'install it, or name the folder of its definitions under interfaces'
     return diagnostic_at(
         reference.span,
         'unknown-package',
         f'there is no interface package {package!r}',
-        help=f'did you mean {nearest}/{name}?' if nearest else install,
+        help=did_you_mean(nearest and f'{nearest}/{name}', install),
     )
 
 
@@ -108,25 +153,25 @@ def _unknown_message(reference: TypeReference, known: _Messages) -> Diagnostic:
     package, _, name = reference.message.partition('/')
     messages = known.of(package) or frozenset()
     if '/' in reference.span.text:
-        nearest = suggest(name, messages)
+        nearest = find_nearest(name, messages)
         return diagnostic_at(
             reference.span,
             'unknown-type',
             f'{package} has no message {name!r}',
-            help=f'did you mean {package}/{nearest}?' if nearest else None,
+            help=did_you_mean(nearest and f'{package}/{nearest}'),
         )
     elsewhere = (f'{other}/{name}' for other in _COMMON if name in (known.of(other) or ()))
     nearest = (
         next(elsewhere, None)
         or translate_type(name)
-        or suggest(name, [*messages, *list_primitive_types()])
+        or find_nearest(name, [*messages, *list_primitive_types()])
     )
     form = 'messages of other packages are written package/Message'
     return diagnostic_at(
         reference.span,
         'unknown-type',
         f'there is no type {name!r}: {package} has no such message',
-        help=f'did you mean {nearest}?' if nearest else form,
+        help=did_you_mean(nearest, form),
     )
 
 

@@ -5,12 +5,14 @@ from building import WriteDefinitions
 
 from composer.diagnostics import Diagnostic
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.definitions.dependencies import (
+from composer.interfaces.definitions.package_folder import load_definitions
+from composer.interfaces.definitions.packages import (
+    DefinitionsError,
     check_definitions,
+    load_packages,
     order_packages,
     used_packages,
 )
-from composer.interfaces.definitions.package_folder import load_definitions
 
 pytestmark = pytest.mark.ros
 
@@ -27,7 +29,7 @@ def check(write: WriteDefinitions, **packages: Mapping[str, str]) -> list[Diagno
             'geometry_msg/Point',
             'unknown-package',
             "there is no interface package 'geometry_msg'",
-            'did you mean geometry_msgs/Point?',
+            "did you mean 'geometry_msgs/Point'?",
         ),
         (
             'qqq/Point',
@@ -39,27 +41,32 @@ def check(write: WriteDefinitions, **packages: Mapping[str, str]) -> list[Diagno
             'geometry_msgs/Pont[]',
             'unknown-type',
             "geometry_msgs has no message 'Pont'",
-            'did you mean geometry_msgs/Point?',
+            "did you mean 'geometry_msgs/Point'?",
         ),
         (
             'Header',
             'unknown-type',
             "there is no type 'Header': robots has no such message",
-            'did you mean std_msgs/Header?',
+            "did you mean 'std_msgs/Header'?",
         ),
         (
             'Pose',
             'unknown-type',
             "there is no type 'Pose': robots has no such message",
-            'did you mean geometry_msgs/Pose?',
+            "did you mean 'geometry_msgs/Pose'?",
         ),
         (
             'Robto',
             'unknown-type',
             "there is no type 'Robto': robots has no such message",
-            'did you mean Robot?',
+            "did you mean 'Robot'?",
         ),
-        ('other/Thin', 'unknown-type', "other has no message 'Thin'", 'did you mean other/Thing?'),
+        (
+            'other/Thin',
+            'unknown-type',
+            "other has no message 'Thin'",
+            "did you mean 'other/Thing'?",
+        ),
     ],
 )
 def test_an_unknown_message_has_a_suggestion(
@@ -140,3 +147,19 @@ def test_services_and_actions_use_packages_of_their_own(
         'service_msgs',
         'unique_identifier_msgs',
     }
+
+
+def test_wrong_definitions_are_one_error_with_all_findings(
+    write_definitions: WriteDefinitions,
+) -> None:
+    folder = write_definitions({'msg/A.msg': 'strng a\n', 'msg/B.msg': 'std_mgs/Header a\n'})
+    with pytest.raises(DefinitionsError) as caught:
+        load_packages({'robots': folder}, InterfaceCatalogue())
+    assert [each.rule for each in caught.value.diagnostics] == ['unknown-type', 'unknown-package']
+    assert str(caught.value) == (
+        f"{folder}/msg/A.msg:1:1: error[unknown-type]: there is no type 'strng'\n"
+        "  help: did you mean 'string'?\n"
+        f'{folder}/msg/B.msg:1:1: error[unknown-package]: '
+        "there is no interface package 'std_mgs'\n"
+        "  help: did you mean 'std_msgs/Header'?"
+    )

@@ -7,7 +7,7 @@ import pytest
 
 from composer.language.parsing.system_parser import parse_system
 from composer.language.qos import resolve_qos
-from composer.language.qos_matching import find_qos_conflicts
+from composer.language.qos_conflicts import find_qos_conflicts
 
 CHOICES = {
     'reliability': ['system_default', 'reliable', 'best_effort', 'best_available'],

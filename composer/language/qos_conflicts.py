@@ -1,0 +1,94 @@
+"""Which QoS of a publisher and of a subscription can never match.
+
+The rules are those of DDS for requested against offered policies, as rmw documents them
+(https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Quality-of-Service-Settings.html) and
+Fast DDS applies them. `rclpy.qos.qos_check_compatible` agrees, with two exceptions: an infinite
+duration that is written out requests no more than one that is left out, and a publisher whose
+liveliness is left to the middleware has an automatic one, as in DDS.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from composer.language.qos import INFINITE, NANOSECONDS, format_policy_value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+PolicyValue: TypeAlias = str | float
+
+# The pairs of an offered and a requested value that never match, by policy.
+_CONFLICTS = {
+    'reliability': {('best_effort', 'reliable')},
+    'durability': {('volatile', 'transient_local')},
+    'liveliness': {('automatic', 'manual_by_topic'), ('system_default', 'manual_by_topic')},
+}
+# The offered duration must not be longer than the requested one.
+_DURATIONS = ('deadline', 'liveliness_lease_duration')
+
+
+@dataclass(frozen=True, slots=True)
+class QosConflict:
+    """A policy for which a publisher offers less than a subscription requests."""
+
+    policy: str
+    offered: PolicyValue
+    requested: PolicyValue
+
+    def __str__(self) -> str:
+        """Return what is offered and what is requested."""
+        return self._describe('', '')
+
+    def describe_from(self, *, publisher: bool) -> str:
+        """Return the conflict, and what to do about it, as seen from one of both ends.
+
+        Args:
+            publisher: Whether that is the publisher.
+        """
+        if publisher:
+            text, here, there = self._describe(' here', ' there'), self.requested, self.offered
+        else:
+            text, here, there = self._describe(' there', ' here'), self.offered, self.requested
+        return f"{text}; set 'qos: {{{self.policy}: {here}}}' here, or {there} there"
+
+    def _describe(self, publisher: str, subscription: str) -> str:
+        offered = format_policy_value(self.policy, self.offered)
+        requested = format_policy_value(self.policy, self.requested)
+        return (
+            f'{self.policy}: {offered} is offered{publisher}, '
+            f'{requested} is requested{subscription}'
+        )
+
+
+def find_qos_conflicts(
+    offered: Mapping[str, Any], requested: Mapping[str, Any]
+) -> Iterator[QosConflict]:
+    """Yield every policy that prevents a match for ever.
+
+    A policy that is left to the middleware (`system_default`), or chosen by it when the other end
+    is known (`best_available`), never does.
+
+    Args:
+        offered: The policies of the publisher, as `resolve_qos` returns them.
+        requested: Those of the subscription.
+    """
+    for policy, pairs in _CONFLICTS.items():
+        if (offered[policy], requested[policy]) in pairs:
+            yield QosConflict(policy, offered[policy], requested[policy])
+    for policy in _DURATIONS:
+        pair = offered.get(policy, INFINITE), requested.get(policy, INFINITE)
+        if 'best_available' not in pair and _nanoseconds(pair[0]) > _nanoseconds(pair[1]):
+            yield QosConflict(policy, *map(_without_zero, pair))
+
+
+def _nanoseconds(value: PolicyValue) -> float:
+    """Return a duration as the middleware gets it, to which 0 is no limit."""
+    if isinstance(value, str):
+        return float('inf')
+    return round(value * NANOSECONDS) or float('inf')
+
+
+def _without_zero(value: PolicyValue) -> PolicyValue:
+    return INFINITE if _nanoseconds(value) == float('inf') else value
