@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.errors import StartError
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
@@ -59,7 +60,7 @@ class NodeStarter:
         if hook is None:
             return
         failures: list[BaseException] = []
-        call = node.hook('on_start', hook, failures.append)
+        call = node.hook(Owner('on_start'), hook, failures.append)
         done = threading.Event()
         task = self._services.executor.create_task(call.as_callback(), node.behaviour_node)
         task.add_done_callback(lambda _task: done.set())

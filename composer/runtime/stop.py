@@ -11,6 +11,7 @@ from rclpy.exceptions import InvalidHandle
 
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def _end(node: LiveNode, timeout_sec: float) -> None:
     hook = node.spec.on_stop
     if hook is None or not node.has_begun:
         return
-    call = node.hook('on_stop', hook)
+    call = node.hook(Owner('on_stop'), hook)
     if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
         done = threading.Event()
         task = node.services.executor.create_task(

@@ -42,6 +42,26 @@ class Pace:
 
 
 @dataclass(frozen=True, slots=True)
+class Owner:
+    """What a behaviour belongs to: an entity, or the node itself.
+
+    Attributes:
+        kind: The noun of the entity's kind, as in `timer`, or the key of a node, as in `on_start`.
+        name: The entity's name.
+        key: The key of the entity that names the behaviour, if it may have several.
+    """
+
+    kind: str
+    name: str = ''
+    key: str = ''
+
+    def __str__(self) -> str:
+        """Return `timer 'tick'`, `action client 'arm' (feedback)` or `on_start`."""
+        name = f" '{self.name}'" if self.name else ''
+        return f'{self.kind}{name}{f" ({self.key})" if self.key else ""}'
+
+
+@dataclass(frozen=True, slots=True)
 class RunningCall:
     """A behaviour that has begun and not ended.
 
@@ -51,7 +71,7 @@ class RunningCall:
         pace: Of one that hands out intermediate results.
     """
 
-    owner: str
+    owner: Owner
     begun_ns: int
     thread: int | None
     coroutine: CoroutineType[Any, Any, Any] | None = None
@@ -71,7 +91,7 @@ class RunningCall:
 
 # The arguments of a `RunningCall`: to make one takes longer than all other bookkeeping.
 _CallEntry: TypeAlias = (
-    'tuple[str, int, int | None, CoroutineType[Any, Any, Any] | None, Pace | None]'
+    'tuple[Owner, int, int | None, CoroutineType[Any, Any, Any] | None, Pace | None]'
 )
 
 
@@ -175,12 +195,12 @@ class BehaviourCall:
 
     def __init__(  # noqa: PLR0913 - all but three have a default or go by their names
         self,
-        owner: str,
+        owner: Owner,
         function: Callable[..., Any],
         ledger: CallLedger,
         *,
         deliver: Callable[[Any], None],
-        failed: Callable[[str, BaseException], None],
+        failed: Callable[[Owner, BaseException], None],
         add_time: Callable[[int], None] | None = None,
         admits: Callable[[], bool] | None = None,
         pace: Pace | None = None,

@@ -21,6 +21,7 @@ from composer.errors import (
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 
@@ -49,13 +50,14 @@ class ActionClient:
 
     def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
         action_class: Any = import_interface(spec.type)
-        owner = f"action client '{spec.name}'"
         self._node = node
         self._name = spec.action
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
-        self._feedback = _Hearing(node, f'{owner} (feedback)', spec.feedback)
-        self._result = _Hearing(node, f'{owner} (result)', spec.result)
+        self._feedback = _Hearing(
+            node, Owner('action client', spec.name, 'feedback'), spec.feedback
+        )
+        self._result = _Hearing(node, Owner('action client', spec.name, 'result'), spec.result)
         self.destroy = self._client.destroy
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -167,7 +169,7 @@ class _Hearing:
     the node's callback group, so that the behaviour never runs beside the node's others.
     """
 
-    def __init__(self, node: LiveNode, owner: str, behaviour: BehaviourSpec | None) -> None:
+    def __init__(self, node: LiveNode, owner: Owner, behaviour: BehaviourSpec | None) -> None:
         self._items: deque[Any] = deque()
         self._guard: Any = None
         if behaviour is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from contextlib import aclosing, closing
+from dataclasses import replace
 from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from rclpy.qos import QoSProfile
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
-from composer.runtime.behaviours.calls import Pace
+from composer.runtime.behaviours.calls import Owner, Pace
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.messages.payloads import converter_for
 
@@ -50,7 +51,7 @@ class _Server(ActionServer):
         self._queue = GoalQueue(spec.concurrency, _start)
         self._execution = _Execution(node, spec, self._queue)
         self._live = node
-        self._owner = f"action '{spec.name}'"
+        self._owner = Owner('action', spec.name)
         self._spec = spec
         self._tokens: dict[bytes, int] = {}
         super().__init__(
@@ -130,7 +131,7 @@ class _Server(ActionServer):
     async def _ask(self, accept: BehaviourSpec, goal: Any, answers: list[Any]) -> None:
         function = self._live.function(accept)
         call = self._live.call(
-            f'{self._owner} (accept)',
+            replace(self._owner, key='accept'),
             accept.path,
             partial(function, self._live.behaviour_node, **accept.arguments),
             rules=self._spec,
@@ -183,7 +184,7 @@ class _Execution:
             FunctionKind.COROUTINE: self._call_async,
         }
         self._goal_call = node.call(
-            f"action '{spec.name}'",
+            Owner('action', spec.name),
             spec.path,
             drives.get(self._kind, self._call),
             rules=spec,

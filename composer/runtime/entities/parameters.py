@@ -20,6 +20,7 @@ from composer.errors import StartError
 from composer.python_source.modules import FunctionKind
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -140,7 +141,7 @@ class _BehaviourHearing:
         function = partial(
             self._node.function(self._spec), self._node.behaviour_node, **self._spec.arguments
         )
-        call = self._node.call('on_parameters', self._spec.path, function)
+        call = self._node.call(Owner('on_parameters'), self._spec.path, function)
         call = call.delivering(answers.append)
         if self._kind is FunctionKind.COROUTINE:
             self._await(call.as_callback(self._kind), new_values)

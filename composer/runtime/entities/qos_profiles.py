@@ -1,4 +1,4 @@
-"""QoS policies ⇄ rclpy's `QoSProfile`."""
+"""QoS policies → rclpy's `QoSProfile`."""
 
 from __future__ import annotations
 
@@ -42,20 +42,6 @@ def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSPro
     """
     policies = resolve_qos(spec, profiles)
     return QoSProfile(**{key: _convert(key, value) for key, value in policies.items()})
-
-
-def read_policies(profile: QoSProfile) -> dict[str, Any]:
-    """Return the policies of a profile that both ends must agree on, as `resolve_qos` does."""
-    policies: dict[str, Any] = {
-        name: getattr(profile, name).name.lower() for name in _POLICIES if name != 'history'
-    }
-    for name, best_available in _BEST_AVAILABLE.items():
-        duration = getattr(profile, name)
-        if duration == best_available:
-            policies[name] = 'best_available'
-        elif 0 < duration.nanoseconds < Infinite.nanoseconds:
-            policies[name] = duration.nanoseconds / NANOSECONDS
-    return policies
 
 
 def _convert(key: str, value: Any) -> Any:

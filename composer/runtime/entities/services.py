@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.system_executor import NoResponseError
@@ -34,7 +35,7 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     service_class: Any = import_interface(spec.type)
     convert = converter_for(service_class.Response).convert
     function = node.bind(spec.behaviour)
-    owner = f"service '{spec.name}'"
+    owner = Owner('service', spec.name)
     call = node.call(owner, spec.path, function, rules=spec, admits=node.gate.lets_requests)
     full_name = node.ros.resolve_service_name(spec.service)
     failures = node.services.failures

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.health.unmatched import TopicEndpoint
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 def create_subscriptions(node: LiveNode) -> None:
     """Create the node's subscriptions, each with its behaviour, or passing messages on."""
     for spec in node.spec.subscriptions.values():
-        owner = f"subscription '{spec.name}'"
+        owner = Owner('subscription', spec.name)
         call = node.call(
             owner,
             spec.path,

@@ -10,6 +10,7 @@ from rclpy.clock import Clock, ClockType
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def create_timers(node: LiveNode) -> None:
     """Create the node's timers; they tick once the node has started."""
     for spec in node.spec.timers.values():
         ticker = _Ticker(node, spec)
-        owner = f"timer '{spec.name}'"
+        owner = Owner('timer', spec.name)
         call = node.call(
             owner,
             spec.path,
@@ -94,7 +95,7 @@ class _Ticker:
         if not self._turn.acquire(timeout=timeout_sec):
             # It is not waiting but hanging, and is reported for that.
             return
-        owner, path = f"timer '{self._spec.name}'", self._spec.path
+        owner, path = Owner('timer', self._spec.name), self._spec.path
         generator, self._generator = self._generator, None
         if generator is not None:
             self._node.reported_call(owner, path, generator.close).run()

@@ -15,7 +15,7 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
-from composer.runtime.behaviours.calls import BehaviourCall, CallLedger
+from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, Owner
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
 from composer.runtime.health.hangs import HangLimit
@@ -92,7 +92,7 @@ class LiveNode:
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
     at_stop: list[AtStop] = field(default_factory=list)
-    limits: dict[str, HangLimit] = field(default_factory=dict)
+    limits: dict[Owner, HangLimit] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
     ledger: CallLedger = field(default_factory=CallLedger)
     has_begun: bool = False
@@ -117,12 +117,12 @@ class LiveNode:
             self.function(behaviour), self.behaviour_node.with_own_state(), **behaviour.arguments
         )
 
-    def health(self, owner: str) -> EntityHealth | None:
+    def health(self, owner: Owner) -> EntityHealth | None:
         """Return the health of an entity in words, `None` if it is not measured."""
         board = self.services.health
         return None if board is None else board.entity(self.full_name, owner)
 
-    def follow(self, owner: str, entity: Any) -> None:
+    def follow(self, owner: Owner, entity: Any) -> None:
         """Let the health of an entity in words tell what its ROS entity has missed."""
         health = self.health(owner)
         if health is not None:
@@ -135,7 +135,7 @@ class LiveNode:
 
     def call(
         self,
-        owner: str,
+        owner: Owner,
         path: DataPath,
         function: Callable[..., Any],
         *,
@@ -146,7 +146,6 @@ class LiveNode:
         """Return the wrapped call of a function that an entity is bound to.
 
         Args:
-            owner: The entity in words.
             path: Its place in the file.
             rules: Those of the entity, if it has its own.
             publish: The publisher that takes what the function returns.
@@ -157,7 +156,7 @@ class LiveNode:
         self._limit(owner, place, own)
         health = self.health(owner)
 
-        def failed(owner: str, error: BaseException) -> None:
+        def failed(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
             if health is not None:
@@ -177,7 +176,7 @@ class LiveNode:
 
     def hook(
         self,
-        owner: str,
+        owner: Owner,
         behaviour: BehaviourSpec,
         failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
@@ -191,7 +190,7 @@ class LiveNode:
 
     def reported_call(
         self,
-        owner: str,
+        owner: Owner,
         path: DataPath,
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
@@ -203,7 +202,7 @@ class LiveNode:
         place = self.place(path)
         self._limit(owner, place, self.spec)
 
-        def report(owner: str, error: BaseException) -> None:
+        def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
             self.errors.report(owner, place, error)
@@ -230,7 +229,7 @@ class LiveNode:
         release(self.ros)
         self.ros.destroy_node()
 
-    def _limit(self, owner: str, place: str, rules: Rules) -> None:
+    def _limit(self, owner: Owner, place: str, rules: Rules) -> None:
         if owner not in self.limits:
             warn = self.ros.get_logger().warning
             self.limits[owner] = HangLimit(owner, place, rules.warn_after_sec, warn)
