@@ -19,7 +19,7 @@ from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
 import composer
-from composer.runtime.behaviours.calls import BehaviourCall, CallLedger
+from composer.runtime.behaviours.calls import BehaviourCall, RunningCalls
 from composer.runtime.health.statistics import CallTimes
 from composer.runtime.system import System
 
@@ -133,11 +133,11 @@ def measuring_overhead() -> dict[str, float]:
         call = BehaviourCall(
             'it',
             lambda message: message,
-            CallLedger(),
+            RunningCalls(),
             deliver=lambda _: None,
             failed=lambda _owner, _error: None,
             add_time=None if times is None else times.add,
-        ).as_callback()
+        ).run
 
         def run() -> float:
             begin = time.thread_time_ns()

@@ -1,4 +1,4 @@
-"""ROS's rules for names, and the nearest right spelling of a wrong one.
+"""ROS's rules for names.
 
 Sources: https://design.ros2.org/articles/topic_and_service_names.html and the validation in rmw
 (`validate_node_name.c`, `validate_namespace.c`) and rcl (`validate_topic_name.c`, `remap.c`).
@@ -6,116 +6,22 @@ Sources: https://design.ros2.org/articles/topic_and_service_names.html and the v
 
 from __future__ import annotations
 
-import difflib
-import heapq
 import re
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
 # RMW_NODE_NAME_MAX_NAME_LENGTH, RMW_NAMESPACE_MAX_LENGTH, RMW_TOPIC_MAX_NAME_LENGTH
 MAX_NODE_NAME = 255
 MAX_NAMESPACE = 245
 MAX_TOPIC_NAME = 247
 
-# With more options, or longer ones, the search for the nearest would take seconds.
-_MOST_OPTIONS = 2000
-_LONGEST_WORD = 255
-_PRESELECTED = 100
-_LONGEST_COMPARED = 64
-
 _NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
 _TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
 _FULL_CHARACTERS = re.compile(r'[A-Za-z0-9_/]*')
 _SUBSTITUTION = re.compile(r'\{([^{}]*)\}')
 _SUBSTITUTIONS = ('node', 'ns', 'namespace')
-
-
-def suggest(word: str, options: Iterable[str]) -> str | None:
-    """Return the option that `word` was most likely meant to be, or `None`.
-
-    Among more than two thousand options, and for words longer than any name of ROS, none is
-    sought.
-    """
-    choices = tuple(options)
-    if len(choices) > _MOST_OPTIONS or len(word) > _LONGEST_WORD:
-        return None
-    return _find_nearest(word.lower(), tuple(sorted(set(choices))))
-
-
-@lru_cache(maxsize=4096)
-def _find_nearest(word: str, choices: tuple[str, ...]) -> str | None:
-    lowered = _lower(choices)
-    if word in lowered:
-        return lowered[word]
-    close = difflib.get_close_matches(word, _preselect(word, lowered), n=5, cutoff=0.6)
-    if not close:
-        return None
-    # Of those that look alike, the one that takes the fewest slips; else the first.
-    return lowered[min(close, key=lambda option: count_slips(word, option))]
-
-
-def count_slips(word: str, other: str) -> int:
-    """Return how many slips of the pen make one word of another.
-
-    A slip is a letter too many, one too few, another one, or two that are swapped (the distance
-    of Damerau and Levenshtein, in its restricted form). Of long words only the beginning counts.
-    """
-    word, other = word[:_LONGEST_COMPARED], other[:_LONGEST_COMPARED]
-    before: list[int] = []
-    row = list(range(len(other) + 1))
-    for i, letter in enumerate(word):
-        above, before, row = before, row, [i + 1]
-        for j, wanted in enumerate(other):
-            cost = min(before[j + 1] + 1, row[j] + 1, before[j] + (letter != wanted))
-            if i and j and (letter, word[i - 1]) == (other[j - 1], wanted):
-                cost = min(cost, above[j - 1] + 1)
-            row.append(cost)
-    return row[-1]
-
-
-@lru_cache(maxsize=64)
-def _lower(choices: tuple[str, ...]) -> dict[str, str]:
-    return {choice.lower(): choice for choice in reversed(choices)}
-
-
-def _preselect(word: str, options: Iterable[str]) -> list[str]:
-    """Return the options worth a close look: of many, those with most pairs of letters of it."""
-    short = [option for option in options if len(option) <= _LONGEST_WORD]
-    if len(short) <= _PRESELECTED:
-        return short
-    pairs = _pairs(word)
-    return heapq.nlargest(
-        _PRESELECTED,
-        short,
-        key=lambda option: len(pairs & _pairs(option)) / (len(word) + len(option)),
-    )
-
-
-@lru_cache(maxsize=4096)
-def _pairs(word: str) -> frozenset[str]:
-    return frozenset(f' {word}'[i : i + 2] for i in range(len(word)))
-
-
-def did_you_mean(word: str, options: Iterable[str], what: str = 'there') -> str | None:
-    """Return the help for a wrong name: the nearest right one, or all if they are few.
-
-    Args:
-        what: How the options are introduced if none is near: `<what>: a, b, c`.
-    """
-    choices = frozenset(options)
-    near = suggest(word, choices)
-    if near is not None:
-        return f"did you mean '{near}'?"
-    if not choices:
-        return None
-    shown = ', '.join(heapq.nsmallest(_FEW, choices))
-    return f'{what}: {shown}' + (', …' if len(choices) > _FEW else '')
-
-
-_FEW = 12
 
 
 def with_article(noun: str) -> str:

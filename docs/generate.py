@@ -1,6 +1,6 @@
-"""Write `docs/reference.md` from the schema and `docs/rules.md` from the table of rules.
+"""Generate `docs/reference.md` from the schema and `docs/rules.md` from the table of rules.
 
-`make docs` runs it; a test shows that both files are what it would write.
+Run by `make docs`; a test checks that both files are current.
 """
 
 from __future__ import annotations

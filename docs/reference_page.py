@@ -1,4 +1,4 @@
-"""The schema of the language → a page that describes every key."""
+"""Generate the reference of every key from the schema."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _TEMPLATE = {'$ref': '#/$defs/template'}
-# The objects in the order of a file; what they refer to comes after them.
+# The objects in the order of a file, then what they refer to.
 _TITLES = {
     'node': 'A node',
     'publisher': 'A publisher',
@@ -24,11 +24,11 @@ _TITLES = {
     'hook': 'A behaviour of the node itself',
     'argument': 'An argument',
     'include': 'An include',
-    'foreach': 'Repetition',
-    'process': 'A process',
-    'process_restart': 'Starting a process again',
+    'foreach': 'Repeating an entry',
+    'process': 'An external process',
+    'process_restart': 'Restarting a process',
     'process_stop': 'Stopping a process',
-    'condition': 'What is waited for',
+    'condition': 'A condition of wait_for',
     'qos': 'QoS',
     'qos_profile': 'A QoS profile',
 }
@@ -38,21 +38,21 @@ _TYPE_WORDS = {
     'string': 'string',
     'number': 'number',
     'integer': 'integer',
-    'boolean': '`true` or `false`',
+    'boolean': 'boolean',
 }
 
 
 def reference_page(schema: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines of a page that describes every key.
+    """Yield the lines of the reference page.
 
     Args:
-        schema: The schema of the language, as JSON gives it.
+        schema: The JSON Schema of system files.
     """
-    yield '# The language'
+    yield '# Reference'
     yield ''
-    yield 'Made from `schemas/composer.schema.json` by `make docs`.'
+    yield 'Every key of a file. Generated from `schemas/composer.schema.json` by `make docs`.'
     yield ''
-    yield 'Any scalar may be an expression of the arguments in quotes: `"{{ name }}"`.'
+    yield 'Any scalar can be an expression, in quotes: `"{{ name }}"`.'
     yield ''
     yield '## A file'
     yield ''
@@ -69,7 +69,7 @@ def reference_page(schema: dict[str, Any]) -> Iterator[str]:
 
 
 def _undescribed(schema: dict[str, Any]) -> list[str]:
-    """Return the definitions with keys of their own that no title is written for yet."""
+    """Return the definitions with keys that have no title in `_TITLES`."""
     return [
         name
         for name, definition in schema['$defs'].items()
@@ -90,7 +90,7 @@ def _section(title: str, definition: dict[str, Any], schema: dict[str, Any]) -> 
     ]
     if forms:
         yield ''
-        yield f'In short: {_join(_describe(form, schema) for form in forms)}.'
+        yield f'Short form: {_join(_describe(form, schema) for form in forms)}.'
     owner = _object_of(definition)
     if owner:
         yield from _table(owner, schema)
@@ -129,12 +129,12 @@ def _conditions(owner: dict[str, Any]) -> Iterator[str]:
             listed = _join(
                 ' with '.join(f'`{key}`' for key in branch['required']) for branch in branches
             )
-            yield f'{word} of {listed} is needed.'
+            yield f'{word} of {listed} is required.'
     for key, needed in owner.get('dependentRequired', {}).items():
-        yield f'`{key}` needs {" and ".join(f"`{other}`" for other in needed)} beside it.'
+        yield f'`{key}` needs {" and ".join(f"`{other}`" for other in needed)} too.'
     excluded = owner.get('not', {}).get('required')
     if excluded:
-        yield f'{" and ".join(f"`{key}`" for key in excluded)} exclude each other.'
+        yield f'{" and ".join(f"`{key}`" for key in excluded)} cannot be used together.'
 
 
 def _meaning(value: dict[str, Any], schema: dict[str, Any]) -> str:
@@ -201,14 +201,14 @@ def _example(definition: dict[str, Any]) -> Iterator[str]:
 
 
 def _as_yaml(example: Any) -> str:
-    """Return an example as people write it: small mappings in one line."""
+    """Return an example as YAML, with small mappings on one line."""
     if not isinstance(example, dict):
         return str(example)
     return yaml.dump(example, Dumper=_Dumper, sort_keys=False, width=200, default_flow_style=None)
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes the small mappings alone in braces."""
+    """Writes only small mappings in braces."""
 
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: ARG002, FBT001, FBT002
         super().increase_indent(flow, indentless=False)

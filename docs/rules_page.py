@@ -1,4 +1,4 @@
-"""The data of the rules → a page that says what each means and why."""
+"""Generate the page of the rules: what each means and why, with examples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def rules_page() -> Iterator[str]:
     """Yield the lines of a page with every rule, what it means and why, and an example."""
     yield '# The rules'
     yield ''
-    yield 'Made from `composer/rules/` by `make docs`. `composer explain RULE` shows the same.'
+    yield 'Generated from `composer/rules/` by `make docs`. `composer explain RULE` prints a rule.'
     yield ''
     families = load_families()
     for family in families:
@@ -44,7 +44,7 @@ def _family(family: Family) -> Iterator[str]:
 
 def _remarks(rule: Rule) -> Iterator[str]:
     if rule.needs == 'interfaces':
-        yield 'It needs interface packages, which come with ROS 2.'
+        yield 'Needs interface packages, which come with ROS 2.'
     if rule.ignorable:
         yield f'`# composer: ignore[{rule.name}]` in the line silences it.'
     if rule.source:

@@ -5,8 +5,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from composer.names import (
-    count_slips,
-    did_you_mean,
     expand_name,
     expand_namespace,
     find_namespace_fault,
@@ -14,7 +12,6 @@ from composer.names import (
     find_parameter_name_fault,
     find_topic_name_fault,
     remap_name,
-    suggest,
 )
 
 NODE = 'rover'
@@ -257,66 +254,3 @@ def test_parameters_have_names_in_parts(name, fault):
 )
 def test_a_relative_namespace_lies_in_the_default(namespace, default, full):
     assert expand_namespace(namespace, default) == full
-
-
-@pytest.mark.parametrize(
-    ('word', 'meant'),
-    [
-        ('timer', 'timers'),
-        ('Timers', 'timers'),
-        ('timesr', 'timers'),
-        ('behavior', 'behaviour'),
-        ('publish', 'publish'),
-        ('pubishers', 'publishers'),
-        ('xyz', None),
-        ('', None),
-    ],
-)
-def test_the_nearest_right_spelling_is_suggested(word, meant):
-    options = ['timers', 'behaviour', 'publish', 'publishers', 'subscriptions']
-    assert suggest(word, options) == meant
-    assert suggest(word, reversed(options)) == meant
-
-
-def test_case_decides_only_where_nothing_else_does():
-    assert suggest('string', ['Strings', 'String']) == 'String'
-    assert suggest('STRING', ['string', 'String']) == 'String'
-    assert suggest('a', []) is None
-
-
-def test_the_help_is_a_spelling_or_the_options():
-    assert did_you_mean('timer', ['timers', 'nodes']) == "did you mean 'timers'?"
-    assert did_you_mean('xyz', ['b', 'a'], 'it has') == 'it has: a, b'
-    assert did_you_mean('xyz', []) is None
-    many = [f'n{number:02}' for number in range(20)]
-    assert did_you_mean('xyz', many, 'they are') == f'they are: {", ".join(many[:12])}, …'
-
-
-@pytest.mark.parametrize(
-    ('word', 'options', 'meant'),
-    [
-        ('turn', ['turn3d', 'tunr'], 'tunr'),
-        ('form', ['former', 'from'], 'from'),
-    ],
-)
-def test_of_words_that_look_alike_the_fewest_slips_decide(word, options, meant):
-    assert suggest(word, options) == meant
-    assert suggest(word, reversed(options)) == meant
-
-
-@pytest.mark.parametrize(
-    ('word', 'other', 'slips'),
-    [
-        ('scan', 'scan', 0),
-        ('scan', 'sacn', 1),
-        ('scan', 'scann', 1),
-        ('scan', 'sca', 1),
-        ('scan', 'span', 1),
-        ('scan', 'nacs', 3),
-        ('', 'scan', 4),
-        ('a' * 900, 'b' * 900, 64),
-    ],
-)
-def test_slips_are_counted(word, other, slips):
-    assert count_slips(word, other) == slips
-    assert count_slips(other, word) == slips

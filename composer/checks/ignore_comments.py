@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import diagnostic_at
-from composer.names import did_you_mean
 from composer.rules import list_rule_names, load_rule
+from composer.spelling import suggest
 from composer.yaml_text.comments import read_ignore_comments
 
 if TYPE_CHECKING:
@@ -80,10 +80,10 @@ def _check(
     for named in comment.rules:
         here = [f for f in findings if f.rule == named.text and _is_beside(f, named)]
         if named.text not in list_rule_names():
-            help_text = did_you_mean(named.text, list_rule_names(), '')
-            near = help_text if help_text and help_text.startswith('did') else None
+            advice = "'composer explain' lists them"
+            help_text = suggest(named.text, list_rule_names(), otherwise=advice)
             message = f"no rule is called '{named.text}'"
-            yield _warn(named, 'unknown-rule', message, near or "'composer explain' lists them")
+            yield _warn(named, 'unknown-rule', message, help_text or advice)
         elif here and not load_rule(named.text).ignorable:
             message = f"no comment silences '{named.text}': nothing can run before it is mended"
             yield _warn(named, 'unused-ignore', message, 'mend it and remove the comment')

@@ -15,17 +15,11 @@ from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
-from composer.names import (
-    did_you_mean,
-    find_namespace_fault,
-    find_node_name_fault,
-    join_names,
-    suggest,
-    with_article,
-)
+from composer.names import find_namespace_fault, find_node_name_fault, join_names, with_article
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -114,8 +108,7 @@ class _Library:
 
 
 def _help_for_missing(path: Path) -> str | None:
-    near = suggest(path.name, list_neighbours(path))
-    return f"did you mean '{near}'?" if near else None
+    return suggest(path.name, list_neighbours(path))
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
@@ -166,7 +159,7 @@ def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic
                 span,
                 'unmatched-node-name',
                 f"'{pattern}' is the name of no node that uses this file, and ROS ignores it",
-                help=did_you_mean(pattern, names, 'it is used by'),
+                help=suggest(pattern, names, 'it is used by'),
             )
 
 
@@ -201,8 +194,9 @@ def _explain_undeclared(entry: ParameterEntry, takers: list[_User]) -> Diagnosti
         entry.key_span,
         'undeclared-parameter',
         f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
-        help=did_you_mean(entry.name, declared, 'declared are')
-        or "declare it under 'parameters:' of the node",
+        help=suggest(
+            entry.name, declared, 'declared are', "declare it under 'parameters:' of the node"
+        ),
     )
 
 

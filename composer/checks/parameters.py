@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.names import suggest
 from composer.ros_parameters.parameter_types import find_type_fault, find_type_faults
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -142,9 +142,7 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
 
 def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:
     """Return the help for a text that is none of the choices, but near one."""
-    choices = [each for each in parameter.choices or () if isinstance(each, str)]
-    near = suggest(value, choices) if isinstance(value, str) else None
-    return f"did you mean '{near}'?" if near else None
+    return suggest(value, parameter.choices or ())
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:

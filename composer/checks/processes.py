@@ -6,11 +6,8 @@ from typing import TYPE_CHECKING
 
 from composer.ament import ament_prefixes, list_executables, list_packages
 from composer.checks.names import check_rules
-from composer.names import (
-    did_you_mean,
-    find_namespace_fault,
-    find_node_name_fault,
-)
+from composer.names import find_namespace_fault, find_node_name_fault
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,7 +60,7 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
             (*process.path, 'package'),
             'missing-package',
             f"no package '{process.package}' is installed",
-            help=did_you_mean(process.package, packages),
+            help=suggest(process.package, packages, 'there are'),
         )
         return
     names = [path.name for path in list_executables(process.package)]
@@ -72,7 +69,7 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
             (*process.path, 'executable'),
             'unknown-executable',
             f"'{process.package}' has no executable '{process.executable}'",
-            help=did_you_mean(process.executable or '', names, 'it has') or 'it has none',
+            help=suggest(process.executable, names, 'it has', 'it has none'),
         )
 
 
@@ -93,7 +90,7 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
             ('environment', 'RMW_IMPLEMENTATION'),
             'bad-environment',
             f"no middleware '{middleware}' is installed",
-            help=did_you_mean(middleware, installed, 'there are'),
+            help=suggest(middleware, installed, 'there are'),
         )
 
 

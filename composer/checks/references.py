@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from composer.language.qos import BUILTIN_PROFILES, QosError, UnknownProfileError, resolve_qos
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,8 +40,7 @@ def _check_publisher(
         (*path, 'publish'),
         'unknown-publisher',
         f"node '{node.name}' declares no publisher '{publisher}'",
-        help=did_you_mean(publisher, node.publishers, 'it declares')
-        or "declare it under 'publishers:'",
+        help=suggest(publisher, node.publishers, 'it declares', "declare it under 'publishers:'"),
     )
 
 
@@ -92,7 +91,7 @@ def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]
     path = inner if inner in context.system.positions.values else error.spec.path
     if isinstance(error, UnknownProfileError):
         options = {*context.spec.qos, *BUILTIN_PROFILES}
-        help_text = did_you_mean(name, options, 'the profiles are')
+        help_text = suggest(name, options, 'the profiles are')
         yield context.at_value(path, 'unknown-qos-profile', str(error), help=help_text)
     else:
         yield context.at_value(path, 'cyclic-qos-profile', str(error))
@@ -127,7 +126,7 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             f"no interface package '{package}' is installed",
             part=package,
             first=True,
-            help=_nearest(package, packages) or 'install it, or mend its name',
+            help=suggest(package, packages, otherwise='install it, or correct its name'),
         )
     known = context.catalogue.names(cast('InterfaceKind', kind), package)
     names = [full.rpartition('/')[2] for full in known]
@@ -137,10 +136,5 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
         'unknown-type',
         f"the package '{package}' has no {noun} '{name}'",
         part=name,
-        help=did_you_mean(name, names, f'its {noun}s are'),
+        help=suggest(name, names, f'its {noun}s are'),
     )
-
-
-def _nearest(word: str, options: list[str]) -> str | None:
-    found = did_you_mean(word, options)
-    return found if found and found.startswith('did') else None

@@ -115,20 +115,19 @@ def check_rule(
 
 
 def _find_rule(name: str) -> None:
-    from composer.names import suggest
     from composer.rules import list_rule_names
+    from composer.spelling import suggest
 
     if name not in list_rule_names():
-        near = suggest(name, list_rule_names())
         message = f"there is no rule '{name}'"
-        advice = f"did you mean '{near}'?" if near else "'composer explain' lists them"
-        raise UsageError(message, help=advice)
+        advice = "'composer explain' lists them"
+        raise UsageError(message, help=suggest(name, list_rule_names(), otherwise=advice))
 
 
 def _find_near(word: str, context: click.Context) -> list[str]:
     """Return the option of a command that a misspelt word most likely meant, if any."""
-    from composer.names import suggest
+    from composer.spelling import find_nearest
 
     options = [option for each in context.command.get_params(context) for option in each.opts]
-    near = suggest(word.partition('=')[0], options)
+    near = find_nearest(word.partition('=')[0], options)
     return [near] if near else []

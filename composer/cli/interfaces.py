@@ -20,7 +20,7 @@ from composer.interfaces.descriptions import (
     ServiceDescription,
 )
 from composer.language.pipeline import load_system
-from composer.names import did_you_mean, suggest
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +56,9 @@ def list_all(package: str | None) -> int:
     catalogue = InterfaceCatalogue()
     if package is not None and package not in catalogue.packages():
         message = f"no interface package '{package}' is installed"
-        raise UnknownInterfaceError(message, help=did_you_mean(package, catalogue.packages()))
+        raise UnknownInterfaceError(
+            message, help=suggest(package, catalogue.packages(), 'there are')
+        )
     for kind in _KINDS:
         for name in catalogue.names(kind, package):
             click.echo(name)
@@ -78,23 +80,22 @@ def show(name: str) -> int:
     return ExitCode.DONE
 
 
-def _advise(name: str) -> str:
+def _advise(name: str) -> str | None:
     """Return the help for an interface that does not exist."""
     catalogue = InterfaceCatalogue()
     package, _, rest = name.partition('/')
     if package not in catalogue.packages():
         names = [known for kind in _KINDS for known in catalogue.names(kind)]
-        near = suggest(name, names)
-        return f"did you mean '{near}'?" if near else "'composer interfaces list' shows all"
+        return suggest(name, names, otherwise="'composer interfaces list' shows all")
     listing = f"'composer interfaces list {package}'"
     if not rest:
         return f"'{package}' is a package: {listing} shows its interfaces"
     names = [known for kind in _KINDS for known in catalogue.names(kind, package)]
     by_last_part = {known.rpartition('/')[2]: known for known in names}
-    last_part = suggest(rest.rpartition('/')[2], by_last_part)
-    if last_part is None:
-        return f'{listing} shows its interfaces'
-    return f"did you mean '{by_last_part[last_part]}'?"
+    last_part = find_nearest(rest.rpartition('/')[2], by_last_part)
+    return did_you_mean(
+        last_part and by_last_part[last_part], otherwise=f'{listing} shows its interfaces'
+    )
 
 
 def _render(description: InterfaceDescription) -> Iterator[str]:

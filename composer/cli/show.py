@@ -59,7 +59,7 @@ def show(
     else:
         remark = (lambda path: describe_origin(system, path)) if origins else None
         comments = find_kept_comments(system, render_yaml(data))
-        click.echo(append_comments(render_yaml(data, remark), comments), nl=False)
+        click.echo(append_comments(render_yaml(data, remark=remark), comments), nl=False)
     return ExitCode.DONE
 
 

@@ -14,7 +14,7 @@ from jinja2 import StrictUndefined, TemplateAssertionError, nodes
 
 from composer.expressions import limits
 from composer.expressions.sandbox import too_deep
-from composer.names import suggest
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -111,8 +111,8 @@ class _Evaluator:
             ('filter', self.sandbox.filters) if is_filter else ('test', self.sandbox.tests)
         )
         if node.name not in known:
-            near = suggest(node.name, known)
-            hint = f" (did you mean '{near}'?)" if near else ''
+            advice = suggest(node.name, known)
+            hint = f' ({advice})' if advice else ''
             message = f"there is no {what} '{node.name}'{hint}"
             raise TemplateAssertionError(message, node.lineno)
         apply = self.sandbox.call_filter if is_filter else self.sandbox.call_test

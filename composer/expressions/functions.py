@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import TemplateRuntimeError
 
 from composer.ament import find_share, list_packages
-from composer.names import suggest
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,8 +35,8 @@ def find_package_share(package: str) -> str:
     """
     share = find_share(package)
     if share is None:
-        near = suggest(package, list_packages())
-        hint = f"; did you mean '{near}'?" if near else ''
+        advice = suggest(package, list_packages())
+        hint = f'; {advice}' if advice else ''
         message = f"no package '{package}' is installed{hint}"
         raise TemplateRuntimeError(message)
     return str(share)

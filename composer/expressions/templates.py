@@ -25,7 +25,8 @@ from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
-from composer.names import did_you_mean, suggest
+from composer.spelling import find_nearest, suggest
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -103,7 +104,7 @@ class TemplateEvaluator:
         written = str(path[-1])
         if OPEN not in written:
             return written
-        return str(_as_text(self._evaluate(written, path, is_key=True)))
+        return _as_text(self._evaluate(written, path, is_key=True))
 
     def is_sampled(self, path: DataPath) -> bool:
         """Return whether the value at a path hangs on samples."""
@@ -137,7 +138,7 @@ class TemplateEvaluator:
         start = 0
         for expression in expressions:
             parts.append(text[start : expression.start])
-            parts.append(str(_as_text(self._value_of(text, expression, span))))
+            parts.append(_as_text(self._value_of(text, expression, span)))
             start = expression.stop
         return ''.join([*parts, text[start:]])
 
@@ -163,13 +164,13 @@ class TemplateEvaluator:
         ):
             name = found.group(1)
             scope = {*self._values, 'here', *self._sandbox.globals}
-            declared = self._values or suggest(name, scope)
-            help_text = did_you_mean(name, scope, 'in scope are') if declared else None
+            declared = self._values or find_nearest(name, scope)
+            listed = 'in scope are' if declared else None
             return diagnostic_at(
                 locate_name(name, span),
                 'undefined-name',
                 f"'{name}' is not defined",
-                help=help_text or "declare it as an argument, under 'args'",
+                help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
@@ -216,8 +217,6 @@ def _as_data(value: Any) -> Any:
     raise TemplateRuntimeError(message)
 
 
-def _as_text(value: Any) -> Any:
-    """Write a value inside a text as YAML does."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    return '' if value is None else value
+def _as_text(value: Any) -> str:
+    """Return a value inside a text as YAML writes it, and nothing for null."""
+    return '' if value is None else format_scalar(value)

@@ -12,7 +12,7 @@ from typing import Any, Final, cast
 
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue, InterfaceKind
-from composer.names import suggest
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 _FULL_NAME: Final = re.compile(r'([A-Za-z]\w*)/(msg|srv|action)/([A-Za-z]\w*)', re.ASCII)
 _KIND_WORDS: Final[dict[InterfaceKind, str]] = {
@@ -104,17 +104,18 @@ def _malformed(full_name: str) -> InterfaceNotFoundError:
     ]
     return InterfaceNotFoundError(
         message,
-        help=f'did you mean {meant[0]!r}?' if meant else 'write it in full: std_msgs/msg/String',
+        help=did_you_mean(
+            meant[0] if meant else None, otherwise='write it in full: std_msgs/msg/String'
+        ),
     )
 
 
 def _package_missing(package: str, full_name: str) -> InterfaceNotFoundError:
-    nearest = suggest(package, InterfaceCatalogue().packages())
     message = f'{full_name}: the package {package!r} is not installed'
     install = "install it, or name the folder of its definitions under 'interfaces:'"
     return InterfaceNotFoundError(
         message,
-        help=f'did you mean {nearest!r}?' if nearest else install,
+        help=suggest(package, InterfaceCatalogue().packages(), otherwise=install),
     )
 
 
@@ -137,8 +138,8 @@ def _find_meant(package: str, full_name: str) -> str | None:
         for kind in _KIND_WORDS
         for interface in catalogue.names(kind, package)
     }
-    nearest = suggest(full_name.rpartition('/')[-1], by_name)
-    return f'did you mean {by_name[nearest]!r}?' if nearest else None
+    nearest = find_nearest(full_name.rpartition('/')[-1], by_name)
+    return did_you_mean(nearest and by_name[nearest])
 
 
 def _broken(full_name: str, error: BaseException) -> InterfaceNotFoundError:

@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias
 from composer.errors import ComposerError
 from composer.interfaces.classes import interface_name, is_message_class
 from composer.interfaces.descriptions import FieldType
-from composer.names import suggest
+from composer.spelling import suggest
 
 FieldRule: TypeAlias = Literal[
     'unknown-field',
@@ -54,12 +54,12 @@ class FieldError(ComposerError):
 def unknown_field(message_name: str, key: object, names: Iterable[str]) -> FieldError:
     """Return the error for a key that is no field of its message."""
     names = tuple(names)
-    nearest = suggest(key, names) if isinstance(key, str) else None
+    advice = suggest(key, names)
     fields = f'its fields are {", ".join(names)}' if names else 'it has no fields'
     return FieldError(
         f'{message_name} has no field {key!r}',
         rule='unknown-field',
-        help=f'did you mean {nearest!r}? {fields}' if nearest else fields,
+        help=f'{advice} {fields}' if advice else fields,
     )
 
 

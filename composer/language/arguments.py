@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import UsageError
 from composer.expressions import is_variable_name
-from composer.names import did_you_mean
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_fault,
     infer_parameter_type,
 )
+from composer.spelling import suggest
 from composer.yaml_text.scalars import ScalarError, parse_plain_scalar
 
 if TYPE_CHECKING:
@@ -132,8 +132,8 @@ def parse_arguments(
     given: dict[str, str] = {}
     for name, text in _assign_words(declared, words, faults):
         if name not in declared:
-            near = did_you_mean(name, declared)
-            hint = f' ({near})' if near and near.startswith('did') else ''
+            advice = suggest(name, declared)
+            hint = f' ({advice})' if advice else ''
             faults.append(f"there is no argument '{name}'{hint}")
         elif name in given:
             faults.append(f"'{name}' is given twice: {given[name]!r} and {text!r}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.names import did_you_mean
+from composer.spelling import suggest
 from composer.yaml_text.reader import Document
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class _Merging:
                 self._new_positions.key(path),
                 'changes-nothing',
                 message,
-                help=did_you_mean(str(path[-1]), there, 'there are') if there else None,
+                help=suggest(str(path[-1]), there, 'there are'),
             )
         )
 

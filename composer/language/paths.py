@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.ament import find_share, list_packages
 from composer.errors import ComposerError
-from composer.names import suggest
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,9 +36,8 @@ def resolve_path(text: str, folder: Path) -> Path:
     package, _, rest = text.removeprefix(_PACKAGE).partition('/')
     share = find_share(package)
     if share is None:
-        near = suggest(package, list_packages())
         message = f"no package '{package}' is installed"
-        raise PathError(message, help=f"did you mean '{near}'?" if near else None)
+        raise PathError(message, help=suggest(package, list_packages()))
     return share / rest
 
 

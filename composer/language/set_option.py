@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import SourceFile, Span
 from composer.errors import UsageError
 from composer.language.layers import is_null_a_value
-from composer.names import did_you_mean
+from composer.spelling import suggest
 from composer.yaml_text.reader import Document, parse_document
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
         key = _longest_key(rest, inside) or rest.partition('.')[0]
         if key not in inside and inside and _has_given_names(path):
             message = f"--set {text}: there is no '{key}' in {'.'.join(path)}"
-            raise UsageError(message, help=did_you_mean(key, inside))
+            raise UsageError(message, help=suggest(key, inside, 'there are'))
         path.append(key)
         rest = rest[len(key) + 1 :]
         inside = inside.get(key, {}) if rest else None
@@ -100,7 +100,7 @@ def _find(path: DataPath, data: dict[str, Any], set_value: str) -> None:
         if not isinstance(inside, dict) or key not in inside:
             where = f' in {".".join(map(str, path[:depth]))}' if depth else ''
             message = f"--set {set_value}: there is no '{key}'{where} to remove"
-            help_text = did_you_mean(str(key), inside, 'there are') if inside else None
+            help_text = suggest(str(key), inside, 'there are') if inside else None
             raise UsageError(message, help=help_text)
         inside = inside[key]
 

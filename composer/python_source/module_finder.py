@@ -9,8 +9,8 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.names import suggest
 from composer.python_source.modules import ModuleSource, read_module
+from composer.spelling import find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -81,7 +81,7 @@ class ModuleFinder:
         for folder in folders:
             if folder not in self._listed:
                 self._listed[folder] = _list_modules(folder)
-        near = suggest(part, {name for folder in folders for name in self._listed[folder]})
+        near = find_nearest(part, {name for folder in folders for name in self._listed[folder]})
         return '.'.join([*done, near]) if near else None
 
 

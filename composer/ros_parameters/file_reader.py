@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
-from composer.names import suggest
 from composer.ros_parameters.node_patterns import find_pattern_fault
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader
+from composer.spelling import suggest
 from composer.yaml_text.reader import decode_content, read_content
 from composer.yaml_text.tree import (
     CompositionError,
@@ -147,11 +147,11 @@ class _Reader:
             if not isinstance(value_node, MappingNode):
                 self._refuse_value(value_node, key)
                 continue
-            if suggest(key, [PARAMETERS_KEY]):
+            if advice := suggest(key, [PARAMETERS_KEY]):
                 self._fault(
                     key_node.span,
                     f"'{key}' is no key of parameter files",
-                    f"did you mean '{PARAMETERS_KEY}'?",
+                    advice,
                 )
                 continue
             self.read_nodes(value_node, _join(prefix, key), key_node.span, is_last=ends)
@@ -264,10 +264,9 @@ class _Reader:
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:
-        near = suggest(key, [PARAMETERS_KEY])
-        if near:
+        if advice := suggest(key, [PARAMETERS_KEY]):
             message = f"'{key}' is no key of parameter files"
-            self._fault(node.span, message, f"did you mean '{near}'?")
+            self._fault(node.span, message, advice)
             return
         help_text = _help_for(node) or _SHAPE_HELP
         self._fault(

@@ -79,13 +79,13 @@ class NodeRestarter:
         self,
         nodes: Mapping[str, LiveNode],
         starter: NodeStarter,
-        services: SystemHandle,
+        system: SystemHandle,
         timeout_sec: float,
     ) -> None:
         self.lock = threading.Lock()
         self._nodes = nodes
         self._starter = starter
-        self._services = services
+        self._system = system
         self._timeout_sec = timeout_sec
 
     def restart(self, full_name: str) -> None:
@@ -96,25 +96,25 @@ class NodeRestarter:
         """
         with self.lock:
             old = self._nodes[full_name]
-            if self._services.stop.is_set or not self._end(old):
+            if self._system.stop.is_set or not self._end(old):
                 return
             try:
                 self._build(old)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
-                self._services.act_on_error(full_name, 'restart')
+                self._system.act_on_error(full_name, 'restart')
                 return
         system_logger.warn(f"node '{old.spec.key}' was restarted")
 
     def _end(self, node: LiveNode) -> bool:
         """Remove a node; return whether a new one may take its place."""
-        stop, executor, name = self._services.stop, self._services.executor, node.spec.key
+        stop, executor, name = self._system.stop, self._system.executor, node.spec.key
         has_ended = stop_node(node, self._timeout_sec, lambda: stop.is_set)
         if stop.is_set:
             return False
         if not has_ended:
             executor.wake()
-            hanging = ', '.join(str(call.owner) for call in node.ledger.running())
+            hanging = ', '.join(str(call.owner) for call in node.running.calls())
             system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
             return False
         executor.remove_node(node.ros)
@@ -128,6 +128,6 @@ class NodeRestarter:
 
     def _build(self, old: LiveNode) -> None:
         node = self._starter.create(old.spec)
-        self._services.executor.add_node(node.ros)
+        self._system.executor.add_node(node.ros)
         self._starter.run_on_start(node)
         self._starter.open([node])

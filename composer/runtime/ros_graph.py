@@ -10,7 +10,8 @@ from rclpy.node import Node as RosNode
 from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter import Parameter
 
-from composer.names import did_you_mean, join_names
+from composer.names import join_names
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -154,6 +155,5 @@ def describe_graph(kind: ConditionKind, name: str, graph: RosGraph) -> str:
         for each in graph.names(kind)
         if not (each in _COMMON_TOPICS or '/_' in each or each.endswith(_COMMON_SERVICES))
     ]
-    nearest = did_you_mean(name, names, _INTRODUCTIONS[kind])
     every = ' but those that every node has' if kind in ('topic', 'service') else ' at all'
-    return nearest or f'there is no {kind}{every}'
+    return suggest(name, names, _INTRODUCTIONS[kind]) or f'there is no {kind}{every}'

@@ -1,8 +1,7 @@
-"""How nodes start: their entities come up, `on_start` runs, then the behaviours may be called."""
+"""Starting nodes: their entities are created, `on_start` runs, then behaviours may be called."""
 
 from __future__ import annotations
 
-import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -28,9 +27,9 @@ class NodeStarter:
         nodes: Takes each node that is created, by its full name.
     """
 
-    def __init__(self, nodes: dict[str, LiveNode], services: SystemHandle) -> None:
+    def __init__(self, nodes: dict[str, LiveNode], system: SystemHandle) -> None:
         self._nodes = nodes
-        self._services = services
+        self._system = system
 
     def create(self, spec: NodeSpec) -> LiveNode:
         """Create a node with all its entities; none of its behaviours is called yet.
@@ -39,7 +38,7 @@ class NodeStarter:
             StartError: It, or one of them, cannot be created.
         """
         try:
-            node = create_live_node(spec, self._services)
+            node = create_live_node(spec, self._system)
         except Exception as error:
             message = f"node '{spec.key}' cannot be created: {error}"
             raise StartError(message) from error
@@ -54,32 +53,31 @@ class NodeStarter:
             StartError: It raised.
         """
         hook = node.spec.on_start
-        if self._services.stop.is_set:
+        if self._system.stop.is_set:
             return
         node.has_begun = True
         if hook is None:
             return
         failures: list[BaseException] = []
-        call = node.hook(Owner('on_start'), hook, failures.append)
-        done = threading.Event()
-        task = self._services.executor.create_task(call.as_callback(), node.behaviour_node)
-        task.add_done_callback(lambda _task: done.set())
-        while not done.wait(_POLL_SEC) and not self._services.stop.is_set:
+        function = node.bind(hook, own_state=False)
+        call = node.reported_call(Owner('on_start'), hook.path, function, failures.append)
+        _, ended = node.begin(call)
+        while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
             pass
         if failures:
             # What has not begun has nothing to stop.
             node.has_begun = False
             message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]
-        node.gate.serves = not self._services.stop.is_set
-        self._services.executor.wake()
+        node.gate.serves = not self._system.stop.is_set
+        self._system.executor.wake()
 
     def open(self, nodes: list[LiveNode]) -> None:
         """Let the behaviours of nodes that have started be called."""
         for node in nodes:
             node.gate.open()
-            for timer in node.timers:
+            for timer in node.entities['timers'].values():
                 with suppress(InvalidHandle):
                     # `on_start` may have destroyed it.
                     timer.reset()
-        self._services.executor.wake()
+        self._system.executor.wake()

@@ -1,4 +1,4 @@
-"""How nodes stop: nothing new begins, what waits half-way is ended, `on_stop` is heard."""
+"""Stopping nodes: nothing new begins, suspended behaviours are ended, `on_stop` runs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.python_source.modules import FunctionKind
-from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.calls import Owner
 from composer.runtime.logs import system_logger
 
@@ -56,7 +54,7 @@ def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) 
         behaviours hangs, nothing has been done to it.
     """
     node.gate.close()
-    if not _wait_for(node.ledger.wait_until_idle, timeout_sec, gives_up):
+    if not _wait_for(node.running.wait_until_idle, timeout_sec, gives_up):
         node.gate.open()
         return False
     _cancel_timers(node)
@@ -71,8 +69,8 @@ def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) 
         _wait_for(ended.wait, timeout_sec, gives_up)
     # It is not stopped twice.
     node.has_begun = False
-    node.at_stop.clear()
-    return node.ledger.wait_until_idle(0.0)
+    node.suspended.clear()
+    return node.running.wait_until_idle(0.0)
 
 
 def _wait_for(
@@ -120,41 +118,35 @@ class _End:
 
 
 def _has_an_end(node: LiveNode) -> bool:
-    return bool(node.at_stop) or (node.spec.on_stop is not None and node.has_begun)
+    return bool(node.suspended) or (node.spec.on_stop is not None and node.has_begun)
 
 
 def _cancel_timers(node: LiveNode) -> None:
-    for timer in node.timers:
+    for timer in node.entities['timers'].values():
         with suppress(InvalidHandle):
             # A behaviour may have destroyed it.
             timer.cancel()
 
 
 def _end(node: LiveNode, timeout_sec: float) -> None:
-    node.ledger.wait_until_idle(timeout_sec / 2)
-    for one in node.at_stop:
-        one.close(timeout_sec)
+    node.running.wait_until_idle(timeout_sec / 2)
+    for behaviour in node.suspended:
+        behaviour.close(timeout_sec)
     node.gate.serves = False
-    node.waits.allow()
+    node.waits.allow_at_stop()
     hook = node.spec.on_stop
     if hook is None or not node.has_begun:
         return
-    call = node.hook(Owner('on_stop'), hook)
-    if kind_of(node.function(hook)) is FunctionKind.COROUTINE:
-        done = threading.Event()
-        task = node.services.executor.create_task(
-            call.as_callback(FunctionKind.COROUTINE), node.behaviour_node
-        )
-        task.add_done_callback(lambda _task: done.set())
-        done.wait(timeout_sec)
-    else:
-        call.run(node.behaviour_node)
+    function = node.bind(hook, own_state=False)
+    node.run_to_end(
+        node.reported_call(Owner('on_stop'), hook.path, function), timeout_sec=timeout_sec
+    )
 
 
 def _wait_until_idle(node: LiveNode, deadline: float) -> bool:
-    if node.ledger.wait_until_idle(max(deadline - monotonic(), 0.0)):
+    if node.running.wait_until_idle(max(deadline - monotonic(), 0.0)):
         return True
-    for call in node.ledger.running():
+    for call in node.running.calls():
         system_logger.error(
             f"node '{node.spec.key}': {call.owner} did not end in time; it is at\n"
             f'{call.format_stack()}'

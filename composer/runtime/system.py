@@ -229,7 +229,7 @@ class System:
         return [
             (node.full_name, call)
             for node in list(self._nodes.values())
-            for call in node.ledger.running()
+            for call in node.running.calls()
             if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
 

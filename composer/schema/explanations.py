@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from composer.names import did_you_mean, suggest
 from composer.schema.violations import (
     StructureFault,
     conflicting_keys,
@@ -17,6 +16,7 @@ from composer.schema.violations import (
     show_value,
     wrong_type,
 )
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -47,8 +47,8 @@ def _explain_unknown_keys(error: ValidationError) -> Iterator[StructureFault]:
             (*path, key),
             (*path, key),
             at_key=True,
-            help=did_you_mean(key, known, 'the keys are'),
-            meant=suggest(key, known),
+            help=suggest(key, known, 'the keys are'),
+            meant=find_nearest(key, known),
         )
 
 
@@ -70,7 +70,7 @@ def _explain_enum(error: ValidationError) -> Iterator[StructureFault]:
         f'expected one of {", ".join(options)}; got {show_value(error.instance)}',
         path_of(error),
         droppable(path_of(error)),
-        help=_near(error.instance, options),
+        help=suggest(error.instance, options),
     )
 
 
@@ -101,7 +101,7 @@ def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
         f'expected {expected}; got {show_value(error.instance)}',
         path,
         droppable(path),
-        help=f"did you mean '{meant}'?" if meant else None,
+        help=did_you_mean(meant),
     )
 
 
@@ -204,13 +204,6 @@ def _explain_key_alternatives(
 def _explain_otherwise(error: ValidationError) -> Iterator[StructureFault]:
     path = path_of(error)
     yield StructureFault('bad-value', error.message, path, droppable(path))
-
-
-def _near(value: Any, options: list[str]) -> str | None:
-    if not isinstance(value, str):
-        return None
-    found = did_you_mean(value, options)
-    return found if found and found.startswith('did') else None
 
 
 def _find_meant_form(text: str, pattern: str) -> str | None:

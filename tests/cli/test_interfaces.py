@@ -177,7 +177,7 @@ TYPO = """\
 defs/msg/Thing.msg:2:1: error[unknown-type]: there is no type 'strin'
   2 | strin name
     | ^^^^^
-  help: did you mean string?
+  help: did you mean 'string'?
 
 """
 

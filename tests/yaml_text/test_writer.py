@@ -41,7 +41,7 @@ def test_numbers_that_are_none_are_written_as_yaml_has_them():
 
 
 def test_remarks_stand_beside_the_values():
-    text = render_yaml({'a': {'b': 1, 'c': [1, 2]}}, '.'.join)
+    text = render_yaml({'a': {'b': 1, 'c': [1, 2]}}, remark='.'.join)
     assert [line.split('  #') for line in text.splitlines()] == [
         ['a:'],
         [f'{"  b: 1":<48}', ' a.b'],

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related
 from composer.language.bindings import Binding, node_bindings
-from composer.names import did_you_mean, suggest
 from composer.python_source.module_finder import MissingModule
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -85,18 +85,15 @@ def _explain_missing_module(
     context: CheckContext, binding: Binding, module: MissingModule
 ) -> Diagnostic:
     behaviour = binding.behaviour
-    if module.nearest:
-        help_text = f"did you mean '{module.nearest}'?"
-    else:
-        path = behaviour.module.replace('.', '/')
-        help_text = f'write {path}.py beside the project, or install the package it is in'
+    path = behaviour.module.replace('.', '/')
+    otherwise = f'write {path}.py beside the project, or install the package it is in'
     return context.at_value(
         behaviour.path,
         'unknown-behaviour',
         f"there is no module '{module.missing}'",
         part=behaviour.module,
         first=True,
-        help=help_text,
+        help=did_you_mean(module.nearest, otherwise),
     )
 
 
@@ -117,7 +114,7 @@ def _explain_missing_function(
         'unknown-behaviour',
         f"{behaviour.module} has no function '{behaviour.function}'",
         part=behaviour.function,
-        help=did_you_mean(behaviour.function, _public(module.functions), 'it has'),
+        help=suggest(behaviour.function, _public(module.functions), 'it has'),
     )
 
 
@@ -140,12 +137,12 @@ def _check_signature(
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
             given.remove(keyword)
-            given.add(suggest(keyword, free) or '')
+            given.add(find_nearest(keyword, free) or '')
             yield context.at_key(
                 (*behaviour.path[:-1], 'with', keyword),
                 'bad-argument',
                 f"{behaviour.name} takes no argument '{keyword}'",
-                help=did_you_mean(keyword, free, 'it takes') or 'it takes no more arguments',
+                help=suggest(keyword, free, 'it takes', 'it takes no more arguments'),
             )
     yield from _check_values(context, binding, signature)
     try:

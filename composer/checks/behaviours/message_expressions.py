@@ -14,7 +14,7 @@ from jinja2 import TemplateError, nodes
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -89,12 +89,12 @@ class _Walk:
     def _find_name_fault(self, name: str) -> ExpressionFault | None:
         if name in self.types or name in self.sandbox.globals:
             return None
-        help_text = did_you_mean(name, self.types, 'in scope are')
+        help_text = suggest(name, self.types, 'in scope are')
         return ExpressionFault('undefined-name', f"'{name}' is not defined", name, help_text)
 
     def _explain_missing(self, what: str, name: str, known: list[str]) -> ExpressionFault:
         message = f"there is no {what} '{name}'"
-        return ExpressionFault('bad-expression', message, name, did_you_mean(name, known))
+        return ExpressionFault('bad-expression', message, name, suggest(name, known, 'there are'))
 
     def _find_field_fault(self, node: nodes.Getattr) -> ExpressionFault | None:
         owner = self._describe(self._type_of(node.node))

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from composer.checks.connections.topology import build_graph, full_name
 from composer.checks.connections.waits import waiters
 from composer.language.specs import REENTRANT
-from composer.names import count_slips, expand_name, with_article
+from composer.names import expand_name, with_article
+from composer.spelling import count_edits, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -56,7 +57,7 @@ def find_slip(word: str, options: Iterable[str]) -> str | None:
 def _is_slip(word: str, other: str) -> bool:
     if min(len(word), len(other)) < _SHORTEST or _digits(word) != _digits(other):
         return False
-    return count_slips(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
+    return count_edits(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
 
 
 def _digits(word: str) -> str:
@@ -84,7 +85,7 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
                 condition.path,
                 _RULE,
                 f"{with_article(condition.kind)} '{name}' is nowhere in this system",
-                help=f"did you mean '{meant}'?",
+                help=did_you_mean(meant),
             )
 
 
@@ -137,7 +138,7 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
                     path,
                     _RULE,
                     f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
-                    help=f"did you mean '{_as_written(bare, near, node.namespace)}'?",
+                    help=did_you_mean(_as_written(bare, near, node.namespace)),
                 )
     yield from (finding for span, finding in slips.items() if span not in matching)
 
@@ -158,5 +159,5 @@ def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:
                     (*entity.path, 'group'),
                     _RULE,
                     f"'{group}' is a group of its own, whose members never run at the same time",
-                    help=f"did you mean '{REENTRANT}'?",
+                    help=did_you_mean(REENTRANT),
                 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import is_doubtful
-from composer.names import suggest
+from composer.spelling import did_you_mean, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -79,7 +79,7 @@ def _explain(
         inner,
         rule,
         message.format(channel.name),
-        help=f"did you mean '{near}'? Otherwise {help_text}" if near else help_text,
+        help=f'{did_you_mean(near)} Otherwise {help_text}' if near else help_text,
     )
 
 
@@ -104,5 +104,5 @@ class _Partners:
         self._comparisons += len(names)
         if self._comparisons > _MOST_COMPARED:
             return None
-        near = suggest(channel.name.rpartition('/')[2], names)
+        near = find_nearest(channel.name.rpartition('/')[2], names)
         return names[near] if near else None

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import full_name
 from composer.names import (
-    did_you_mean,
     expand_name,
     find_namespace_fault,
     find_node_name_fault,
     find_topic_name_fault,
     with_article,
 )
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -37,7 +37,7 @@ def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
                     condition.path,
                     'unknown-process',
                     f"there is no process '{condition.name}' in this system",
-                    help=did_you_mean(condition.name, processes),
+                    help=suggest(condition.name, processes, 'there are'),
                 )
     yield from _find_cycles(context)
 

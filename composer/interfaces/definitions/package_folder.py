@@ -30,6 +30,7 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
+from composer.spelling import did_you_mean
 
 PARTS: Final = {
     'msg': ('',),
@@ -178,7 +179,7 @@ def _check_name(reading: _Reading, path: Path) -> None:
     if '_' in name or not load_parser().is_valid_message_name(name):
         better = ''.join(part[:1].upper() + part[1:] for part in name.split('_'))
         message = f'{name!r} is no name of an interface: expected CamelCase'
-        advice = f'did you mean {better}{path.suffix}?'
+        advice = did_you_mean(f'{better}{path.suffix}')
         reading.diagnostics.append(_about_file(path, 'bad-name', message, advice))
 
 

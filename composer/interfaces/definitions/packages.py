@@ -14,7 +14,7 @@ from composer.interfaces.definitions.package_folder import (
 )
 from composer.interfaces.definitions.statement_rules import list_primitive_types, translate_type
 from composer.interfaces.descriptions import ActionDescription, ServiceDescription
-from composer.names import suggest
+from composer.spelling import did_you_mean, find_nearest
 
 # What services and actions consist of beside their own parts (rosidl_parser.definition).
 SERVICE_PACKAGES = frozenset({'builtin_interfaces', 'service_msgs'})
@@ -139,13 +139,13 @@ def order_packages(packages: Iterable[PackageDefinitions]) -> list[PackageDefini
 
 def _unknown_package(reference: TypeReference, options: Iterable[str]) -> Diagnostic:
     package, _, name = reference.message.partition('/')
-    nearest = suggest(package, options)
+    nearest = find_nearest(package, options)
     install = 'install it, or name the folder of its definitions under interfaces'
     return diagnostic_at(
         reference.span,
         'unknown-package',
         f'there is no interface package {package!r}',
-        help=f'did you mean {nearest}/{name}?' if nearest else install,
+        help=did_you_mean(nearest and f'{nearest}/{name}', install),
     )
 
 
@@ -153,25 +153,25 @@ def _unknown_message(reference: TypeReference, known: _Messages) -> Diagnostic:
     package, _, name = reference.message.partition('/')
     messages = known.of(package) or frozenset()
     if '/' in reference.span.text:
-        nearest = suggest(name, messages)
+        nearest = find_nearest(name, messages)
         return diagnostic_at(
             reference.span,
             'unknown-type',
             f'{package} has no message {name!r}',
-            help=f'did you mean {package}/{nearest}?' if nearest else None,
+            help=did_you_mean(nearest and f'{package}/{nearest}'),
         )
     elsewhere = (f'{other}/{name}' for other in _COMMON if name in (known.of(other) or ()))
     nearest = (
         next(elsewhere, None)
         or translate_type(name)
-        or suggest(name, [*messages, *list_primitive_types()])
+        or find_nearest(name, [*messages, *list_primitive_types()])
     )
     form = 'messages of other packages are written package/Message'
     return diagnostic_at(
         reference.span,
         'unknown-type',
         f'there is no type {name!r}: {package} has no such message',
-        help=f'did you mean {nearest}?' if nearest else form,
+        help=did_you_mean(nearest, form),
     )
 
 

@@ -14,7 +14,7 @@ from typing import Final
 from composer.diagnostics import Diagnostic, Span, diagnostic_at
 from composer.interfaces.definitions.definition_parser import SyntaxFault, load_parser, parse_value
 from composer.interfaces.definitions.statements import Statement
-from composer.names import suggest
+from composer.spelling import did_you_mean, find_nearest
 
 FLOAT32_MAX: Final = (2 - 2**-23) * 2.0**127
 _TYPE: Final = re.compile(
@@ -165,19 +165,19 @@ def _check_message_name(span: Span) -> Iterator[Diagnostic]:
             span,
             'bad-type',
             f'{span.text!r} is no type: expected package/Message',
-            help=f'did you mean {first}/{name}?',
+            help=did_you_mean(f'{first}/{name}'),
         )
     elif package and not parser.is_valid_package_name(package):
         yield diagnostic_at(span, 'bad-type', f'{package!r} is no name of a package')
     elif not parser.is_valid_message_name(name):
         types = list_primitive_types()
-        nearest = translate_type(span.text) or suggest(span.text, types)
+        nearest = translate_type(span.text) or find_nearest(span.text, types)
         expected = f'expected package/Message, or one of {", ".join(types)}'
         yield diagnostic_at(
             span,
             'unknown-type',
             f'there is no type {span.text!r}',
-            help=f'did you mean {nearest}?' if nearest else expected,
+            help=did_you_mean(nearest, expected),
         )
 
 
@@ -186,7 +186,7 @@ def _check_constant_name(span: Span) -> Iterator[Diagnostic]:
     if parser.is_valid_constant_name(span.text):
         return
     better = _snake_case(span.text).upper()
-    advice = f'did you mean {better}?' if parser.is_valid_constant_name(better) else None
+    advice = did_you_mean(better if parser.is_valid_constant_name(better) else None)
     if any(character in span.text for character in '"\'<>'):
         advice = 'a line with = is a constant: no default value or type with spaces may have one'
     yield diagnostic_at(
@@ -207,7 +207,7 @@ def _check_field_name(span: Span) -> Iterator[Diagnostic]:
             'bad-name',
             f'{span.text!r} is no name of a field: expected small letters, digits and single '
             'underscores, beginning with a letter',
-            help=f'did you mean {better}?' if parser.is_valid_field_name(better) else None,
+            help=did_you_mean(better if parser.is_valid_field_name(better) else None),
         )
     elif span.text in RESERVED_NAMES:
         yield diagnostic_at(

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.instances import ArgumentValues, sample_values
-from composer.names import did_you_mean, suggest
 from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_fault
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -58,7 +58,7 @@ def _find_unknown(
             place.instance.positions.key((*place.at, 'args', name)),
             'unknown-argument',
             f"'{place.file}' takes no argument '{name}'",
-            help=did_you_mean(name, declared, 'it takes'),
+            help=suggest(name, declared, 'it takes'),
         )
 
 
@@ -74,9 +74,7 @@ def _missing_argument(argument: ArgumentSpec, place: IncludePlace) -> Diagnostic
 
 
 def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
-    choices = [choice for choice in argument.choices if isinstance(choice, str)]
-    near = suggest(value, choices) if isinstance(value, str) else None
-    return f"did you mean '{near}'?" if near else None
+    return suggest(value, argument.choices)
 
 
 def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.language.paths import PathError, list_neighbours, resolve_path
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -22,7 +22,7 @@ def locate_file(text: str, place: Span) -> Path:
     path = resolve_path(text, place.source.folder)
     if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
         message = f"there is no file '{shown_path(path)}'"
-        raise PathError(message, help=did_you_mean(path.name, list_neighbours(path), 'there are'))
+        raise PathError(message, help=suggest(path.name, list_neighbours(path), 'there are'))
     return path
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
 from composer.language.qos import BUILTIN_PROFILES
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -87,7 +87,7 @@ def drop_unknown_profiles(instance: Instance) -> None:
                 span,
                 'unknown-qos-profile',
                 f"no QoS profile is called '{name}'",
-                help=did_you_mean(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
+                help=suggest(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
             )
             instance.diagnostics.append(finding)
         del holder[key]

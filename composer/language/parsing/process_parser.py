@@ -12,6 +12,7 @@ from composer.language.specs import (
     ProcessSpec,
 )
 from composer.names import expand_namespace
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -96,10 +97,10 @@ def parse_process(
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
-        command=tuple(map(write_scalar, data.get('command', ()))),
+        command=tuple(map(format_scalar, data.get('command', ()))),
         package=data.get('package'),
         executable=data.get('executable'),
-        arguments=tuple(map(write_scalar, data.get('arguments', ()))),
+        arguments=tuple(map(format_scalar, data.get('arguments', ()))),
         node_name=data.get('name'),
         namespace=_parse_namespace(outer_namespace, data),
         parameters=MappingProxyType(data.get('parameters', {})),
@@ -107,7 +108,7 @@ def parse_process(
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
         env=MappingProxyType(
-            {key: write_scalar(value) for key, value in data.get('env', {}).items()}
+            {key: format_scalar(value) for key, value in data.get('env', {}).items()}
         ),
         cwd=data.get('cwd'),
         required=data.get('required', False),
@@ -128,13 +129,6 @@ def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpe
     if isinstance(written, dict):
         return (_parse_condition(written, at),)
     return tuple(_parse_condition(each, (*at, index)) for index, each in enumerate(written))
-
-
-def write_scalar(value: Any) -> str:
-    """Return a value as a program gets it: as YAML would write it."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    return str(value)
 
 
 def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 from composer.language.parsing.entry_parser import Data, parse_entries, parse_qos
 from composer.language.parsing.node_parser import NodeParser, parse_defaults
-from composer.language.parsing.process_parser import parse_process, write_scalar
+from composer.language.parsing.process_parser import parse_process
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
     QosSpec,
     SystemSpec,
 )
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
@@ -44,7 +45,7 @@ def parse_system(data: Data, name: str) -> SystemSpec:
             lambda name, node, path: NodeParser(defaults, node, path).parse(name),
         ),
         environment=MappingProxyType(
-            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+            {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
         processes=parse_entries(
             data, (), 'processes', partial(parse_process, defaults.given_namespace, defaults.node)

@@ -1,4 +1,4 @@
-"""Behaviours by name → the functions themselves."""
+"""Behaviours as Python objects: imported by name, and what kind of function each is."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def kind_of(function: Callable[..., Any]) -> FunctionKind:
     """Return how a function runs; of an object with `__call__`, how that does."""
     target: Any = inspect.unwrap(function)
     while isinstance(target, partial):
-        target = target.func
+        target = inspect.unwrap(target.func)
     if not inspect.isroutine(target) and not inspect.isclass(target):
         target = type(target).__call__
     if inspect.isasyncgenfunction(target):

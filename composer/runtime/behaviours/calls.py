@@ -1,7 +1,7 @@
-"""The wrapper around every behaviour: it runs it, keeps account of it, and catches everything.
+"""Calls of behaviours: what runs, for how long, and that nothing of what they raise gets out.
 
-It is on the way of every message, so it is made of plain functions and tuples: a hundred
-nanoseconds here are what composing costs.
+Every message goes through here, so a call is made of plain functions and tuples: a hundred
+nanoseconds more would be the cost of composing.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import threading
 from dataclasses import dataclass
 from threading import get_ident
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from composer.executor.after_fork import end_child
 from composer.python_source.modules import FunctionKind
@@ -23,9 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import CoroutineType
 
+# What a call returns if the behaviour raised, or was not called.
+FAILED: Final = object()
 
-class Pace:
-    """When a behaviour that hands out intermediate results went on the last time.
+
+class Progress:
+    """When a behaviour that yields intermediate results was last resumed.
 
     Attributes:
         resumed_ns: A time of `time.monotonic_ns`.
@@ -36,8 +39,8 @@ class Pace:
     def __init__(self) -> None:
         self.resumed_ns = 0
 
-    def resumed(self) -> None:
-        """Measure from now on."""
+    def resume(self) -> None:
+        """Note that it is resumed now."""
         self.resumed_ns = monotonic_ns()
 
 
@@ -46,7 +49,7 @@ class Owner:
     """What a behaviour belongs to: an entity, or the node itself.
 
     Attributes:
-        kind: The noun of the entity's kind, as in `timer`, or the key of a node, as in `on_start`.
+        kind: The noun of the entity's kind, as in `timer`, or a key of the node, as in `on_start`.
         name: The entity's name.
         key: The key of the entity that names the behaviour, if it may have several.
     """
@@ -63,24 +66,26 @@ class Owner:
 
 @dataclass(frozen=True, slots=True)
 class RunningCall:
-    """A behaviour that has begun and not ended.
+    """A call that has begun and not ended.
 
     Attributes:
         begun_ns: When it began, by `time.monotonic_ns`.
         thread: The identifier of its thread, `None` for a coroutine.
-        pace: Of one that hands out intermediate results.
+        progress: Of a behaviour that yields intermediate results.
     """
 
     owner: Owner
     begun_ns: int
     thread: int | None
     coroutine: CoroutineType[Any, Any, Any] | None = None
-    pace: Pace | None = None
+    progress: Progress | None = None
 
     @property
     def since_ns(self) -> int:
-        """When it began, or went on after an intermediate result."""
-        return self.begun_ns if self.pace is None else max(self.begun_ns, self.pace.resumed_ns)
+        """When it began, or was last resumed after an intermediate result."""
+        if self.progress is None:
+            return self.begun_ns
+        return max(self.begun_ns, self.progress.resumed_ns)
 
     def format_stack(self) -> str:
         """Return where it is now, innermost call last."""
@@ -89,107 +94,111 @@ class RunningCall:
         return format_thread(self.thread or 0)
 
 
-# The arguments of a `RunningCall`: to make one takes longer than all other bookkeeping.
+# The arguments of a `RunningCall`: to make one takes longer than everything else in a call.
 _CallEntry: TypeAlias = (
-    'tuple[Owner, int, int | None, CoroutineType[Any, Any, Any] | None, Pace | None]'
+    'tuple[Owner, int, int | None, CoroutineType[Any, Any, Any] | None, Progress | None]'
 )
 
 
-class CallLedger:
-    """The behaviours of a node that are running.
+class RunningCalls:
+    """The calls of a node's behaviours that have begun and not ended.
 
     Attributes:
-        entries: What runs, by tokens; `None` for what has no stack of its own.
-        tokens: What to call the next entry.
-        is_awaited: Whether somebody must be told when an entry has gone.
+        entries: The calls, by tokens; `None` for work that has no stack of its own.
+        tokens: The token of the next entry.
+        has_listeners: Whether somebody must be told when an entry is removed.
     """
 
-    __slots__ = ('_changed', '_heard_at_end', '_waiters', 'entries', 'is_awaited', 'tokens')
+    __slots__ = ('_changed', '_end_listeners', '_waiters', 'entries', 'has_listeners', 'tokens')
 
     def __init__(self) -> None:
         self.entries: dict[int, _CallEntry | None] = {}
         self.tokens = itertools.count()
-        self.is_awaited = False
+        self.has_listeners = False
         self._waiters = 0
-        self._heard_at_end: dict[int, Callable[[], None]] = {}
+        self._end_listeners: dict[int, Callable[[], None]] = {}
         self._changed = threading.Condition()
 
     def begin(self) -> int:
-        """Note something that is still to be done but has no stack; return what `end` takes."""
+        """Add work that has no stack, and return its token for `end`."""
         token = next(self.tokens)
         self.entries[token] = None
         return token
 
     def end(self, token: int) -> None:
-        """Note that it has been done, or that a behaviour has ended."""
+        """Remove a call or work that has ended."""
         del self.entries[token]
-        if self.is_awaited:
-            self.tell_end(token)
+        if self.has_listeners:
+            self.notify_end(token)
 
-    def tell_end(self, token: int) -> None:
-        """Tell those who are to know that an entry has gone; wake those who wait for the last."""
+    def notify_end(self, token: int) -> None:
+        """Tell the listener of an entry that it was removed, and wake those who wait for all."""
         with self._changed:
-            hear = self._heard_at_end.pop(token, None)
-            self._note_who_awaits()
+            listener = self._end_listeners.pop(token, None)
+            self._update_listeners()
             if not self.entries:
                 self._changed.notify_all()
-        if hear is not None:
-            hear()
+        if listener is not None:
+            listener()
 
-    def hear_end(self, token: int, hear: Callable[[], None]) -> None:
-        """Let `hear` be called when an entry has gone."""
+    def on_end(self, token: int, listener: Callable[[], None]) -> None:
+        """Call `listener` when an entry is removed, at once if it has been."""
         with self._changed:
-            self._heard_at_end[token] = hear
-            self._note_who_awaits()
+            self._end_listeners[token] = listener
+            self._update_listeners()
         if token not in self.entries:
-            # It went before it was seen that somebody is to be told.
-            self.tell_end(token)
+            # It may have been removed before `has_listeners` was set.
+            self.notify_end(token)
 
-    def running(self) -> list[RunningCall]:
-        """Return the behaviours that run now."""
+    def calls(self) -> list[RunningCall]:
+        """Return the calls that run now."""
         return [RunningCall(*entry) for entry in list(self.entries.values()) if entry is not None]
 
     def wait_until_idle(self, timeout_sec: float) -> bool:
-        """Wait until no behaviour runs; return whether that came to be in time."""
+        """Wait until no call runs and no work is left; return whether that was in time."""
         with self._changed:
             self._waiters += 1
-            # Said before the entries are looked at: whoever takes the last one away sees it.
-            self.is_awaited = True
+            # Set before the entries are looked at: whoever removes the last one sees it.
+            self.has_listeners = True
             try:
                 return self._changed.wait_for(lambda: not self.entries, timeout_sec)
             finally:
                 self._waiters -= 1
-                self._note_who_awaits()
+                self._update_listeners()
 
-    def _note_who_awaits(self) -> None:
-        self.is_awaited = bool(self._waiters or self._heard_at_end)
+    def _update_listeners(self) -> None:
+        self.has_listeners = bool(self._waiters or self._end_listeners)
 
 
 class BehaviourCall:
     """A function bound to an entity, as a callback for rclpy.
 
     Args:
-        function: Called with the callback's arguments.
+        function: Called with the arguments of the callback.
         deliver: Takes what the function returned.
         failed: Takes what it raised.
         add_time: Takes how long each call took, in nanoseconds; `None` measures nothing.
-        admits: Asked right before the function is called, when the call is in the ledger already:
-            whoever closes a gate and then looks into the ledger misses no call. `None` for always.
-        pace: Of a function that hands out intermediate results.
+        may_begin: Asked right before the function is called, when the call is among the running
+            ones already: whoever closes a gate and then looks at these misses no call. `None` for
+            always.
+        progress: Of a function that yields intermediate results.
 
     Attributes:
-        run: Calls a plain function; returns whether it did not raise.
+        is_async: Whether the function is a coroutine.
+        run: Calls the function, and returns what `deliver` returned, or `FAILED`; it never raises.
+            It is itself a coroutine where the function is one.
     """
 
     __slots__ = (
         '_add_time',
-        '_admits',
         '_deliver',
         '_failed',
         '_function',
-        '_ledger',
+        '_may_begin',
         '_owner',
-        '_pace',
+        '_progress',
+        '_running',
+        'is_async',
         'run',
     )
 
@@ -197,103 +206,96 @@ class BehaviourCall:
         self,
         owner: Owner,
         function: Callable[..., Any],
-        ledger: CallLedger,
+        running: RunningCalls,
         *,
-        deliver: Callable[[Any], None],
+        deliver: Callable[[Any], Any],
         failed: Callable[[Owner, BaseException], None],
         add_time: Callable[[int], None] | None = None,
-        admits: Callable[[], bool] | None = None,
-        pace: Pace | None = None,
+        may_begin: Callable[[], bool] | None = None,
+        progress: Progress | None = None,
     ) -> None:
-        self._admits = admits
-        self._pace = pace
         self._owner = owner
         self._function = function
-        self._ledger = ledger
+        self._running = running
         self._deliver = deliver
         self._failed = failed
         self._add_time = add_time
-        self.run: Callable[..., bool] = self._compile()
+        self._may_begin = may_begin
+        self._progress = progress
+        self.is_async = kind_of(function) is FunctionKind.COROUTINE
+        # rclpy looks at the callback itself to tell what to await, and how many arguments it
+        # takes: a message callback has one, a timer callback none.
+        self.run: Callable[..., Any] = self._compile_async() if self.is_async else self._compile()
 
-    def delivering(
-        self, deliver: Callable[[Any], None], pace: Pace | None = None
-    ) -> BehaviourCall:
-        """Return the same call with its result going elsewhere."""
+    def with_progress(self, progress: Progress) -> BehaviourCall:
+        """Return the same call of a function that yields intermediate results."""
         return BehaviourCall(
             self._owner,
             self._function,
-            self._ledger,
-            deliver=deliver,
+            self._running,
+            deliver=self._deliver,
             failed=self._failed,
             add_time=self._add_time,
-            admits=self._admits,
-            pace=pace,
+            may_begin=self._may_begin,
+            progress=progress,
         )
 
-    def as_callback(self, kind: FunctionKind | None = None) -> Callable[..., Any]:
-        """Return what rclpy calls or awaits; it never raises."""
-        asynchronous = (kind or kind_of(self._function)) is FunctionKind.COROUTINE
-        # rclpy looks at the callback itself to tell what to await, and how many arguments it
-        # takes: a message callback with one, a timer callback with none.
-        return self._compile_async() if asynchronous else self.run
+    async def complete(self, *arguments: Any) -> Any:
+        """Call the function, await it if it is a coroutine, and return what `run` does."""
+        result = self.run(*arguments)
+        return await result if self.is_async else result
 
-    def _compile(self) -> Callable[..., bool]:
+    def _compile(self) -> Callable[..., Any]:
         """Return the call of a plain function as one function, with all that it needs at hand."""
-        owner, function, deliver, failed = (
-            self._owner,
-            self._function,
-            self._deliver,
-            self._failed,
-        )
-        ledger, entries, tokens = self._ledger, self._ledger.entries, self._ledger.tokens
-        admits, pace, add_time = self._admits, self._pace, self._add_time
+        owner, function, deliver, failed = self._owner, self._function, self._deliver, self._failed
+        running, entries, tokens = self._running, self._running.entries, self._running.tokens
+        add_time, may_begin, progress = self._add_time, self._may_begin, self._progress
         now_ns, get_thread = monotonic_ns, get_ident
 
-        def call_behaviour(*arguments: Any) -> bool:
+        def call_behaviour(*arguments: Any) -> Any:
             token = next(tokens)
             begun_ns = now_ns()
-            entries[token] = (owner, begun_ns, get_thread(), None, pace)
+            entries[token] = (owner, begun_ns, get_thread(), None, progress)
             try:
-                if admits is not None and not admits():
-                    return False
+                if may_begin is not None and not may_begin():
+                    return FAILED
                 result = function(*arguments)
                 if forked_children.in_child:
                     end_child()
-                deliver(result)
+                return deliver(result)
             except BaseException as error:  # noqa: BLE001 - it never takes another node down
                 if forked_children.in_child:
                     end_child(error)
                 failed(owner, error)
-                return False
+                return FAILED
             finally:
                 if add_time is not None:
                     add_time(now_ns() - begun_ns)
-                # As `ledger.end` does.
+                # As `running.end` does.
                 del entries[token]
-                if ledger.is_awaited:
-                    ledger.tell_end(token)
-            return True
+                if running.has_listeners:
+                    running.notify_end(token)
 
         return call_behaviour
 
     def _compile_async(self) -> Callable[..., Any]:
-        ledger, add_time = self._ledger, self._add_time
+        running, add_time = self._running, self._add_time
 
-        async def await_behaviour(*arguments: Any) -> None:
+        async def await_behaviour(*arguments: Any) -> Any:
             begun_ns = monotonic_ns()
             token = None
             try:
                 # A wrapper of an async function may itself be a plain one, and raise at once.
                 coroutine: CoroutineType[Any, Any, Any] = self._function(*arguments)
-                token = next(ledger.tokens)
-                ledger.entries[token] = (self._owner, begun_ns, None, coroutine, self._pace)
-                if self._admits is not None and not self._admits():
+                token = next(running.tokens)
+                running.entries[token] = (self._owner, begun_ns, None, coroutine, self._progress)
+                if self._may_begin is not None and not self._may_begin():
                     coroutine.close()
-                    return
+                    return FAILED
                 result = await coroutine
                 if forked_children.in_child:
                     end_child()
-                self._deliver(result)
+                return self._deliver(result)
             except BaseException as error:
                 if forked_children.in_child:
                     end_child(error)
@@ -301,15 +303,25 @@ class BehaviourCall:
                     # The executor drops the coroutine; to go on would be an error of Python's.
                     raise
                 self._failed(self._owner, error)
+                return FAILED
             finally:
                 if add_time is not None:
                     add_time(monotonic_ns() - begun_ns)
                 if token is not None:
-                    ledger.end(token)
+                    running.end(token)
 
         # A child goes on in the executor whenever its coroutine waits.
         forked_children.coroutine_codes.add(await_behaviour.__code__)
         return await_behaviour
+
+
+def return_result(result: Any) -> Any:
+    """Return a result to whoever called; for `deliver`."""
+    return result
+
+
+def discard_result(_result: Any) -> None:
+    """Drop a result; for `deliver`."""
 
 
 def _comes_from_outside(error: BaseException) -> bool:

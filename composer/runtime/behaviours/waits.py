@@ -1,8 +1,8 @@
-"""Waiting with a deadline, in a thread or in a coroutine; a stop of the system ends every wait.
+"""Waits with a deadline, in threads and in coroutines; a stop of the system ends all of them.
 
-A wait that began before the stop was requested ends by `SystemStoppingError`, so that the
-behaviour ends too. One that begins later is for what must be switched off, and goes on; but
-nothing except `on_stop` waits for somebody who is not there yet.
+A wait that began before the stop was requested ends with `SystemStoppingError`, so that the
+behaviour ends too. One that begins later, to switch something off, goes on; but only `on_stop`
+waits for nodes, servers and messages that are not there yet.
 """
 
 from __future__ import annotations
@@ -27,39 +27,41 @@ _POLL_SEC = 0.01
 
 
 def stopping_error() -> SystemStoppingError:
-    """Return what ends a wait."""
+    """Return the error that ends a wait."""
     return SystemStoppingError('the system stops, and nothing more is waited for')
 
 
-class ThreadWaits:
-    """Waits of behaviours that are plain functions.
+class Waits:
+    """Waits of one node's behaviours; those of coroutines hold no thread meanwhile.
 
     Args:
-        make_room: The executor's context for callbacks that wait for others.
+        executor: Runs the behaviours.
     """
 
-    def __init__(
-        self, make_room: Callable[[], AbstractContextManager[None]], stop: StopRequest
-    ) -> None:
-        self.make_room = make_room
+    def __init__(self, executor: ComposerExecutor, stop: StopRequest) -> None:
         self.stop = stop
-        self._is_patient = False
+        self._executor = executor
+        self._may_wait_at_stop = False
 
-    def allow(self) -> None:
-        """Let `on_stop` wait for whom it needs."""
-        self._is_patient = True
+    def make_room(self) -> AbstractContextManager[None]:
+        """Let another callback run meanwhile, as this one waits for others."""
+        return self._executor.waiting()
+
+    def allow_at_stop(self) -> None:
+        """Let `on_stop` wait for what is not there yet."""
+        self._may_wait_at_stop = True
 
     def until_done(self, future: Future, timeout_sec: float | None) -> bool:
-        """Wait until a future is done; return whether it came to be in time.
+        """Wait until a future is done; return whether it was in time.
 
         Args:
-            timeout_sec: `None` for no end.
+            timeout_sec: `None` for no limit.
 
         Raises:
-            SystemStoppingError: A stop was requested meanwhile; or before, and the wait would
-                have no end.
+            SystemStoppingError: A stop was requested meanwhile; or before, and the wait has no
+                limit.
         """
-        self.refuse_endless(future, timeout_sec)
+        self._refuse_unlimited(future, timeout_sec)
         woken = threading.Event()
 
         def wake(_future: Future | None = None) -> None:
@@ -68,70 +70,13 @@ class ThreadWaits:
         future.add_done_callback(wake)
         if future.done():
             return True
-        with self.stop.waking(wake) as yields, self.make_room():
+        with self.stop.waking(wake) as ends_at_stop, self.make_room():
             woken.wait(timeout_sec)
-        return self.ended(future, wake, yields=yields)
+        return self._finish(future, wake, ends_at_stop=ends_at_stop)
 
-    def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
-        """Wait until a condition holds; return whether it came to hold in time.
-
-        Raises:
-            SystemStoppingError: A stop was requested, and `on_stop` has not been called yet.
-        """
-        if condition():
-            return True
-        deadline = None if timeout_sec is None else monotonic() + timeout_sec
-        with self.make_room():
-            while not condition():
-                if self.gives_up():
-                    raise stopping_error()
-                if deadline is not None and monotonic() >= deadline:
-                    return False
-                sleep(_POLL_SEC)
-        return True
-
-    def ended(self, future: Future, wake: Callable[..., None], *, yields: bool) -> bool:
-        """Say how a wait has ended, as `until_done` does.
-
-        Args:
-            wake: The future's callback, which is taken back.
-            yields: Whether the wait began before a stop.
-        """
-        if future.done():
-            return True
-        future.remove_done_callback(wake)
-        if yields and self.stop.is_set:
-            raise stopping_error()
-        return False
-
-    def refuse_endless(self, future: Future, timeout_sec: float | None) -> None:
-        """Begin no wait without an end when the system stops already.
-
-        Raises:
-            SystemStoppingError: It does, and `on_stop` has not been called yet.
-        """
-        if timeout_sec is None and self.gives_up() and not future.done():
-            raise stopping_error()
-
-    def gives_up(self) -> bool:
-        """Return whether nobody is to be waited for who is not there."""
-        return self.stop.is_set and not self._is_patient
-
-
-class CoroutineWaits:
-    """The same for coroutines, which the executor resumes.
-
-    Args:
-        threads: The waits of the same node's threads.
-    """
-
-    def __init__(self, executor: ComposerExecutor, threads: ThreadWaits) -> None:
-        self._executor = executor
-        self._threads = threads
-
-    async def until_done(self, future: Future, timeout_sec: float | None) -> bool:
-        """See `ThreadWaits.until_done`."""
-        self._threads.refuse_endless(future, timeout_sec)
+    async def until_done_async(self, future: Future, timeout_sec: float | None) -> bool:
+        """As `until_done`, for coroutines."""
+        self._refuse_unlimited(future, timeout_sec)
         first: Future = Future()
 
         def wake(_future: Future | None = None) -> None:
@@ -139,30 +84,78 @@ class CoroutineWaits:
                 first.set_result(None)
 
         future.add_done_callback(wake)
-        with self._threads.stop.waking(wake) as yields:
+        with self.stop.waking(wake) as ends_at_stop:
             if timeout_sec is None:
                 await first
             else:
-                await self._or_later(timeout_sec, wake, first)
-        return self._threads.ended(future, wake, yields=yields)
+                await self._with_timeout(timeout_sec, wake, first)
+        return self._finish(future, wake, ends_at_stop=ends_at_stop)
 
-    async def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
-        """See `ThreadWaits.until_true`."""
-        deadline = None if timeout_sec is None else monotonic() + timeout_sec
-        while not condition():
-            if self._threads.gives_up():
-                raise stopping_error()
-            if deadline is not None and monotonic() >= deadline:
-                return False
-            pause: Future = Future()
-            await self._or_later(_POLL_SEC, partial(pause.set_result, None), pause)
+    def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
+        """Wait until a condition holds; return whether it did in time.
+
+        Raises:
+            SystemStoppingError: A stop was requested, and `on_stop` has not been called yet.
+        """
+        if condition():
+            return True
+        deadline = _deadline(timeout_sec)
+        with self.make_room():
+            while not condition():
+                if self._is_refused():
+                    raise stopping_error()
+                if monotonic() >= deadline:
+                    return False
+                sleep(_POLL_SEC)
         return True
 
-    async def _or_later(
-        self, delay_sec: float, callback: Callable[[], Any], awaited: Future
+    async def until_true_async(
+        self, condition: Callable[[], bool], timeout_sec: float | None
+    ) -> bool:
+        """As `until_true`, for coroutines."""
+        deadline = _deadline(timeout_sec)
+        while not condition():
+            if self._is_refused():
+                raise stopping_error()
+            if monotonic() >= deadline:
+                return False
+            pause: Future = Future()
+            await self._with_timeout(_POLL_SEC, partial(pause.set_result, None), pause)
+        return True
+
+    def _finish(self, future: Future, wake: Callable[..., None], *, ends_at_stop: bool) -> bool:
+        """Return how a wait for a future has ended, or raise, as `until_done` does.
+
+        Args:
+            wake: The callback of the future, which is removed.
+            ends_at_stop: Whether the wait began before a stop.
+        """
+        if future.done():
+            return True
+        future.remove_done_callback(wake)
+        if ends_at_stop and self.stop.is_set:
+            raise stopping_error()
+        return False
+
+    def _refuse_unlimited(self, future: Future, timeout_sec: float | None) -> None:
+        """Begin no wait without a limit when the system is stopping, except in `on_stop`."""
+        if timeout_sec is None and self._is_refused() and not future.done():
+            raise stopping_error()
+
+    def _is_refused(self) -> bool:
+        """Return whether behaviours may no longer wait for what is not there yet."""
+        return self.stop.is_set and not self._may_wait_at_stop
+
+    async def _with_timeout(
+        self, timeout_sec: float, callback: Callable[[], Any], awaited: Future
     ) -> None:
-        delay = self._executor.call_later(delay_sec, callback)
+        timeout = self._executor.call_later(timeout_sec, callback)
         try:
             await awaited
         finally:
-            delay.cancel()
+            timeout.cancel()
+
+
+def _deadline(timeout_sec: float | None) -> float:
+    """Return the time of `time.monotonic` at which a wait ends."""
+    return float('inf') if timeout_sec is None else monotonic() + timeout_sec

@@ -1,11 +1,10 @@
-"""Action clients: `node.send_goal`, and behaviours that hear feedback and results."""
+"""Action clients: `node.send_goal`, and behaviours for feedback and results."""
 
 from __future__ import annotations
 
 import threading
 from collections import deque
 from functools import partial
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
@@ -19,9 +18,8 @@ from composer.errors import (
     GoalTimeoutError,
 )
 from composer.interfaces.classes import import_interface
-from composer.python_source.modules import FunctionKind
-from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.requests import Requests
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 
@@ -37,28 +35,22 @@ if TYPE_CHECKING:
 _QOS = QoSProfile(depth=1000)
 
 
-def create_action_clients(node: LiveNode) -> None:
-    """Create the clients; behaviours reach them through `node.send_goal`."""
-    for spec in node.spec.action_clients.values():
-        client = ActionClient(node, spec)
-        node.entities['action_clients'][spec.name] = client
-        node.at_destruction.append(client.destroy)
-
-
 class ActionClient:
-    """A client that converts payloads, and lets behaviours hear of all its goals."""
+    """A client that converts payloads, and calls behaviours for what comes of all its goals."""
 
     def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
         action_class: Any = import_interface(spec.type)
+        kind, name = 'action client', spec.name
         self._node = node
         self._name = spec.action
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
-        self._feedback = _Hearing(
-            node, Owner('action client', spec.name, 'feedback'), spec.feedback
+        self._requests = Requests(
+            node.waits, self._client.server_is_ready, self._unavailable, self._unanswered
         )
-        self._result = _Hearing(node, Owner('action client', spec.name, 'result'), spec.result)
-        self.destroy = self._client.destroy
+        self._feedback = _Behaviour(node, Owner(kind, name, 'feedback'), spec.feedback)
+        self._result = _Behaviour(node, Owner(kind, name, 'result'), spec.result)
+        node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
         """Send a goal and wait until it is accepted.
@@ -71,18 +63,9 @@ class ActionClient:
             SystemStoppingError: A stop was requested while it waited.
         """
         message = self._convert(payload)
-        begun = monotonic()
-        waits = self._node.waits
-        if not waits.until_true(self._client.server_is_ready, timeout_sec):
-            text = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
-            raise ActionNotAvailableError(text)
-        goal = Goal(self._name, self._node.waits, self._node.coroutine_waits)
-        future = self._client.send_goal_async(message, partial(self._take_feedback, goal))
-        left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
-        if not waits.until_done(future, left):
-            text = f"the server of '{self._name}' did not answer within {timeout_sec:g} s"
-            raise GoalTimeoutError(text)
-        handle = future.result()
+        goal = Goal(self._name, self._node.waits)
+        send = partial(self._client.send_goal_async, message, partial(self._take_feedback, goal))
+        handle = self._requests.send(send, timeout_sec)
         if not handle.accepted:
             text = f"the server of '{self._name}' refused the goal"
             raise GoalRejectedError(text)
@@ -90,12 +73,20 @@ class ActionClient:
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
 
+    def _unavailable(self, timeout_sec: float) -> ActionNotAvailableError:
+        message = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
+        return ActionNotAvailableError(message)
+
+    def _unanswered(self, timeout_sec: float, _begun: float) -> GoalTimeoutError:
+        message = f"the server of '{self._name}' did not answer within {timeout_sec:g} s"
+        return GoalTimeoutError(message)
+
     def _take_feedback(self, goal: Goal, message: Any) -> None:
-        goal.heard.put(message.feedback)
+        goal.feedback_queue.put(message.feedback)
         self._feedback.put(message.feedback)
 
     def _take_result(self, goal: Goal, future: Future) -> None:
-        goal.heard.put(None)
+        goal.feedback_queue.put(None)
         if future.done() and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
                 self._node.behaviour_node.logger.warning(
@@ -105,13 +96,13 @@ class ActionClient:
 
 
 class _Client(RosActionClient):
-    """A client whose goals hear all their feedback in order, and before their result.
+    """A client whose goals get all their feedback in order, and before their result.
 
-    The stock one may take an answer before it has noted the request, and then drops it.
+    The stock one may take an answer before it has registered the request, and then drops it.
     """
 
     def __init__(self, ros: RosNode, action_class: Any, name: str) -> None:
-        self._noting = threading.RLock()
+        self._registering = threading.RLock()
         super().__init__(
             ros,
             action_class,
@@ -125,27 +116,27 @@ class _Client(RosActionClient):
         )
 
     def add_future(self, future: Future) -> None:
-        """Let whoever waits be woken at once, and not by the executor: see the base class."""
+        """Let those who wait be woken at once, and not by the executor: see the base class."""
 
     def remove_future(self, future: Future) -> None:
         """See the base class."""
 
     def send_goal_async(self, *arguments: Any) -> Future:
         """See the base class."""
-        with self._noting:
+        with self._registering:
             return super().send_goal_async(*arguments)
 
     def _cancel_goal_async(self, goal_handle: Any) -> Future:
-        with self._noting:
+        with self._registering:
             return super()._cancel_goal_async(goal_handle)
 
     def _get_result_async(self, goal_handle: Any) -> Future:
-        with self._noting:
+        with self._registering:
             return super()._get_result_async(goal_handle)
 
     def take_data(self) -> dict[str, Any]:
         """See the base class."""
-        with self._noting:
+        with self._registering:
             data: dict[str, Any] = super().take_data()
         if 'result' in data:
             take = partial(
@@ -162,7 +153,7 @@ class _Client(RosActionClient):
         await super().execute(taken_data)
 
 
-class _Hearing:
+class _Behaviour:
     """Calls a behaviour for each item, as one of the node's own callbacks.
 
     What the middleware brings comes in a thread of its own; a guard condition takes it over into
@@ -174,16 +165,13 @@ class _Hearing:
         self._guard: Any = None
         if behaviour is None:
             return
-        function = node.function(behaviour)
-        call = node.call(
+        self._call = node.call(
             owner,
             behaviour.path,
-            partial(function, node.behaviour_node, **behaviour.arguments),
-            admits=node.gate.lets_events,
+            node.bind(behaviour, own_state=False),
+            may_begin=node.gate.allows_events,
         )
-        kind = kind_of(function)
-        self._callback = call.as_callback(kind)
-        drain = self._drain_async if kind is FunctionKind.COROUTINE else self._drain
+        drain = self._drain_async if self._call.is_async else self._drain
         self._guard = node.ros.create_guard_condition(drain, callback_group=node.group(None))
 
     def put(self, item: Any) -> None:
@@ -194,8 +182,8 @@ class _Hearing:
 
     def _drain(self) -> None:
         while self._items:
-            self._callback(self._items.popleft())
+            self._call.run(self._items.popleft())
 
     async def _drain_async(self) -> None:
         while self._items:
-            await self._callback(self._items.popleft())
+            await self._call.run(self._items.popleft())

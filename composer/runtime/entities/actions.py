@@ -1,11 +1,10 @@
-"""Actions: goals accepted, executed beside each other as declared, cancelled at a `yield`."""
+"""Actions: goals are accepted, executed as `concurrency` says, and cancelled at a `yield`."""
 
 from __future__ import annotations
 
 import threading
-from contextlib import aclosing, closing
+from contextlib import aclosing, closing, suppress
 from dataclasses import replace
-from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -16,49 +15,56 @@ from rclpy.qos import QoSProfile
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
-from composer.runtime.behaviours.calls import Owner, Pace
+from composer.runtime.behaviours.calls import FAILED, Owner, Progress, return_result
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from composer.language.specs import ActionSpec, BehaviourSpec
+    from composer.language.specs import ActionSpec
     from composer.runtime.nodes.live_node import LiveNode
 
 _POLL_SEC = 0.005
-# A cancel request takes effect right after its callback; this only bounds a fault of the server.
+# A request to cancel takes effect right after its callback; this only bounds an error of rclpy.
 _CANCEL_SEC = 5.0
 # The middleware's default of 10 loses requests when more goals come at once.
 _SERVICE_QOS = QoSProfile(depth=1000)
 
 
-def create_actions(node: LiveNode) -> None:
-    """Create the actions that the node serves."""
-    for spec in node.spec.actions.values():
-        server = _Server(node, spec)
-        node.at_destruction.append(server.destroy)
+def create_action(node: LiveNode, spec: ActionSpec) -> ActionServer:
+    """Create an action that the node serves."""
+    server = _Server(node, spec)
+    node.at_destruction.append(server.destroy)
+    return server
 
 
 class _Server(ActionServer):
     """An action server whose plain and generator behaviours run in threads of their own.
 
-    The stock server executes goals in the executor's pool, where goals that sleep keep requests
-    to cancel them from being heard.
+    The stock server executes goals in the threads of the executor, where goals that sleep keep
+    requests to cancel them from being taken.
     """
 
     def __init__(self, node: LiveNode, spec: ActionSpec) -> None:
         self._queue = GoalQueue(spec.concurrency, _start)
         self._execution = _Execution(node, spec, self._queue)
-        self._live = node
+        self._live_node = node
         self._owner = Owner('action', spec.name)
-        self._spec = spec
+        self._accept = None
+        if spec.accept is not None:
+            self._accept = node.call(
+                replace(self._owner, key='accept'),
+                spec.accept.path,
+                node.bind(spec.accept, own_state=False),
+                options=spec,
+                deliver=return_result,
+                may_begin=node.gate.allows_requests,
+            )
         self._tokens: dict[bytes, int] = {}
         super().__init__(
             node.ros,
             import_interface(spec.type),
             spec.action,
-            execute_callback=self._execution.callback,
+            execute_callback=self._execution.execute,
             callback_group=node.serving,
             goal_callback=self._decide,
             handle_accepted_callback=self._add,
@@ -69,9 +75,9 @@ class _Server(ActionServer):
         )
 
     def add_future(self, future: Any) -> None:
-        """Let results be sent by whom they come from: see the base class.
+        """Let results be sent by the thread that they come from: see the base class.
 
-        The executor, which sends them otherwise, may have been stopped by then.
+        Otherwise the executor sends them, which may have been stopped by then.
         """
 
     def remove_future(self, future: Any) -> None:
@@ -79,68 +85,43 @@ class _Server(ActionServer):
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
         """See the base class."""
-        callback = execute_callback or self._execution.callback
+        callback = execute_callback or self._execution.execute
         if self._execution.is_async:
-            self._live.services.executor.create_task(self._execute_in_task, callback, goal_handle)
+            self._live_node.system.executor.create_task(self._execute, callback, goal_handle)
         else:
             threading.Thread(
-                target=self._execute_in_thread, args=(callback, goal_handle), daemon=True
+                target=self._execute_here, args=(callback, goal_handle), daemon=True
             ).start()
 
-    async def _execute_in_task(self, callback: Any, goal: Any) -> None:
+    def _execute_here(self, callback: Any, goal: Any) -> None:
+        # Nothing in it waits, so that it ends when it is first resumed.
+        with suppress(StopIteration):
+            self._execute(callback, goal).send(None)
+
+    async def _execute(self, callback: Any, goal: Any) -> None:
         try:
             await self._execute_goal(callback, goal)
         finally:
-            self._end(goal)
-
-    def _execute_in_thread(self, callback: Any, goal: Any) -> None:
-        try:
-            # Nothing in it waits: the callback is a plain function.
-            self._execute_goal(callback, goal).send(None)
-        except StopIteration:
-            pass
-        finally:
-            self._end(goal)
+            self._live_node.running.end(self._tokens.pop(goal_key(goal)))
 
     def _add(self, goal: Any) -> None:
         # The node has not ended before the results of all its goals are sent.
-        self._tokens[goal_key(goal)] = self._live.ledger.begin()
+        self._tokens[goal_key(goal)] = self._live_node.running.begin()
         self._queue.add(goal)
-
-    def _end(self, goal: Any) -> None:
-        self._live.ledger.end(self._tokens.pop(goal_key(goal)))
 
     async def _decide(self, goal: Any) -> GoalResponse:
         if self._execution.is_ending() or not self._queue.has_room():
             return GoalResponse.REJECT
-        accept = self._spec.accept
-        if accept is None:
+        if self._accept is None:
             return GoalResponse.ACCEPT
-        answers: list[Any] = []
-        await self._ask(accept, goal, answers)
-        if not answers:
-            # It raised.
+        answer = await self._accept.complete(goal)
+        if answer is FAILED:
             return GoalResponse.REJECT
-        answer = answers[0]
         if answer is False or isinstance(answer, str):
             reason = f': {answer}' if answer else ''
-            self._live.behaviour_node.logger.info(f'{self._owner} refused a goal{reason}')
+            self._live_node.ros.get_logger().info(f'{self._owner} refused a goal{reason}')
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
-
-    async def _ask(self, accept: BehaviourSpec, goal: Any, answers: list[Any]) -> None:
-        function = self._live.function(accept)
-        call = self._live.call(
-            replace(self._owner, key='accept'),
-            accept.path,
-            partial(function, self._live.behaviour_node, **accept.arguments),
-            rules=self._spec,
-            admits=self._live.gate.lets_requests,
-        ).delivering(answers.append)
-        if kind_of(function) is FunctionKind.COROUTINE:
-            await call.as_callback(FunctionKind.COROUTINE)(goal)
-        else:
-            call.run(goal)
 
     def _cancel(self, goal: Any) -> CancelResponse:
         if self._queue.take_out(goal):
@@ -164,69 +145,56 @@ def _start(goal: Any) -> None:
 
 
 class _Execution:
-    """Runs the behaviour of an action for one goal after another."""
+    """Runs the behaviour of an action for one goal after another.
+
+    Attributes:
+        is_async: Whether the behaviour waits in coroutines.
+    """
 
     def __init__(self, node: LiveNode, spec: ActionSpec, queue: GoalQueue) -> None:
         action_class: Any = import_interface(spec.type)
-        behaviour = node.function(spec.behaviour)
         self._node = node
         self._queue = queue
         self._begin = node.bind(spec.behaviour)
-        self._kind = kind_of(behaviour)
         self._result_class = action_class.Result
-        self._feedback_class = action_class.Feedback
         self._to_result = converter_for(action_class.Result).convert
         self._to_feedback = converter_for(action_class.Feedback).convert
-        self.is_async = self._kind in (FunctionKind.COROUTINE, FunctionKind.ASYNC_GENERATOR)
-        drives = {
-            FunctionKind.GENERATOR: self._drive,
-            FunctionKind.ASYNC_GENERATOR: self._drive_async,
-            FunctionKind.COROUTINE: self._call_async,
-        }
-        self._goal_call = node.call(
-            Owner('action', spec.name),
-            spec.path,
-            drives.get(self._kind, self._call),
-            rules=spec,
+        run = {
+            FunctionKind.GENERATOR: self._run_generator,
+            FunctionKind.ASYNC_GENERATOR: self._run_async_generator,
+            FunctionKind.COROUTINE: self._run_coroutine,
+            FunctionKind.PLAIN: self._run_function,
+        }[kind_of(self._begin)]
+        self._call = node.call(
+            Owner('action', spec.name), spec.path, run, options=spec, deliver=return_result
         )
-        self.callback: Callable[[Any], Any] = (
-            self._execute_async if self.is_async else self._execute
-        )
+        self.is_async = self._call.is_async
 
-    def _execute(self, goal: Any) -> Any:
-        results: list[Any] = []
+    async def execute(self, goal: Any) -> Any:
+        """Return the result of a goal, which has its final state then."""
+        result = FAILED
         try:
             if not self._end_early(goal):
-                pace = Pace()
-                self._goal_call.delivering(results.append, pace).run(goal, pace)
-            return self._result_of(goal, results)
+                progress = Progress()
+                result = await self._call.with_progress(progress).complete(goal, progress)
+            if goal.is_active:
+                # Its behaviour raised.
+                goal.abort()
+            return self._result_class() if result is FAILED else result
         finally:
             self._queue.finished(goal)
 
-    async def _execute_async(self, goal: Any) -> Any:
-        results: list[Any] = []
-        try:
-            if not self._end_early(goal):
-                pace = Pace()
-                call = self._goal_call.delivering(results.append, pace)
-                await call.as_callback(FunctionKind.COROUTINE)(goal, pace)
-            return self._result_of(goal, results)
-        finally:
-            self._queue.finished(goal)
+    def is_ending(self) -> bool:
+        """Return whether goals are neither accepted nor continued."""
+        return self._node.system.stop.is_set or not self._node.gate.serves
 
-    def _result_of(self, goal: Any, results: list[Any]) -> Any:
-        if goal.is_active:
-            # Its behaviour raised.
-            goal.abort()
-        return results[0] if results else self._result_class()
-
-    def _call(self, goal: Any, _pace: Pace) -> Any:
+    def _run_function(self, goal: Any, _progress: Progress) -> Any:
         return self._succeed(goal, self._begin(goal.request))
 
-    async def _call_async(self, goal: Any, _pace: Pace) -> Any:
+    async def _run_coroutine(self, goal: Any, _progress: Progress) -> Any:
         return self._succeed(goal, await self._begin(goal.request))
 
-    def _drive(self, goal: Any, pace: Pace) -> Any:
+    def _run_generator(self, goal: Any, progress: Progress) -> Any:
         with closing(self._begin(goal.request)) as generator:
             while True:
                 try:
@@ -236,11 +204,11 @@ class _Execution:
                 if self._must_end(goal):
                     break
                 self._publish(goal, feedback)
-                pace.resumed()
+                progress.resume()
         self._end_early(goal)
         return self._result_class()
 
-    async def _drive_async(self, goal: Any, pace: Pace) -> Any:
+    async def _run_async_generator(self, goal: Any, progress: Progress) -> Any:
         # An async generator cannot return a value: what it yields last is the result.
         held: list[Any] = []
         async with aclosing(self._begin(goal.request)) as generator:
@@ -250,7 +218,7 @@ class _Execution:
                 for feedback in held:
                     self._publish(goal, feedback)
                 held = [item]
-                pace.resumed()
+                progress.resume()
             else:
                 return self._succeed(goal, held[0] if held else None)
         self._end_early(goal)
@@ -267,10 +235,6 @@ class _Execution:
 
     def _must_end(self, goal: Any) -> bool:
         return goal.is_cancel_requested or self.is_ending() or self._queue.is_superseded(goal)
-
-    def is_ending(self) -> bool:
-        """Return whether goals are neither accepted nor continued."""
-        return self._node.services.stop.is_set or not self._node.gate.serves
 
     def _end_early(self, goal: Any) -> bool:
         """Give a goal that may not go on its final state; return whether it was such a one."""

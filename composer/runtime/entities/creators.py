@@ -1,35 +1,38 @@
-"""The kinds of entity, in the order of their creation; to add a kind, add a file and a row."""
+"""The entities of a node are created, those that behaviours use before those that call behaviours.
+
+A new kind of entity is a file here and a row in `CREATORS`.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
-from composer.runtime.entities.action_clients import create_action_clients
-from composer.runtime.entities.actions import create_actions
-from composer.runtime.entities.parameters import create_parameters
-from composer.runtime.entities.publishers import create_publishers
-from composer.runtime.entities.service_clients import create_service_clients
-from composer.runtime.entities.services import create_services
-from composer.runtime.entities.subscriptions import create_subscriptions
-from composer.runtime.entities.timers import create_timers
+from composer.runtime.entities.action_clients import ActionClient
+from composer.runtime.entities.actions import create_action
+from composer.runtime.entities.parameters import declare_parameters
+from composer.runtime.entities.publishers import create_publisher
+from composer.runtime.entities.service_clients import ServiceClient
+from composer.runtime.entities.services import create_service
+from composer.runtime.entities.subscriptions import create_subscription
+from composer.runtime.entities.timers import create_timer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from composer.runtime.nodes.live_node import LiveNode
 
-# First come those that behaviours use, then those that call behaviours.
-ENTITY_KINDS: tuple[Callable[[LiveNode], None], ...] = (
-    create_parameters,
-    create_publishers,
-    create_service_clients,
-    create_action_clients,
-    create_services,
-    create_actions,
-    create_subscriptions,
-    create_timers,
-)
+# By section, in the order of creation: each takes the node and the record of one entity, and
+# returns what is kept of it in `LiveNode.entities`.
+CREATORS: dict[str, Callable[[LiveNode, Any], Any]] = {
+    'publishers': create_publisher,
+    'service_clients': ServiceClient,
+    'action_clients': ActionClient,
+    'services': create_service,
+    'actions': create_action,
+    'subscriptions': create_subscription,
+    'timers': create_timer,
+}
 
 
 def create_entities(node: LiveNode) -> None:
@@ -38,13 +41,15 @@ def create_entities(node: LiveNode) -> None:
     Raises:
         StartError: One of them cannot be created.
     """
-    for create in ENTITY_KINDS:
-        try:
-            create(node)
-        except ComposerError as error:
-            message = f"node '{node.spec.key}': {error}"
-            raise StartError(message, help=error.help) from error
-        except Exception as error:
-            # rclpy and the middleware raise many kinds; none of them may leave half a system.
-            message = f"node '{node.spec.key}': {type(error).__name__}: {error}"
-            raise StartError(message) from error
+    try:
+        declare_parameters(node)
+        for section, create in CREATORS.items():
+            for spec in getattr(node.spec, section).values():
+                node.entities[section][spec.name] = create(node, spec)
+    except ComposerError as error:
+        message = f"node '{node.spec.key}': {error}"
+        raise StartError(message, help=error.help) from error
+    except Exception as error:
+        # rclpy and the middleware raise many kinds; none of them may leave half a system.
+        message = f"node '{node.spec.key}': {type(error).__name__}: {error}"
+        raise StartError(message) from error

@@ -1,11 +1,9 @@
-"""Parameters: declared with descriptors, checked live, with a behaviour heard before a change."""
+"""Parameters: declared with descriptors; changes are checked, and a behaviour may refuse them."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import partial
-from time import sleep
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -17,23 +15,20 @@ from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 
 from composer.errors import StartError
-from composer.python_source.modules import FunctionKind
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
-from composer.runtime.behaviours.callables import kind_of
-from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.calls import FAILED, Owner, return_result
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from composer.language.specs import BehaviourSpec, ParameterSpec
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.ros_node import ComposedRosNode
 
 _FLOAT_MAX = 1.7976931348623157e308
-_POLL_SEC = 0.001
 
 
-def create_parameters(node: LiveNode) -> None:
+def declare_parameters(node: LiveNode) -> None:
     """Declare the node's parameters.
 
     Raises:
@@ -50,11 +45,11 @@ def create_parameters(node: LiveNode) -> None:
             message = f"parameter '{spec.name}' from {_origin(node.ros, spec.name)}: {reason}"
             raise StartError(message) from error
     if node.spec.on_parameters:
-        # rclpy asks the callback first that was added last, and a behaviour need not hear of what
-        # is refused anyway.
+        # rclpy calls the callback first that was added last, and a behaviour is not asked about
+        # what is refused anyway.
         node.ros.remove_on_set_parameters_callback(refusing)
-        hear = _BehaviourHearing(node, node.spec.on_parameters)
-        node.ros.add_on_set_parameters_callback(hear)
+        asking = _create_callback(node, node.spec.on_parameters)
+        node.ros.add_on_set_parameters_callback(asking)
         node.ros.add_on_set_parameters_callback(refusing)
 
 
@@ -126,35 +121,18 @@ def _refuse_unless_chosen(
     return SetParametersResult(successful=True)
 
 
-class _BehaviourHearing:
-    """Asks `on_parameters` whether a change is accepted."""
+def _create_callback(
+    node: LiveNode, spec: BehaviourSpec
+) -> Callable[[list[Parameter]], SetParametersResult]:
+    """Return what asks `on_parameters` whether changes are accepted."""
+    function = node.bind(spec, own_state=False)
+    call = node.call(Owner('on_parameters'), spec.path, function, deliver=return_result)
 
-    def __init__(self, node: LiveNode, spec: BehaviourSpec) -> None:
-        self._node = node
-        self._spec = spec
-        self._kind = kind_of(node.function(spec))
-
-    def __call__(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return the result that ROS gives to whoever asked for the change."""
-        new_values = {change.name: change.value for change in changes}
-        answers: list[Any] = []
-        function = partial(
-            self._node.function(self._spec), self._node.behaviour_node, **self._spec.arguments
-        )
-        call = self._node.call(Owner('on_parameters'), self._spec.path, function)
-        call = call.delivering(answers.append)
-        if self._kind is FunctionKind.COROUTINE:
-            self._await(call.as_callback(self._kind), new_values)
-        else:
-            call.run(new_values)
-        reason = answers[0] if answers else 'the behaviour that decides on it raised an error'
+    def ask(changes: list[Parameter]) -> SetParametersResult:
+        # rclpy wants the answer when this returns, so a coroutine is waited for.
+        reason = node.run_to_end(call, {change.name: change.value for change in changes})
+        if reason is FAILED:
+            reason = 'the behaviour that decides on it raised an error'
         return SetParametersResult(successful=reason is None, reason=str(reason or ''))
 
-    def _await(self, callback: Any, new_values: dict[str, Any]) -> None:
-        # rclpy wants the answer when this returns, on a thread that the executor may not have
-        # twice: so the coroutine is resumed here until it ends, not given to the executor.
-        coroutine = callback(new_values)
-        with suppress(StopIteration):
-            while True:
-                coroutine.send(None)
-                sleep(_POLL_SEC)
+    return ask

@@ -1,4 +1,4 @@
-"""Publishers."""
+"""Publishers: `node.publish`, and what behaviours return."""
 
 from __future__ import annotations
 
@@ -15,15 +15,10 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 
-def create_publishers(node: LiveNode) -> None:
-    """Create the node's publishers; behaviours reach them through `node.publish`."""
-    for spec in node.spec.publishers.values():
-        node.entities['publishers'][spec.name] = _create_publisher(node, spec)
-
-
-def _create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
+def create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
+    """Create a publisher; return what publishes a payload on it."""
     message_class = import_interface(spec.type)
-    profile = create_qos_profile(spec.qos, node.services.profiles)
+    profile = create_qos_profile(spec.qos, node.system.profiles)
     endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
     node.endpoints.append(endpoint)
     send = node.ros.create_publisher(

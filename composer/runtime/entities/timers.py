@@ -1,8 +1,9 @@
-"""Timers: functions called, generators resumed, or constants published at a fixed rate."""
+"""Timers: call functions, resume generators or publish constants at a fixed rate."""
 
 from __future__ import annotations
 
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
@@ -14,7 +15,7 @@ from composer.runtime.behaviours.calls import Owner
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Callable, Generator
+    from collections.abc import AsyncGenerator, Callable
 
     from rclpy.timer import Timer
 
@@ -24,31 +25,28 @@ if TYPE_CHECKING:
 _CLOCKS = {'steady': ClockType.STEADY_TIME, 'system': ClockType.SYSTEM_TIME}
 
 
-def create_timers(node: LiveNode) -> None:
-    """Create the node's timers; they tick once the node has started."""
-    for spec in node.spec.timers.values():
-        ticker = _Ticker(node, spec)
-        owner = Owner('timer', spec.name)
-        call = node.call(
-            owner,
-            spec.path,
-            ticker.function,
-            rules=spec,
-            publish=spec.publish,
-            admits=node.gate.lets_events,
-        )
-        if ticker.is_generator:
-            node.at_stop.append(ticker)
-        ticker.timer = node.ros.create_timer(
-            spec.period_sec,
-            call.as_callback(ticker.kind),
-            callback_group=node.group(spec.group),
-            clock=_create_clock(spec.clock),
-            # A period is counted from the start of the node, not from its creation.
-            autostart=False,
-        )
-        node.timers.append(ticker.timer)
-        node.follow(owner, ticker.timer)
+def create_timer(node: LiveNode, spec: TimerSpec) -> Timer:
+    """Create a timer; it ticks once the node has started."""
+    ticker = _Ticker(node, spec)
+    owner = Owner('timer', spec.name)
+    call = node.call(
+        owner,
+        spec.path,
+        ticker.function,
+        options=spec,
+        deliver=node.publish_to(spec.publish),
+        may_begin=node.gate.allows_events,
+    )
+    ticker.timer = node.ros.create_timer(
+        spec.period_sec,
+        call.run,
+        callback_group=node.group(spec.group),
+        clock=_create_clock(spec.clock),
+        # A period is counted from the start of the node, not from its creation.
+        autostart=False,
+    )
+    node.count_missed(owner, ticker.timer)
+    return ticker.timer
 
 
 def _create_clock(name: ClockName) -> Clock | None:
@@ -56,58 +54,47 @@ def _create_clock(name: ClockName) -> Clock | None:
 
 
 class _Ticker:
-    """What a timer does at each tick, as one function without arguments.
+    """What a timer does at each tick.
 
     Attributes:
-        is_generator: Whether it waits half-way between two ticks.
+        function: Does it; it takes no arguments.
     """
 
     timer: Timer
-    is_generator = False
 
     def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
-        self.kind = FunctionKind.PLAIN
+        self._node, self._spec = node, spec
         if spec.behaviour is None:
             publisher = node.spec.publishers[spec.publish or '']
             message = converter_for(import_interface(publisher.type)).convert(spec.message)
             self.function: Callable[[], Any] = lambda: message
             return
-        behaviour = node.function(spec.behaviour)
-        self._begin = node.bind(spec.behaviour)
-        kind = kind_of(behaviour)
-        self._node, self._spec = node, spec
-        self._generator: Generator[Any, Any, Any] | None = None
-        self._async_generator: AsyncGenerator[Any, Any] | None = None
-        self.is_generator = kind in (FunctionKind.GENERATOR, FunctionKind.ASYNC_GENERATOR)
-        # Ticks of a reentrant group overlap, which a generator cannot: it lets such a tick pass.
+        self._begin = self.function = node.bind(spec.behaviour)
+        # The generator that is suspended until the next tick, if there is one.
+        self._generator: Any = None
+        # Ticks of a reentrant group overlap, which a generator cannot: it skips such a tick.
         self._turn = threading.Lock()
-        if kind is FunctionKind.GENERATOR:
+        self._kind = kind_of(self._begin)
+        if self._kind is FunctionKind.GENERATOR:
             self.function = self._resume
-        elif kind is FunctionKind.ASYNC_GENERATOR:
-            self.kind = FunctionKind.COROUTINE
+        elif self._kind is FunctionKind.ASYNC_GENERATOR:
             self.function = self._resume_async
         else:
-            self.kind = kind
-            self.function = self._begin
+            return
+        node.suspended.append(self)
 
     def close(self, timeout_sec: float) -> None:
-        """See `AtStop`: what the generator has in `finally:` runs."""
+        """See `Suspended`: what the generator has in `finally:` runs."""
         if not self._turn.acquire(timeout=timeout_sec):
-            # It is not waiting but hanging, and is reported for that.
+            # It is not suspended but hangs, and is reported for that.
             return
-        owner, path = Owner('timer', self._spec.name), self._spec.path
         generator, self._generator = self._generator, None
-        if generator is not None:
-            self._node.reported_call(owner, path, generator.close).run()
-        async_generator, self._async_generator = self._async_generator, None
-        if async_generator is not None:
-            done = threading.Event()
-            call = self._node.reported_call(owner, path, async_generator.aclose)
-            task = self._node.services.executor.create_task(
-                call.as_callback(FunctionKind.COROUTINE)
-            )
-            task.add_done_callback(lambda _task: done.set())
-            done.wait(timeout_sec)
+        if generator is None:
+            return
+        is_async = self._kind is FunctionKind.ASYNC_GENERATOR
+        close = partial(_close_async, generator) if is_async else generator.close
+        call = self._node.reported_call(Owner('timer', self._spec.name), self._spec.path, close)
+        self._node.run_to_end(call, timeout_sec=timeout_sec)
 
     def _resume(self) -> Any:
         if not self._turn.acquire(blocking=False):
@@ -130,14 +117,18 @@ class _Ticker:
         if not self._turn.acquire(blocking=False):
             return None
         try:
-            if self._async_generator is None:
-                self._async_generator = self._begin()
-            return await anext(self._async_generator)
+            if self._generator is None:
+                self._generator = self._begin()
+            return await anext(self._generator)
         except StopAsyncIteration:
             self.timer.cancel()
             return None
         except BaseException:
-            self._async_generator = None
+            self._generator = None
             raise
         finally:
             self._turn.release()
+
+
+async def _close_async(generator: AsyncGenerator[Any, Any]) -> None:
+    await generator.aclose()

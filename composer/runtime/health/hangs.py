@@ -16,7 +16,7 @@ from composer.runtime.health.watcher import Watcher
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from composer.runtime.behaviours.calls import CallLedger, Owner
+    from composer.runtime.behaviours.calls import Owner, RunningCalls
     from composer.runtime.behaviours.error_reports import ErrorReporter
 
 _CHECKS_PER_LIMIT = 4
@@ -53,7 +53,7 @@ class HangLimit:
         ran_sec = (monotonic_ns() - call.since_ns) * 1e-9
         return self.after_sec is not None and ran_sec >= self.after_sec
 
-    def check(self, ledger: CallLedger, token: int, call: RunningCall) -> None:
+    def check(self, running: RunningCalls, token: int, call: RunningCall) -> None:
         """Report a call that has been running for too long; each is reported once."""
         reported_ns = self._reported.get(token)
         if reported_ns is not None:
@@ -76,7 +76,7 @@ class HangLimit:
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
             f'it is at\n{call.format_stack()}'
         )
-        ledger.hear_end(token, lambda: self._report_end(token, 'returned', monotonic_ns()))
+        running.on_end(token, lambda: self._report_end(token, 'returned', monotonic_ns()))
 
     def _report_end(self, token: int, what: str, now_ns: int) -> None:
         reported_ns = self._reported.pop(token, None)
@@ -93,7 +93,7 @@ class WatchedNode(Protocol):
     """
 
     @property
-    def ledger(self) -> CallLedger: ...  # noqa: D102
+    def running(self) -> RunningCalls: ...  # noqa: D102
 
     @property
     def limits(self) -> Mapping[Owner, HangLimit]: ...  # noqa: D102
@@ -120,7 +120,7 @@ class HangWatcher(Watcher):
 
     def _check_calls(self) -> None:
         for node in self._nodes():
-            for token, entry in list(node.ledger.entries.items()):
+            for token, entry in list(node.running.entries.items()):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
-                    limit.check(node.ledger, token, RunningCall(*entry))
+                    limit.check(node.running, token, RunningCall(*entry))
             node.errors.flush_old()

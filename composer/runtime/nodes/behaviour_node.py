@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from composer.entity_kinds import KIND_OF_SECTION
 from composer.errors import ComposerError
-from composer.names import did_you_mean
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -59,7 +59,7 @@ class Parameters(Mapping[str, Any]):
         """Return a parameter's value: a bool, int, float, str or a list of these."""
         if not self._ros.has_parameter(name):
             message = f"node '{self._ros.get_name()}' has no parameter '{name}'"
-            raise UndeclaredParameterError(message, help=did_you_mean(name, self, 'it has'))
+            raise UndeclaredParameterError(message, help=suggest(name, self, 'it has'))
         value = self._ros.get_parameter_or(name).value
         return value.tolist() if hasattr(value, 'tolist') else value
 
@@ -231,5 +231,5 @@ class Node:
         entity = entities.get(name)
         if entity is None:
             message = f"node '{self.name}' declares no {KIND_OF_SECTION[section].noun} '{name}'"
-            raise UndeclaredError(message, help=did_you_mean(name, entities, 'it declares'))
+            raise UndeclaredError(message, help=suggest(name, entities, 'it declares'))
         return entity

@@ -1,8 +1,8 @@
-"""Callback groups with a gate: entities of a closed group are not run, their messages wait.
+"""Callback groups with a gate: while it is closed, no callback runs and messages wait.
 
-The gate is closed until all nodes have started, and closed again when the system stops. Services
-answer for longer, so that an `on_start` or `on_stop` can call those of other nodes.
-An executor asks a group before it takes an event for it, so nothing is lost at a closed gate.
+The gate is closed until all nodes have started, and again when the system stops. Services answer
+for longer, so that an `on_start` or `on_stop` can call those of other nodes.
+The executor asks a group before it takes a message, so nothing is lost at a closed gate.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Gate:
     """Whether the behaviours of a node may run.
 
     Attributes:
-        is_open: All of them: when all nodes have started, until a stop is requested.
-        serves: Those of services and actions: from the end of the node's own `on_start` until
-            its `on_stop`.
+        is_open: Whether all of them may: from the start of all nodes to the request to stop.
+        serves: Whether those of services and actions may: from the end of the node's own
+            `on_start` to its `on_stop`.
     """
 
     __slots__ = ('is_open', 'serves')
@@ -39,28 +39,28 @@ class Gate:
         self.is_open = True
 
     def close(self) -> None:
-        """Let no behaviour begin."""
+        """Let no behaviour begin from now on."""
         self.is_open = False
         self.serves = False
 
-    def lets(self, entity: Any) -> bool:
+    def allows(self, entity: Any) -> bool:
         """Return whether the callback of an entity may begin."""
         return self.is_open or (self.serves and isinstance(entity, (Service, ActionServer)))
 
-    def lets_events(self) -> bool:
-        """Return whether behaviours that answer nobody may begin."""
+    def allows_events(self) -> bool:
+        """Return whether behaviours of subscriptions, timers and the like may begin."""
         return self.is_open
 
-    def lets_requests(self) -> bool:
-        """Return whether behaviours that answer requests may begin."""
+    def allows_requests(self) -> bool:
+        """Return whether behaviours of services and actions may begin."""
         return self.serves
 
 
 class _GatedGroup(CallbackGroup):
-    """Asks its gate before it asks the kind of group that it is mixed with.
+    """Asks its gate first, then the kind of group that it is mixed with.
 
     Attributes:
-        wakes_executor: Tells the executor that it is woken when a gate opens, and need not ask.
+        wakes_executor: Tells the executor that it is woken when a gate opens, and need not poll.
     """
 
     wakes_executor = True
@@ -71,11 +71,11 @@ class _GatedGroup(CallbackGroup):
 
     def can_execute(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.lets(entity) and bool(super().can_execute(entity))
+        return self._gate.allows(entity) and bool(super().can_execute(entity))
 
     def beginning_execution(self, entity: Any) -> bool:
         """See the base class."""
-        return self._gate.lets(entity) and bool(super().beginning_execution(entity))
+        return self._gate.allows(entity) and bool(super().beginning_execution(entity))
 
 
 class GatedMutuallyExclusiveGroup(_GatedGroup, MutuallyExclusiveCallbackGroup):

@@ -13,7 +13,7 @@ from composer.runtime.behaviours.waits import stopping_error
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
+    from composer.runtime.behaviours.waits import Waits
 
 _STATUS_NAMES = {
     GoalStatus.STATUS_UNKNOWN: 'unknown',
@@ -33,14 +33,13 @@ class Goal:
     """A goal that a server has accepted.
 
     Attributes:
-        heard: The feedback that has come, then `None` when the goal has ended.
+        feedback_queue: The feedback that has come, then `None` when the goal has ended.
     """
 
-    def __init__(self, name: str, waits: ThreadWaits, coroutine_waits: CoroutineWaits) -> None:
-        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    def __init__(self, name: str, waits: Waits) -> None:
+        self.feedback_queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._name = name
         self._waits = waits
-        self._coroutine_waits = coroutine_waits
         self._handle: Any = None
         self.result_future: Any = None
 
@@ -51,7 +50,7 @@ class Goal:
 
     @property
     def status(self) -> str:
-        """How the goal is: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
+        """The state of the goal: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
         if self.result_future.done():
             return _STATUS_NAMES[self.result_future.result().status]
         return 'executing'
@@ -65,12 +64,12 @@ class Goal:
         """
         while (message := self._next_feedback()) is not None:
             yield message
-        self.heard.put(None)
+        self.feedback_queue.put(None)
 
     def _next_feedback(self) -> Any:
-        waking = self._waits.stop.waking(lambda: self.heard.put(_STOPPED))
+        waking = self._waits.stop.waking(lambda: self.feedback_queue.put(_STOPPED))
         with waking, self._waits.make_room():
-            message = self.heard.get()
+            message = self.feedback_queue.get()
         if message is _STOPPED:
             raise stopping_error()
         return message
@@ -101,5 +100,5 @@ class Goal:
 
     async def result_async(self) -> Any:
         """As `result`, without holding a thread while it waits."""
-        await self._coroutine_waits.until_done(self.result_future, None)
+        await self._waits.until_done_async(self.result_future, None)
         return self.result_future.result().result

@@ -1,8 +1,9 @@
-"""A node while it lives: the rclpy node, its entities, and what they share."""
+"""A running node: the rclpy node, its entities, and what these share."""
 
 from __future__ import annotations
 
 import copy
+import threading
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,9 +16,15 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
-from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, Owner
+from composer.runtime.behaviours.calls import (
+    FAILED,
+    BehaviourCall,
+    Owner,
+    RunningCalls,
+    discard_result,
+)
 from composer.runtime.behaviours.error_reports import ErrorReporter
-from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
+from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
@@ -33,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rclpy.callback_groups import CallbackGroup
-    from rclpy.timer import Timer
+    from rclpy.task import Future
 
     from composer.language.specs import BehaviourSpec, NodeSpec, OnError
     from composer.runtime.health.statistics import EntityHealth
@@ -42,14 +49,14 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-class AtStop(Protocol):
-    """A behaviour that has begun, and waits half-way for its next turn."""
+class Suspended(Protocol):
+    """A behaviour that has begun, and is suspended until its next turn."""
 
     def close(self, timeout_sec: float) -> None:
-        """Let it end; what it raises is reported."""
+        """End it; what it raises is reported."""
 
 
-class Rules(Protocol):
+class BehaviourOptions(Protocol):
     """What the file says about the behaviours of an entity, or of a node."""
 
     @property
@@ -66,38 +73,41 @@ class LiveNode:
     """A node with what its entities share.
 
     Attributes:
+        entities: Its entities as behaviours use them, by section and name.
         gate: Closed until the node has started, and when it stops.
-        entities: What behaviours use by name, by the section of its kind.
-        has_begun: Whether its turn to start has come, so that `on_stop` has something to stop.
-        waits: How its plain functions wait; `coroutine_waits` is for coroutines.
-        background: A group that no behaviour is in: responses and the like are always taken.
-        serving: The group of requests to action servers.
+        has_begun: Whether `on_start` has been called, so that `on_stop` has something to stop.
+        waits: How its behaviours wait.
+        background: A callback group without behaviours: its responses are always taken.
+        serving: The callback group of requests to action servers.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
-        at_stop: Behaviours that wait half-way, to be ended before `on_stop`.
+        suspended: Behaviours that are ended before `on_stop`.
         limits: How long behaviours may run, by their owners.
     """
 
     spec: NodeSpec
-    services: SystemHandle
+    system: SystemHandle
     ros: ComposedRosNode
     behaviour_node: Node
     errors: ErrorReporter
     entities: dict[str, dict[str, Any]]
-    waits: ThreadWaits
-    coroutine_waits: CoroutineWaits
+    waits: Waits
     background: CallbackGroup
     gate: Gate
     serving: CallbackGroup
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
-    at_stop: list[AtStop] = field(default_factory=list)
+    suspended: list[Suspended] = field(default_factory=list)
     limits: dict[Owner, HangLimit] = field(default_factory=dict)
-    timers: list[Timer] = field(default_factory=list)
-    ledger: CallLedger = field(default_factory=CallLedger)
+    running: RunningCalls = field(default_factory=RunningCalls)
     has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _is_destroyed: bool = False
+
+    @property
+    def full_name(self) -> str:
+        """The node's name with its namespace."""
+        return str(self.ros.get_fully_qualified_name())
 
     def group(self, name: str | None) -> CallbackGroup:
         """Return the callback group of this name; `None` is the node's own."""
@@ -107,31 +117,19 @@ class LiveNode:
             self._groups[key] = kind(self.gate)
         return self._groups[key]
 
-    def function(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
-        """Return a behaviour as a function of its positional arguments."""
-        return self.services.functions[behaviour.name]
+    def place(self, path: DataPath) -> str:
+        """Return `file:line` of a place in the file."""
+        span = self.system.positions.key(path)
+        return f'{span.source.name}:{span.line}'
 
-    def bind(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
-        """Return the function of a behaviour with the node and its constant arguments given."""
-        return partial(
-            self.function(behaviour), self.behaviour_node.with_own_state(), **behaviour.arguments
-        )
+    def bind(self, behaviour: BehaviourSpec, *, own_state: bool = True) -> Callable[..., Any]:
+        """Return the function of a behaviour with the node and its constant arguments given.
 
-    def health(self, owner: Owner) -> EntityHealth | None:
-        """Return the health of an entity in words, `None` if it is not measured."""
-        board = self.services.health
-        return None if board is None else board.entity(self.full_name, owner)
-
-    def follow(self, owner: Owner, entity: Any) -> None:
-        """Let the health of an entity in words tell what its ROS entity has missed."""
-        health = self.health(owner)
-        if health is not None:
-            health.follow(partial(self.services.executor.missed_counts, self.ros, entity))
-
-    @property
-    def full_name(self) -> str:
-        """The node's name with its namespace."""
-        return str(self.ros.get_fully_qualified_name())
+        Args:
+            own_state: Whether it has an `own_state`, which none of the node's others has.
+        """
+        node = self.behaviour_node.with_own_state() if own_state else self.behaviour_node
+        return partial(self.system.functions[behaviour.name], node, **behaviour.arguments)
 
     def call(
         self,
@@ -139,22 +137,22 @@ class LiveNode:
         path: DataPath,
         function: Callable[..., Any],
         *,
-        rules: Rules | None = None,
-        publish: str | None = None,
-        admits: Callable[[], bool] | None = None,
+        options: BehaviourOptions | None = None,
+        deliver: Callable[[Any], Any] = discard_result,
+        may_begin: Callable[[], bool] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of a function that an entity is bound to.
+        """Return the call of a function that an entity is bound to.
 
         Args:
             path: Its place in the file.
-            rules: Those of the entity, if it has its own.
-            publish: The publisher that takes what the function returns.
-            admits: See `BehaviourCall`.
+            options: Those of the entity, if it has its own.
+            deliver: Takes what the function returns.
+            may_begin: See `BehaviourCall`.
         """
         place = self.place(path)
-        own = rules or self.spec
+        own = options or self.spec
         self._limit(owner, place, own)
-        health = self.health(owner)
+        health = self._health(owner)
 
         def failed(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
@@ -162,31 +160,17 @@ class LiveNode:
             if health is not None:
                 health.note_error(error)
             self.errors.report(owner, place, error)
-            self.services.act_on_error(self.spec.full_name, own.on_error)
+            self.system.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
             owner,
             function,
-            self.ledger,
-            deliver=self._delivery(publish),
+            self.running,
+            deliver=deliver,
             failed=failed,
             add_time=None if health is None else health.times.add,
-            admits=admits,
+            may_begin=may_begin,
         )
-
-    def hook(
-        self,
-        owner: Owner,
-        behaviour: BehaviourSpec,
-        failed: Callable[[BaseException], None] | None = None,
-    ) -> BehaviourCall:
-        """Return the wrapped call of `on_start` or `on_stop`, which takes the node alone.
-
-        Args:
-            failed: Takes what it raised, after that has been reported.
-        """
-        function = partial(self.function(behaviour), **behaviour.arguments)
-        return self.reported_call(owner, behaviour.path, function, failed)
 
     def reported_call(
         self,
@@ -195,9 +179,12 @@ class LiveNode:
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
     ) -> BehaviourCall:
-        """Return the wrapped call of a function whose errors are reported, and no more.
+        """Return the call of a function whose errors are reported, and no more.
 
         At the start and the end of a node `on_error` does not count.
+
+        Args:
+            failed: Takes what it raised, after that has been reported.
         """
         place = self.place(path)
         self._limit(owner, place, self.spec)
@@ -209,12 +196,53 @@ class LiveNode:
             if failed is not None:
                 failed(error)
 
-        return BehaviourCall(owner, function, self.ledger, deliver=_discard, failed=report)
+        return BehaviourCall(owner, function, self.running, deliver=discard_result, failed=report)
 
-    def place(self, path: DataPath) -> str:
-        """Return `file:line` of a place in the file."""
-        span = self.services.positions.key(path)
-        return f'{span.source.name}:{span.line}'
+    def begin(self, call: BehaviourCall, *arguments: Any) -> tuple[Future, threading.Event]:
+        """Run a behaviour in the executor.
+
+        Returns:
+            The future of what `call.run` returns, and an event that is set when it is done.
+        """
+        ended = threading.Event()
+        task = self.system.executor.create_task(call.run, *arguments)
+        task.add_done_callback(lambda _task: ended.set())
+        return task, ended
+
+    def run_to_end(
+        self, call: BehaviourCall, *arguments: Any, timeout_sec: float | None = None
+    ) -> Any:
+        """Run a behaviour here, or in the executor if it is a coroutine, and wait for its end.
+
+        Args:
+            timeout_sec: How long to wait for a coroutine; `None` for no limit.
+
+        Returns:
+            What `call.run` returns; `FAILED` for a coroutine that did not end in time.
+        """
+        if not call.is_async:
+            return call.run(*arguments)
+        task, ended = self.begin(call, *arguments)
+        with self.waits.make_room():
+            return task.result() if ended.wait(timeout_sec) else FAILED
+
+    def publish_to(self, publisher: str | None) -> Callable[[Any], None]:
+        """Return what publishes results on a publisher, but for `None`; without one, nothing."""
+        if publisher is None:
+            return discard_result
+        publish = self.entities['publishers'][publisher]
+
+        def publish_result(payload: Any) -> None:
+            if payload is not None:
+                publish(payload)
+
+        return publish_result
+
+    def count_missed(self, owner: Owner, entity: Any) -> None:
+        """Let the health of an entity, in words, tell what its ROS entity has missed."""
+        health = self._health(owner)
+        if health is not None:
+            health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
@@ -229,50 +257,39 @@ class LiveNode:
         release(self.ros)
         self.ros.destroy_node()
 
-    def _limit(self, owner: Owner, place: str, rules: Rules) -> None:
+    def _health(self, owner: Owner) -> EntityHealth | None:
+        """Return the health of an entity in words, `None` if it is not measured."""
+        board = self.system.health
+        return None if board is None else board.entity(self.full_name, owner)
+
+    def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
         if owner not in self.limits:
             warn = self.ros.get_logger().warning
-            self.limits[owner] = HangLimit(owner, place, rules.warn_after_sec, warn)
-
-    def _delivery(self, publish: str | None) -> Callable[[Any], None]:
-        if publish is None:
-            return _discard
-        send = self.entities['publishers'][publish]
-
-        def deliver(payload: Any) -> None:
-            if payload is not None:
-                send(payload)
-
-        return deliver
+            self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
 
-def create_live_node(spec: NodeSpec, services: SystemHandle) -> LiveNode:
+def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
-    ros = ComposedRosNode(spec, services.context, services.ros_arguments)
+    ros = ComposedRosNode(spec, system.context, system.ros_arguments)
     reserve(ros, 'the node', 'destroy_node')
     entities: dict[str, dict[str, Any]] = {kind.section: {} for kind in ENTITY_KINDS}
     background = ReentrantCallbackGroup()
     gate = Gate()
-    waits = ThreadWaits(services.executor.waiting, services.stop)
+    waits = Waits(system.executor, system.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
     remote_parameters = RemoteParameters(
-        ros, spec.namespace, waits, background, services.without_parameter_services
+        ros, spec.namespace, waits, background, system.without_parameter_services
     )
     return LiveNode(
         spec,
-        services,
+        system,
         ros,
-        behaviour_node=Node(ros, state, entities, remote_parameters, services.shutdown),
+        behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
         errors=ErrorReporter(ros.get_logger().error),
         entities=entities,
         waits=waits,
-        coroutine_waits=CoroutineWaits(services.executor, waits),
         background=background,
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),
     )
-
-
-def _discard(_result: Any) -> None:
-    """Take a result that goes nowhere."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import monotonic
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.srv import GetParameters, SetParameters
@@ -14,14 +14,16 @@ from composer.errors import (
     ServiceNotAvailableError,
 )
 from composer.names import join_names
+from composer.runtime.behaviours.requests import Requests
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
     from rclpy.callback_groups import CallbackGroup
+    from rclpy.client import Client
     from rclpy.node import Node
 
-    from composer.runtime.behaviours.waits import ThreadWaits
+    from composer.runtime.behaviours.waits import Waits
 
 
 class RemoteParameters:
@@ -38,7 +40,7 @@ class RemoteParameters:
         self,
         ros: Node,
         namespace: str,
-        waits: ThreadWaits,
+        waits: Waits,
         group: CallbackGroup,
         without_services: Collection[str],
     ) -> None:
@@ -47,7 +49,7 @@ class RemoteParameters:
         self._waits = waits
         self._group = group
         self._without_services = without_services
-        self._clients: dict[str, Any] = {}
+        self._clients: dict[str, tuple[Client, Requests]] = {}
 
     def set(self, node_name: str, values: Mapping[str, Any], timeout_sec: float | None) -> None:
         """Set parameters of a node.
@@ -100,27 +102,32 @@ class RemoteParameters:
             message = f"node '{full_name}' has no parameter services"
             advice = "write 'parameter_services: true' where the file declares it"
             raise ServiceNotAvailableError(message, help=advice)
-        client = self._client(kind, join_names(full_name, service))
-        begun = monotonic()
-        waits = self._waits
-        if not waits.until_true(client.service_is_ready, timeout_sec):
-            message = f"no node '{full_name}' with parameter services appeared in time"
-            raise ServiceNotAvailableError(message)
-        future = client.call_async(request)
-        left = None if timeout_sec is None else max(begun + timeout_sec - monotonic(), 0.0)
-        try:
-            if not waits.until_done(future, left):
-                message = f"node '{full_name}' did not answer in time"
-                raise CallTimeoutError(message)
-        finally:
-            if not future.done():
-                client.remove_pending_request(future)
-        return future.result()
-
-    def _client(self, kind: Any, service: str) -> Any:
+        service_name = join_names(full_name, service)
         # A client is kept: to make one and find its server takes longer than the call.
-        if service not in self._clients:
-            self._clients[service] = self._ros.create_client(
-                kind, service, callback_group=self._group
+        if service_name not in self._clients:
+            self._clients[service_name] = self._create_client(kind, service_name, full_name)
+        client, requests = self._clients[service_name]
+        return requests.send(partial(client.call_async, request), timeout_sec)
+
+    def _create_client(
+        self, kind: Any, service_name: str, full_name: str
+    ) -> tuple[Client, Requests]:
+        def unavailable(timeout_sec: float) -> ServiceNotAvailableError:
+            message = (
+                f"no node '{full_name}' with parameter services appeared within {timeout_sec:g} s"
             )
-        return self._clients[service]
+            return ServiceNotAvailableError(message)
+
+        def unanswered(timeout_sec: float, _begun: float) -> CallTimeoutError:
+            message = f"node '{full_name}' did not answer within {timeout_sec:g} s"
+            return CallTimeoutError(message)
+
+        client = self._ros.create_client(kind, service_name, callback_group=self._group)
+        requests = Requests(
+            self._waits,
+            client.service_is_ready,
+            unavailable,
+            unanswered,
+            client.remove_pending_request,
+        )
+        return client, requests

@@ -29,7 +29,7 @@ def check(write: WriteDefinitions, **packages: Mapping[str, str]) -> list[Diagno
             'geometry_msg/Point',
             'unknown-package',
             "there is no interface package 'geometry_msg'",
-            'did you mean geometry_msgs/Point?',
+            "did you mean 'geometry_msgs/Point'?",
         ),
         (
             'qqq/Point',
@@ -41,27 +41,32 @@ def check(write: WriteDefinitions, **packages: Mapping[str, str]) -> list[Diagno
             'geometry_msgs/Pont[]',
             'unknown-type',
             "geometry_msgs has no message 'Pont'",
-            'did you mean geometry_msgs/Point?',
+            "did you mean 'geometry_msgs/Point'?",
         ),
         (
             'Header',
             'unknown-type',
             "there is no type 'Header': robots has no such message",
-            'did you mean std_msgs/Header?',
+            "did you mean 'std_msgs/Header'?",
         ),
         (
             'Pose',
             'unknown-type',
             "there is no type 'Pose': robots has no such message",
-            'did you mean geometry_msgs/Pose?',
+            "did you mean 'geometry_msgs/Pose'?",
         ),
         (
             'Robto',
             'unknown-type',
             "there is no type 'Robto': robots has no such message",
-            'did you mean Robot?',
+            "did you mean 'Robot'?",
         ),
-        ('other/Thin', 'unknown-type', "other has no message 'Thin'", 'did you mean other/Thing?'),
+        (
+            'other/Thin',
+            'unknown-type',
+            "other has no message 'Thin'",
+            "did you mean 'other/Thing'?",
+        ),
     ],
 )
 def test_an_unknown_message_has_a_suggestion(
@@ -153,8 +158,8 @@ def test_wrong_definitions_are_one_error_with_all_findings(
     assert [each.rule for each in caught.value.diagnostics] == ['unknown-type', 'unknown-package']
     assert str(caught.value) == (
         f"{folder}/msg/A.msg:1:1: error[unknown-type]: there is no type 'strng'\n"
-        '  help: did you mean string?\n'
+        "  help: did you mean 'string'?\n"
         f'{folder}/msg/B.msg:1:1: error[unknown-package]: '
         "there is no interface package 'std_mgs'\n"
-        '  help: did you mean std_msgs/Header?'
+        "  help: did you mean 'std_msgs/Header'?"
     )

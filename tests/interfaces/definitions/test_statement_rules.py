@@ -7,14 +7,14 @@ from composer.interfaces.definitions.statements import split_line
 pytestmark = pytest.mark.ros
 
 FAULTY = [
-    ('int a', 'unknown-type', 'int', 'did you mean int32?'),
-    ('strng a', 'unknown-type', 'strng', 'did you mean string?'),
-    ('time a', 'unknown-type', 'time', 'did you mean builtin_interfaces/Time?'),
+    ('int a', 'unknown-type', 'int', "did you mean 'int32'?"),
+    ('strng a', 'unknown-type', 'strng', "did you mean 'string'?"),
+    ('time a', 'unknown-type', 'time', "did you mean 'builtin_interfaces/Time'?"),
     (
         'geometry_msgs/msg/Pose p',
         'bad-type',
         'geometry_msgs/msg/Pose',
-        'did you mean geometry_msgs/Pose?',
+        "did you mean 'geometry_msgs/Pose'?",
     ),
     ('Geometry/Pose p', 'bad-type', 'Geometry/Pose', None),
     ('int32[0] a', 'bad-type', '[0]', None),
@@ -34,11 +34,11 @@ FAULTY = [
     ),
     ('string<=0 a', 'bad-type', '<=0', None),
     ('int32', 'missing-name', '', None),
-    ('int32 maxSpeed;', 'bad-name', 'maxSpeed;', 'did you mean max_speed?'),
-    ('int32 a__b', 'bad-name', 'a__b', 'did you mean a_b?'),
+    ('int32 maxSpeed;', 'bad-name', 'maxSpeed;', "did you mean 'max_speed'?"),
+    ('int32 a__b', 'bad-name', 'a__b', "did you mean 'a_b'?"),
     ('int32 class', 'bad-name', 'class', 'call it class_value, for example'),
     ('int32 lambda', 'bad-name', 'lambda', 'call it lambda_value, for example'),
-    ('int32 maxSpeed=3', 'bad-name', 'maxSpeed', 'did you mean MAX_SPEED?'),
+    ('int32 maxSpeed=3', 'bad-name', 'maxSpeed', "did you mean 'MAX_SPEED'?"),
     (
         'string text "a=b"',
         'bad-name',

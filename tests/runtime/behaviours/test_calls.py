@@ -1,4 +1,4 @@
-"""The ledger of running behaviours, and the calls that keep it."""
+"""Calls of behaviours, and which of them run."""
 
 import threading
 import time
@@ -7,32 +7,32 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, Owner
+from composer.runtime.behaviours.calls import FAILED, BehaviourCall, Owner, RunningCalls
 
 
-def call_of(function, ledger, deliver=lambda _: None, failed=lambda owner, error: None):
-    return BehaviourCall(Owner('timer', 'tick'), function, ledger, deliver=deliver, failed=failed)
+def call_of(function, running, deliver=lambda _: None, failed=lambda owner, error: None):
+    return BehaviourCall(Owner('timer', 'tick'), function, running, deliver=deliver, failed=failed)
 
 
 def test_a_running_call_tells_its_thread_its_begin_and_its_stack():
-    ledger = CallLedger()
+    running = RunningCalls()
     seen = []
     before = time.monotonic_ns()
 
     def look_around():
-        (call,) = ledger.running()
+        (call,) = running.calls()
         seen.append((call, call.format_stack()))
 
-    assert call_of(look_around, ledger).run()
+    assert call_of(look_around, running).run() is not FAILED
     ((call, stack),) = seen
     assert (call.owner, call.thread) == (Owner('timer', 'tick'), threading.get_ident())
     assert before <= call.begun_ns <= time.monotonic_ns()
     assert 'look_around' in stack
-    assert ledger.running() == []
+    assert running.calls() == []
 
 
 def test_a_running_coroutine_tells_where_it_waits():
-    ledger = CallLedger()
+    running = RunningCalls()
 
     class Pause:
         def __await__(self):
@@ -41,25 +41,25 @@ def test_a_running_coroutine_tells_where_it_waits():
     async def behaviour():
         await Pause()
 
-    coroutine = call_of(behaviour, ledger).as_callback()()
+    coroutine = call_of(behaviour, running).run()
     coroutine.send(None)
-    (call,) = ledger.running()
+    (call,) = running.calls()
     assert call.thread is None
     assert 'in behaviour' in call.format_stack()
     coroutine.close()
-    assert ledger.running() == []
+    assert running.calls() == []
 
 
 def test_a_call_that_raises_is_no_longer_running():
-    ledger, errors = CallLedger(), []
-    call = call_of(lambda: 1 / 0, ledger, failed=lambda owner, error: errors.append(error))
-    assert not call.run()
+    running, errors = RunningCalls(), []
+    call = call_of(lambda: 1 / 0, running, failed=lambda owner, error: errors.append(error))
+    assert call.run() is FAILED
     assert [type(error) for error in errors] == [ZeroDivisionError]
-    assert ledger.wait_until_idle(0.0)
+    assert running.wait_until_idle(0.0)
 
 
 def test_waiting_for_idleness_ends_with_the_last_call():
-    ledger = CallLedger()
+    running = RunningCalls()
     may_end = [threading.Event(), threading.Event()]
     begun = threading.Barrier(3)
 
@@ -68,21 +68,21 @@ def test_waiting_for_idleness_ends_with_the_last_call():
         event.wait(20.0)
 
     threads = [
-        threading.Thread(target=call_of(work, ledger).run, args=(event,)) for event in may_end
+        threading.Thread(target=call_of(work, running).run, args=(event,)) for event in may_end
     ]
     for thread in threads:
         thread.start()
     begun.wait(20.0)
     idle = []
     waiters = [
-        threading.Thread(target=lambda: idle.append(ledger.wait_until_idle(20.0)))
+        threading.Thread(target=lambda: idle.append(running.wait_until_idle(20.0)))
         for _ in range(2)
     ]
     for waiter in waiters:
         waiter.start()
     may_end[0].set()
     threads[0].join()
-    assert not ledger.wait_until_idle(0.0)
+    assert not running.wait_until_idle(0.0)
     assert idle == []
     may_end[1].set()
     for thread in (*threads, *waiters):
@@ -91,9 +91,9 @@ def test_waiting_for_idleness_ends_with_the_last_call():
 
 
 def test_what_is_still_to_be_done_is_awaited_but_does_not_run():
-    ledger = CallLedger()
-    token = ledger.begin()
-    assert ledger.running() == []
-    assert not ledger.wait_until_idle(0.0)
-    ledger.end(token)
-    assert ledger.wait_until_idle(0.0)
+    running = RunningCalls()
+    token = running.begin()
+    assert running.calls() == []
+    assert not running.wait_until_idle(0.0)
+    running.end(token)
+    assert running.wait_until_idle(0.0)

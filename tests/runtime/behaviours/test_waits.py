@@ -1,6 +1,7 @@
 """Waits of behaviours beside a stop of the system."""
 
 from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,7 +10,7 @@ pytest.importorskip('rclpy')
 from rclpy.task import Future
 
 from composer.errors import SystemStoppingError
-from composer.runtime.behaviours.waits import CoroutineWaits, ThreadWaits
+from composer.runtime.behaviours.waits import Waits
 from composer.runtime.stop_request import StopRequest
 
 pytestmark = pytest.mark.ros
@@ -17,7 +18,7 @@ pytestmark = pytest.mark.ros
 
 @pytest.fixture
 def waits():
-    return ThreadWaits(nullcontext, StopRequest())
+    return Waits(SimpleNamespace(waiting=nullcontext), StopRequest())
 
 
 def test_a_wait_without_an_end_does_not_begin_when_the_system_stops(waits):
@@ -29,7 +30,7 @@ def test_a_wait_without_an_end_does_not_begin_when_the_system_stops(waits):
 def test_nor_does_one_of_a_coroutine(waits):
     waits.stop.make()
     with pytest.raises(SystemStoppingError):
-        CoroutineWaits(None, waits).until_done(Future(), None).send(None)
+        waits.until_done_async(Future(), None).send(None)
 
 
 def test_one_with_an_end_does_for_what_must_be_switched_off(waits):

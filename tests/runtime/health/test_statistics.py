@@ -11,7 +11,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.validate_node_name import validate_node_name
 
 from composer.executor import MissedCounts
-from composer.runtime.behaviours.calls import BehaviourCall, CallLedger, Owner, RunningCall
+from composer.runtime.behaviours.calls import (
+    FAILED,
+    BehaviourCall,
+    Owner,
+    RunningCall,
+    RunningCalls,
+)
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.diagnostics_publisher import node_name
 from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry
@@ -149,14 +155,14 @@ def test_the_board_knows_the_oldest_call_of_each_entity():
 
 def measured_call(function, times, failed=lambda owner, error: None):
     return BehaviourCall(
-        'it', function, CallLedger(), deliver=lambda _: None, failed=failed, add_time=times.add
+        'it', function, RunningCalls(), deliver=lambda _: None, failed=failed, add_time=times.add
     )
 
 
 def test_calls_count_whether_they_raise_or_not():
     times = CallTimes()
-    assert measured_call(lambda: None, times).run()
-    assert not measured_call(lambda: 1 / 0, times).run()
+    assert measured_call(lambda: None, times).run() is not FAILED
+    assert measured_call(lambda: 1 / 0, times).run() is FAILED
     assert times.calls() == 2
 
 
@@ -170,7 +176,7 @@ def test_coroutines_are_measured_to_their_end():
     async def behaviour():
         await Pause()
 
-    coroutine = measured_call(behaviour, times).as_callback()()
+    coroutine = measured_call(behaviour, times).run()
     coroutine.send(None)
     assert times.calls() == 0
     with pytest.raises(StopIteration):

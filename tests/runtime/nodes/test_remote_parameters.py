@@ -110,7 +110,7 @@ def test_an_unknown_node_is_an_error(compose):
     child = compose(asking('change_and_tell', arguments), CODE)
 
     assert child.wait_for_line('Error').endswith(
-        "ServiceNotAvailableError: no node '/robot/nobody' with parameter services appeared in time"
+        "ServiceNotAvailableError: no node '/robot/nobody' with parameter services appeared within 0.2 s"
     )
 
 

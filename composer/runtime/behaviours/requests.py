@@ -1,0 +1,81 @@
+"""Requests to servers: of services, of actions, and of the parameters of other nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.task import Future
+
+    from composer.errors import ComposerError
+    from composer.runtime.behaviours.waits import Waits
+
+
+def _keep(_future: Future) -> None:
+    """Let an answer come that nobody waits for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requests:
+    """Sends requests to one server, each as soon as it is there, and waits for the answers.
+
+    Args:
+        is_available: Whether the server is there.
+        unavailable: Returns the error for a server that is not there after so many seconds.
+        unanswered: Returns the error for a request without an answer after so many seconds, and
+            since a time of `time.monotonic`.
+        forget: Takes the future of a request whose answer is no longer waited for.
+    """
+
+    waits: Waits
+    is_available: Callable[[], bool]
+    unavailable: Callable[[float], ComposerError]
+    unanswered: Callable[[float, float], ComposerError]
+    forget: Callable[[Future], None] = _keep
+
+    def send(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
+        """Send a request and return its answer.
+
+        Args:
+            send: Sends it.
+            timeout_sec: How long to wait for the server and its answer; `None` for no limit.
+
+        Raises:
+            ComposerError: There was no server or no answer in time.
+            SystemStoppingError: A stop was requested while it waited.
+        """
+        begun = monotonic()
+        if not self.waits.until_true(self.is_available, timeout_sec):
+            raise self.unavailable(timeout_sec or 0.0)
+        future = send()
+        try:
+            if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
+                raise self.unanswered(timeout_sec or 0.0, begun)
+        finally:
+            if not future.done():
+                self.forget(future)
+        return future.result()
+
+    async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
+        """As `send`, without holding a thread while it waits."""
+        begun = monotonic()
+        if not await self.waits.until_true_async(self.is_available, timeout_sec):
+            raise self.unavailable(timeout_sec or 0.0)
+        future = send()
+        try:
+            if not await self.waits.until_done_async(future, _remaining(timeout_sec, begun)):
+                raise self.unanswered(timeout_sec or 0.0, begun)
+        finally:
+            if not future.done():
+                self.forget(future)
+        return future.result()
+
+
+def _remaining(timeout_sec: float | None, begun: float) -> float | None:
+    if timeout_sec is None:
+        return None
+    return max(begun + timeout_sec - monotonic(), 0.0)

@@ -1,0 +1,116 @@
+"""The nearest right spelling of a wrong name, and the help that suggests it."""
+
+from __future__ import annotations
+
+import difflib
+import heapq
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# With more options, or longer ones, the search for the nearest would take seconds.
+_MOST_OPTIONS = 2000
+_LONGEST_WORD = 255
+_PRESELECTED = 100
+_LONGEST_COMPARED = 64
+# Of more options the help lists the first.
+_MOST_LISTED = 12
+
+
+def suggest(
+    word: object,
+    options: Iterable[object],
+    listed: str | None = None,
+    otherwise: str | None = None,
+) -> str | None:
+    """Return the help for a wrong name.
+
+    Args:
+        word: The wrong name; of what is no string, nothing is near.
+        options: The right names; what is no string is left out.
+        listed: What introduces a list of the options if none is near, as in `it has`.
+        otherwise: The help if no option is near and none is listed.
+    """
+    names = _strings(options)
+    near = find_nearest(word, names)
+    if near is None and listed and names:
+        shown = ', '.join(heapq.nsmallest(_MOST_LISTED, names))
+        otherwise = f'{listed}: {shown}' + (', …' if len(names) > _MOST_LISTED else '')
+    return did_you_mean(near, otherwise)
+
+
+def did_you_mean(meant: str | None, otherwise: str | None = None) -> str | None:
+    """Return the help that suggests a name; `otherwise` if there is none."""
+    return otherwise if meant is None else f"did you mean '{meant}'?"
+
+
+def find_nearest(word: object, options: Iterable[object]) -> str | None:
+    """Return the option that `word` was most likely meant to be, or `None`.
+
+    Among more than two thousand options, and for words longer than any name of ROS, there is no
+    search.
+    """
+    names = _strings(options)
+    if not isinstance(word, str) or len(word) > _LONGEST_WORD or len(names) > _MOST_OPTIONS:
+        return None
+    return _find_nearest(word.lower(), tuple(sorted(names)))
+
+
+def _strings(options: Iterable[object]) -> frozenset[str]:
+    return frozenset(option for option in options if isinstance(option, str))
+
+
+@lru_cache(maxsize=4096)
+def _find_nearest(word: str, choices: tuple[str, ...]) -> str | None:
+    lowered = _lower(choices)
+    if word in lowered:
+        return lowered[word]
+    close = difflib.get_close_matches(word, _preselect(word, lowered), n=5, cutoff=0.6)
+    if not close:
+        return None
+    # Of those that look alike, the one that takes the fewest edits; else the first.
+    return lowered[min(close, key=lambda option: count_edits(word, option))]
+
+
+def count_edits(word: str, other: str) -> int:
+    """Return how many edits make one word of another.
+
+    An edit adds, removes or replaces a letter, or swaps two (the distance of Damerau and
+    Levenshtein, in its restricted form). Of long words only the beginning counts.
+    """
+    word, other = word[:_LONGEST_COMPARED], other[:_LONGEST_COMPARED]
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for i, letter in enumerate(word):
+        above, before, row = before, row, [i + 1]
+        for j, wanted in enumerate(other):
+            cost = min(before[j + 1] + 1, row[j] + 1, before[j] + (letter != wanted))
+            if i and j and (letter, word[i - 1]) == (other[j - 1], wanted):
+                cost = min(cost, above[j - 1] + 1)
+            row.append(cost)
+    return row[-1]
+
+
+@lru_cache(maxsize=64)
+def _lower(choices: tuple[str, ...]) -> dict[str, str]:
+    return {choice.lower(): choice for choice in reversed(choices)}
+
+
+def _preselect(word: str, options: Iterable[str]) -> list[str]:
+    """Return the options to compare: of many, those that share most pairs of letters."""
+    short = [option for option in options if len(option) <= _LONGEST_WORD]
+    if len(short) <= _PRESELECTED:
+        return short
+    pairs = _pairs(word)
+    return heapq.nlargest(
+        _PRESELECTED,
+        short,
+        key=lambda option: len(pairs & _pairs(option)) / (len(word) + len(option)),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _pairs(word: str) -> frozenset[str]:
+    return frozenset(f' {word}'[i : i + 2] for i in range(len(word)))
