@@ -76,22 +76,8 @@ def with_waits(
     return entry | {'wait_for': [renamed(each) for each in written]}
 
 
-def parse_process(
-    outer_namespace: str | None,
-    defaults: dict[str, Any],
-    name: str,
-    data: dict[str, Any],
-    path: DataPath,
-) -> ProcessSpec:
-    """Return a process.
-
-    Args:
-        outer_namespace: That of the file's defaults, `None` if they have none.
-        defaults: The rest of them.
-    """
-    data = with_defaults(data, defaults)
-    if not takes_ros_arguments(data):
-        data = with_waits(data, {}, outer_namespace or '')
+def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpec:
+    """Return a process."""
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
     return ProcessSpec(
@@ -102,7 +88,7 @@ def parse_process(
         executable=data.get('executable'),
         arguments=tuple(map(format_scalar, data.get('arguments', ()))),
         node_name=data.get('name'),
-        namespace=_parse_namespace(outer_namespace, data),
+        namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         parameters=MappingProxyType(data.get('parameters', {})),
         parameter_files=tuple(data.get('parameter_files', ())),
         remap=tuple(data.get('remap', {}).items()),
@@ -139,9 +125,3 @@ def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
 
 def _kind_of(condition: dict[str, Any]) -> ConditionKind:
     return next(each for each in _CONDITION_KINDS if each in condition)
-
-
-def _parse_namespace(outer: str | None, data: dict[str, Any]) -> str | None:
-    if 'namespace' in data:
-        return expand_namespace(data['namespace'], outer or '/')
-    return outer if takes_ros_arguments(data) else None

@@ -132,7 +132,7 @@ def _create_callback(
         # rclpy wants the answer when this returns, so a coroutine is waited for.
         reason = node.run_to_end(call, {change.name: change.value for change in changes})
         if reason is FAILED:
-            reason = 'the behaviour that decides on it raised an error'
+            reason = 'on_parameters raised an error'
         return SetParametersResult(successful=reason is None, reason=str(reason or ''))
 
     return ask

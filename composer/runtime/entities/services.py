@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED, Owner
-from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.messages.payloads import converter_for
+from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import Owner, return_result
-from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.health.unmatched import TopicEndpoint
+from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
     from composer.language.specs import SubscriptionSpec

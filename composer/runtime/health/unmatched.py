@@ -13,10 +13,10 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.exceptions import InvalidHandle
 
 from composer.executor import checked_seldom
-from composer.language.qos import NANOSECONDS
-from composer.language.qos_conflicts import CONFLICTS, MATCHED_DURATIONS, find_qos_conflicts
+from composer.language.qos_conflicts import find_qos_conflicts
 from composer.language.specs import PublisherSpec
 from composer.runtime.health.watcher import Watcher
+from composer.runtime.messages.qos_profiles import read_policies
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 _PAUSE_SEC = 1.0
 # The graph may learn the name of an end some time after the event.
 _MOST_CHECKS = 10
-# Longer durations are no limit: rclpy's `Infinite`, and what is left to the middleware.
-_LONGEST_NS = 2**62
 _UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 
 
@@ -122,21 +120,10 @@ class TopicEndpoint:
         """Return why another end cannot match this one, `None` if it can."""
         if end.topic_type != self._spec.type:
             return f'its type is {end.topic_type} there, and {self._spec.type} here'
-        here, there = _read_policies(self._profile), _read_policies(end.qos_profile)
+        here, there = read_policies(self._profile), read_policies(end.qos_profile)
         offered, requested = (here, there) if self._publishes else (there, here)
         conflict = next(find_qos_conflicts(offered, requested), None)
         return None if conflict is None else conflict.describe_from(publisher=self._publishes)
-
-
-def _read_policies(profile: QoSProfile) -> dict[str, Any]:
-    """Return the policies of rclpy's profile that must match, as `resolve_qos` does."""
-    policies: dict[str, Any] = {name: getattr(profile, name).name.lower() for name in CONFLICTS}
-    for name in MATCHED_DURATIONS:
-        duration_ns = getattr(profile, name).nanoseconds
-        # 0 is no limit either.
-        if 0 < duration_ns < _LONGEST_NS:
-            policies[name] = duration_ns / NANOSECONDS
-    return policies
 
 
 class GraphWatcher(Watcher):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from composer.runtime.behaviours.tracebacks import format_fault
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Watcher:
             try:
                 self._check()
             except Exception as error:  # noqa: BLE001 - one error must not end the checks
-                self._report(format_fault(error))
+                self._report(format_internal_error(error))
 
     def _report(self, error: str) -> None:
         if error not in self._errors:

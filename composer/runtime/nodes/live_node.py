@@ -239,7 +239,7 @@ class LiveNode:
         return publish_result
 
     def count_missed(self, owner: Owner, entity: Any) -> None:
-        """Let the health of an entity, in words, tell what its ROS entity has missed."""
+        """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
             health.follow(partial(self.system.executor.missed_counts, self.ros, entity))

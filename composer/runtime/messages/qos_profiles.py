@@ -1,4 +1,4 @@
-"""QoS policies → rclpy's `QoSProfile`."""
+"""QoS policies ⇄ rclpy's `QoSProfile`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rclpy.qos import (
 )
 
 from composer.language.qos import INFINITE, NANOSECONDS, resolve_qos
+from composer.language.qos_conflicts import CONFLICTS, MATCHED_DURATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,6 +33,8 @@ _BEST_AVAILABLE = {
     'deadline': DeadlineBestAvailable,
     'liveliness_lease_duration': LivelinessLeaseDurationeBestAvailable,
 }
+# Longer durations are no limit: `Infinite`, and what is left to the middleware.
+_LONGEST_NS = 2**62
 
 
 def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSProfile:
@@ -42,6 +45,17 @@ def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSPro
     """
     policies = resolve_qos(spec, profiles)
     return QoSProfile(**{key: _convert(key, value) for key, value in policies.items()})
+
+
+def read_policies(profile: QoSProfile) -> dict[str, Any]:
+    """Return the policies of rclpy's profile that must match, as `resolve_qos` does."""
+    policies: dict[str, Any] = {name: getattr(profile, name).name.lower() for name in CONFLICTS}
+    for name in MATCHED_DURATIONS:
+        duration_ns = getattr(profile, name).nanoseconds
+        # 0 is no limit either.
+        if 0 < duration_ns < _LONGEST_NS:
+            policies[name] = duration_ns / NANOSECONDS
+    return policies
 
 
 def _convert(key: str, value: Any) -> Any:
