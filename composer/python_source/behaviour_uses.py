@@ -1,4 +1,4 @@
-"""What the behaviours of a node do with it, helpers of theirs included."""
+"""Read what behaviours do with their nodes, their helper functions included."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Span
+from composer.python_source.local_names import find_parameter
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import FunctionKind, ModuleSource
-from composer.python_source.uses import ALL_KINDS, NodeUses, find_parameter, read_node_uses
+from composer.python_source.node_use_reader import read_node_uses
+from composer.python_source.node_uses import USED_NOUNS, NodeUses
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,15 +18,15 @@ if TYPE_CHECKING:
     from composer.language.bindings import Binding
     from composer.python_source.module_finder import ModuleFinder
     from composer.python_source.modules import FunctionSource
-    from composer.python_source.uses import NodePass, NodeUse, UseKind
+    from composer.python_source.node_uses import NodePass, NodeUse
 
-# Helpers of helpers are followed so far; those that call themselves go deeper.
+# How deep helpers of helpers are followed: recursive ones have no end.
 _DEEPEST = 8
 
 
 @dataclass(frozen=True, slots=True)
 class FoundUse:
-    """A use of something of the node, and where it is written."""
+    """A use of an entity of the node, and where it is written."""
 
     use: NodeUse
     place: Span
@@ -35,19 +37,19 @@ class BehaviourUses:
     """All uses of a behaviour.
 
     Attributes:
-        open_kinds: Of what it may use more.
+        open_kinds: The kinds of which it may use more.
         reads_others: Whether it may read parameters of other nodes.
         reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
     """
 
     found: tuple[FoundUse, ...] = ()
-    open_kinds: frozenset[UseKind] = ALL_KINDS
+    open_kinds: frozenset[str] = USED_NOUNS
     reads_others: bool = True
     reaches_ros: bool = True
 
 
 _UNKNOWN = BehaviourUses()
-# Of a behaviour that is nowhere, which is a finding of its own.
+# Of a behaviour that does not exist, which another check reports.
 _MISSING = BehaviourUses(reaches_ros=False)
 
 
@@ -59,7 +61,7 @@ class UseReader:
         self._read: dict[tuple[object, ...], BehaviourUses] = {}
 
     def uses_of(self, binding: Binding) -> BehaviourUses:
-        """Return what a behaviour does with its node; all kinds are open if that is unknown."""
+        """Return what a behaviour does with its node; if that is unknown, all kinds are open."""
         module = self._modules.find(binding.behaviour.module)
         function = binding.behaviour.function
         return self._uses(module, function, 0, len(binding.parameters), ())
@@ -108,7 +110,7 @@ class UseReader:
             open_kinds |= inner.open_kinds
             reads_others |= inner.reads_others
             reaches_ros |= inner.reaches_ros
-        # Each once, or functions that call each other often would never be done.
+        # Each use once, or functions that call each other often would take forever.
         return BehaviourUses(tuple(dict.fromkeys(found)), open_kinds, reads_others, reaches_ros)
 
     def _is_coroutine(self, module: ModuleSource, name: str) -> bool:
@@ -122,7 +124,7 @@ def _read(
     """Return what a function does itself.
 
     Args:
-        given: How many of its positional parameters no file decides; of a helper only the node.
+        given: The number of its positional parameters whose values no file sets; 0 for a helper.
     """
     if source.definition is None:
         return NodeUses()

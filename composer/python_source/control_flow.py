@@ -1,11 +1,11 @@
-"""The way to each place of a function: what has to be so for it to be reached."""
+"""Walk the body of a function and track on which conditions each place is reached."""
 
 from __future__ import annotations
 
 import ast
 from typing import TYPE_CHECKING
 
-from composer.python_source.local_names import hangs_on, list_arguments
+from composer.python_source.local_names import depends_on_file, list_arguments
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -26,23 +26,23 @@ _CATCHING = {
 _JUMPS = (ast.Return, ast.Raise, ast.Continue, ast.Break)
 
 
-class WayReader(ast.NodeVisitor):
-    """Walks the body of a function, and keeps what is known of the way to the present place.
+class ControlFlowVisitor(ast.NodeVisitor):
+    """Walks the body of a function, and tracks the conditions of the current place.
 
     Args:
         node_name: The parameter that is the node.
         local: All names of the function itself.
-        chosen: Those of them whose values a file decides.
-        run: The functions inside that the function runs to their ends (`find_run`).
+        chosen: Those of them whose values a file sets.
+        called: The inner functions that the function itself calls (`find_inner_calls`).
 
     Attributes:
-        doubts: On how many decisions of a file the place hangs.
-        guards: How many statements around it catch what an unknown name raises.
-        depth: How many functions inside the function it lies in.
+        doubts: The number of conditions around the place that depend on the file.
+        guards: The number of statements around it that catch the error of an unknown name.
+        depth: The number of inner functions around it.
     """
 
     def __init__(
-        self, node_name: str, local: set[str], chosen: set[str], run: Collection[str]
+        self, node_name: str, local: set[str], chosen: set[str], called: Collection[str]
     ) -> None:
         self.node_name = node_name
         self.local = local
@@ -50,10 +50,13 @@ class WayReader(ast.NodeVisitor):
         self.guards = 0
         self.depth = 0
         self._chosen = chosen
-        self._run = run
+        self._called = called
 
     def visit_If(self, node: ast.If) -> None:
-        """What a file decides makes both branches, and all behind a jump, uncertain."""
+        """A condition that depends on the file makes its branches uncertain.
+
+        After a jump in a branch, all that follows is uncertain too.
+        """
         self._visit_choice(node.test, [*node.body, *node.orelse])
 
     def visit_While(self, node: ast.While) -> None:
@@ -80,10 +83,10 @@ class WayReader(ast.NodeVisitor):
     def visit_Assert(self, node: ast.Assert) -> None:
         """See `visit_If`."""
         self.visit(node.test)
-        self.doubts += hangs_on(node.test, self.node_name, self._chosen)
+        self.doubts += depends_on_file(node.test, self.node_name, self._chosen)
 
     def visit_Try(self, node: ast.Try) -> None:
-        """Its body is guarded if a handler catches what an unknown name raises."""
+        """A handler that catches the error of an unknown name guards the body."""
         is_guard = any(_catches(handler) for handler in node.handlers)
         self.guards += is_guard
         for statement in node.body:
@@ -93,19 +96,19 @@ class WayReader(ast.NodeVisitor):
             self.visit(inner)
 
     def visit_With(self, node: ast.With) -> None:
-        """`suppress` is a guard."""
+        """`suppress` guards the body."""
         is_guard = any('suppress' in ast.dump(item.context_expr) for item in node.items)
         self.guards += is_guard
         self.generic_visit(node)
         self.guards -= is_guard
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        """A function inside runs when it is called, if ever."""
-        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
+        """An inner function may run later, or never."""
+        self._visit_nested(node, node.args, node.body, is_called=node.name in self._called)
 
     def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> None:
         """See `visit_FunctionDef`."""
-        self._visit_nested(node, node.args, node.body, runs=node.name in self._run)
+        self._visit_nested(node, node.args, node.body, is_called=node.name in self._called)
 
     def visit_Lambda(self, node: ast.Lambda) -> None:
         """See `visit_FunctionDef`."""
@@ -115,7 +118,7 @@ class WayReader(ast.NodeVisitor):
         self, test: ast.expr, branches: Iterable[ast.AST], *, is_loop: bool = False
     ) -> None:
         self.visit(test)
-        is_chosen = hangs_on(test, self.node_name, self._chosen)
+        is_chosen = depends_on_file(test, self.node_name, self._chosen)
         is_chosen |= not is_loop and self._is_constant(test)
         self.doubts += is_chosen
         inner = list(branches)
@@ -126,7 +129,7 @@ class WayReader(ast.NodeVisitor):
             self.doubts -= 1
 
     def _is_constant(self, test: ast.expr) -> bool:
-        """Return whether a test hangs on nothing of the function: on a constant, say."""
+        """Return whether a test depends on nothing in the function, as a constant."""
         if isinstance(test, ast.Constant):
             return not test.value
         names = {node.id for node in ast.walk(test) if isinstance(node, ast.Name)}
@@ -138,7 +141,7 @@ class WayReader(ast.NodeVisitor):
         arguments: ast.arguments,
         body: Iterable[ast.AST],
         *,
-        runs: bool = False,
+        is_called: bool = False,
     ) -> None:
         for default in (*arguments.defaults, *filter(None, arguments.kw_defaults)):
             self.visit(default)
@@ -146,14 +149,14 @@ class WayReader(ast.NodeVisitor):
             self.visit(decorator)
         if any(argument.arg == self.node_name for argument in list_arguments(arguments)):
             return
-        self.depth += not runs
+        self.depth += not is_called
         for inner in body:
             self.visit(inner)
-        self.depth -= not runs
+        self.depth -= not is_called
 
 
-def find_run(function: FunctionNode) -> set[str]:
-    """Return the names of the functions inside that the function itself runs to their ends."""
+def find_inner_calls(function: FunctionNode) -> set[str]:
+    """Return the names of the inner functions that the function itself calls (and awaits)."""
     inner = {
         each.name: isinstance(each, ast.AsyncFunctionDef)
         for each in function.body

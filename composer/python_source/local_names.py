@@ -1,4 +1,4 @@
-"""Names in a function: parameters, what is stored, and those whose values a file decides."""
+"""The names in a function: its parameters, its variables, and those whose values a file sets."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def list_arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
 
 
 def stored_names(function: FunctionNode) -> Iterator[ast.Name]:
-    """Yield each place where a name is given a value, or deleted."""
+    """Yield each place where a name is assigned or deleted."""
     for statement in function.body:
         for node in ast.walk(statement):
             if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
@@ -36,7 +36,7 @@ def stored_names(function: FunctionNode) -> Iterator[ast.Name]:
 
 
 def nested_names(function: FunctionNode) -> set[str]:
-    """Return the names that functions, classes, imports and handlers in a function bring."""
+    """Return the names that inner functions, classes, imports and handlers define."""
     names: set[str] = set()
     for statement in function.body:
         for node in ast.walk(statement):
@@ -50,20 +50,20 @@ def nested_names(function: FunctionNode) -> set[str]:
 
 
 def find_chosen(function: FunctionNode, node_name: str, chosen: set[str]) -> set[str]:
-    """Return the names whose values a file decides, those computed from others included."""
+    """Return the names whose values a file sets, and those computed from them."""
     found = set(chosen)
     pairs = [pair for statement in function.body for pair in _assignments(statement)]
     while True:
         before = len(found)
         for target, value in pairs:
-            if hangs_on(value, node_name, found):
+            if depends_on_file(value, node_name, found):
                 found |= {name.id for name in ast.walk(target) if isinstance(name, ast.Name)}
         if len(found) == before:
             return found
 
 
-def hangs_on(expression: ast.expr, node_name: str, chosen: set[str]) -> bool:
-    """Return whether a file decides what an expression is: by the node, or by a chosen name."""
+def depends_on_file(expression: ast.expr, node_name: str, chosen: set[str]) -> bool:
+    """Return whether an expression depends on the file: on the node or on a chosen name."""
     for node in ast.walk(expression):
         if isinstance(node, ast.Name) and node.id in chosen:
             return True

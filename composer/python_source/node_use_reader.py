@@ -1,37 +1,84 @@
-"""The uses themselves: what the text of a function does with the node, place by place."""
+"""Read what a function does with its node, without running it.
+
+The node is one of the parameters, whatever its name. If a use has no literal name, its kind is
+*open*: the function may use more entities of that kind.
+"""
 
 from __future__ import annotations
 
 import ast
 import builtins
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from composer.python_source.control_flow import WayReader
-from composer.python_source.local_names import is_name
-from composer.python_source.node_uses import ALL_KINDS, NodePass, NodeUse, UseKind
+from composer.python_source.control_flow import ControlFlowVisitor, find_inner_calls
+from composer.python_source.local_names import (
+    find_chosen,
+    is_name,
+    list_arguments,
+    nested_names,
+    stored_names,
+)
+from composer.python_source.modules import find_texts
+from composer.python_source.node_uses import USED_NOUNS, NodePass, NodeUse, NodeUses
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterable, Mapping
 
-_METHODS: dict[str, UseKind] = {
+    from composer.python_source.modules import FunctionNode
+
+# Methods of `composer.Node`, and the kind of entity whose name is their first argument.
+_METHODS = {
     'publish': 'publisher',
     'call': 'service client',
     'call_async': 'service client',
     'send_goal': 'action client',
 }
-# Attributes of `composer.Node` through which nothing that a file declares is reached by name.
+# Attributes of `composer.Node` that use no declared entity.
 _HARMLESS = {'name', 'logger', 'now', 'state', 'own_state', 'shutdown', 'set_parameters'}
-# What a mapping has itself, so that `node.parameters.get` is no parameter.
-_OF_MAPPINGS = {'get', 'items', 'keys', 'values'}
+# Methods of a mapping: `node.parameters.get` is no parameter.
+_MAPPING_METHODS = {'get', 'items', 'keys', 'values'}
 
 
-class UseReader(WayReader):
-    """Notes what each place does with the node, and what is known of the way there.
+def read_node_uses(
+    function: FunctionNode,
+    node_name: str,
+    given: Iterable[str],
+    texts: Mapping[str, str] = MappingProxyType({}),
+) -> NodeUses:
+    """Return what a function does with its parameter `node_name`.
 
     Args:
-        texts: The names that are a text for good, as `find_texts` tells.
+        given: The parameters whose values no file sets: the node itself, a message.
+        texts: The constants outside of the function that are texts.
+    """
+    parameters = {argument.arg for argument in list_arguments(function.args)}
+    stored = {name.id for name in stored_names(function)}
+    if node_name in stored:
+        return NodeUses()
+    local = parameters | stored | nested_names(function)
+    chosen = find_chosen(function, node_name, parameters - set(given))
+    known = {name: text for name, text in texts.items() if name not in local}
+    known |= {n: text for n, text in find_texts(function.body).items() if n not in parameters}
+    reader = _UseVisitor(node_name, local, chosen, find_inner_calls(function), known)
+    for statement in function.body:
+        reader.visit(statement)
+    return NodeUses(
+        tuple(reader.uses),
+        tuple(reader.passes),
+        frozenset(reader.open_kinds),
+        reader.reads_others,
+        reader.reaches_ros,
+    )
 
-    The others are as in `WayReader`.
+
+class _UseVisitor(ControlFlowVisitor):
+    """Collects the uses of the node.
+
+    Args:
+        texts: The constants that are texts, as `find_texts` returns them.
+
+    The others are as in `ControlFlowVisitor`.
     """
 
     def __init__(
@@ -46,20 +93,20 @@ class UseReader(WayReader):
         self._texts = texts
         self.uses: list[NodeUse] = []
         self.passes: list[NodePass] = []
-        self.open_kinds: set[UseKind] = set()
+        self.open_kinds: set[str] = set()
         self.reads_others = False
         self.reaches_ros = False
         self._awaited: ast.AST | None = None
 
     def visit_Name(self, node: ast.Name) -> None:
-        """Anything else than what the other methods know may do anything with the node."""
+        """Any other expression may do anything with the node."""
         if node.id == self.node_name:
-            self.open_kinds |= ALL_KINDS
+            self.open_kinds |= USED_NOUNS
 
     def visit_Attribute(self, node: ast.Attribute) -> None:
         """`node.parameters.x`, and attributes that are not called."""
         if self._is_parameters(node.value):
-            if isinstance(node.ctx, ast.Load) and node.attr not in _OF_MAPPINGS:
+            if isinstance(node.ctx, ast.Load) and node.attr not in _MAPPING_METHODS:
                 self._use('parameter', node.attr, node)
             else:
                 self.open_kinds.add('parameter')
@@ -73,7 +120,7 @@ class UseReader(WayReader):
         elif node.attr == 'get_parameters':
             self.reads_others = True
         elif node.attr not in _HARMLESS:
-            self.open_kinds |= ALL_KINDS
+            self.open_kinds |= USED_NOUNS
 
     def visit_Subscript(self, node: ast.Subscript) -> None:
         """`node.parameters['x']`."""
@@ -84,7 +131,7 @@ class UseReader(WayReader):
             self.generic_visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
-        """`'x' in node.parameters` uses it, and copes without."""
+        """`'x' in node.parameters` uses it, and works without it."""
         name = self._text(node.left)
         if name is not None and len(node.ops) == 1 and self._is_parameters(node.comparators[0]):
             self._use('parameter', name, node.left, is_optional=True, has_default=True)
@@ -92,7 +139,7 @@ class UseReader(WayReader):
             self.generic_visit(node)
 
     def visit_Await(self, node: ast.Await) -> None:
-        """What is awaited is waited for."""
+        """The function waits for what it awaits."""
         self._awaited = node.value
         self.visit(node.value)
 
@@ -143,7 +190,7 @@ class UseReader(WayReader):
     def _visit_pass(self, node: ast.Call, function: str) -> None:
         places: list[tuple[int | str, ast.expr]] = list(enumerate(node.args))
         places += [(each.arg or '', each.value) for each in node.keywords]
-        # Behind `*arguments` no position is known.
+        # After `*arguments`, positions are unknown.
         is_plain = not any(isinstance(argument, ast.Starred) for argument in node.args)
         may_be_helper = is_plain and not hasattr(builtins, function)
         for position, value in places:
@@ -175,7 +222,7 @@ class UseReader(WayReader):
 
     def _use(
         self,
-        kind: UseKind,
+        kind: str,
         name: str,
         at: ast.expr,
         *,

@@ -1,33 +1,32 @@
-"""What is told of a function: its uses of the node, and where it passes the node on."""
+"""Records of what a function does with its node."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
-UseKind: TypeAlias = Literal['publisher', 'service client', 'action client', 'parameter']
+from composer.entity_kinds import USED_KINDS
 
-ALL_KINDS: frozenset[UseKind] = frozenset(
-    ('publisher', 'service client', 'action client', 'parameter')
-)
+# The nouns of the kinds of entity that behaviours use by name, as in `service client`.
+USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
 
 
 @dataclass(frozen=True, slots=True)
 class NodeUse:
-    """One use of something by a literal name, as in `node.publish('status', …)`.
+    """A use of an entity by a literal name, as in `node.publish('status', …)`.
 
     Attributes:
-        line: Of the name, counted from 1; `column` likewise.
-        length: Of what stands for the name there: itself, or that of a constant.
-        is_optional: Whether it copes without: `node.parameters.get('x')`.
-        has_default: Whether it brings a value for that case.
-        is_certain: Whether it hangs on nothing that a file can decide: on parameters, the node's
-            name, or arguments of `with:`.
-        is_guarded: Whether an error that it raises is caught.
+        kind: The noun of the entity's kind.
+        line: The line of the name, counted from 1; `column` likewise.
+        length: The length of the name, or of the constant that holds it.
+        is_optional: Whether the function works without it: `node.parameters.get('x')`.
+        has_default: Whether the function has a value to use without it.
+        is_certain: Whether it happens whatever the file says: it does not depend on parameters,
+            the node's name, or arguments under `with:`.
+        is_guarded: Whether the function catches the error that it raises.
         waits: Whether the function itself waits for the answer.
     """
 
-    kind: UseKind
+    kind: str
     name: str
     line: int
     column: int
@@ -41,11 +40,11 @@ class NodeUse:
 
 @dataclass(frozen=True, slots=True)
 class NodePass:
-    """The node is given to a function of the module: `helper(node)`.
+    """A call that passes the node to a function of the module: `helper(node)`.
 
     Attributes:
-        position: Of the node among the arguments, or the keyword that it is given by.
-        is_awaited: Whether a coroutine that it returns is run here.
+        position: The position of the node among the arguments, or its keyword.
+        is_awaited: Whether the returned coroutine is awaited here.
 
     The others are as in `NodeUse`, and hold for all that the function does.
     """
@@ -60,16 +59,16 @@ class NodePass:
 
 @dataclass(frozen=True, slots=True)
 class NodeUses:
-    """All that a function does with the node.
+    """All that a function does with its node.
 
     Attributes:
-        open_kinds: Of what it may use more than `uses` says.
+        open_kinds: The kinds of which it may use more than `uses` lists.
         reads_others: Whether it reads parameters of other nodes.
         reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
     """
 
     uses: tuple[NodeUse, ...] = ()
     passes: tuple[NodePass, ...] = ()
-    open_kinds: frozenset[UseKind] = ALL_KINDS
+    open_kinds: frozenset[str] = USED_NOUNS
     reads_others: bool = False
     reaches_ros: bool = False

@@ -4,7 +4,9 @@ import ast
 
 import pytest
 
-from composer.python_source.uses import ALL_KINDS, find_parameter, read_node_uses
+from composer.python_source.local_names import find_parameter
+from composer.python_source.node_use_reader import read_node_uses
+from composer.python_source.node_uses import USED_NOUNS
 
 
 def read(body, head='def f(node, message, mode=1):', given=('node', 'message')):
@@ -70,18 +72,18 @@ def test_what_reaches_nothing_declared_is_no_use(body):
         ('node.parameters.items()', {'parameter'}),
         ('getattr(node.parameters, mode)', {'parameter'}),
         ('node.ros.get_parameter(mode)', {'parameter'}),
-        ('self = node', ALL_KINDS),
-        ('return node', ALL_KINDS),
-        ('message.tell(node)', ALL_KINDS),
-        ('print(node)', ALL_KINDS),
-        ("getattr(node, 'publish')('x', 1)", ALL_KINDS),
-        ("node = message\nnode.publish('x', 1)", ALL_KINDS),
-        ("for node in message: node.publish('x', 1)", ALL_KINDS),
-        ('[node.publish for node in message]', ALL_KINDS),
-        ('def tell(n): ...\ntell(node)', ALL_KINDS),
-        ('tell = message\ntell(node)', ALL_KINDS),
-        ('tell(*message, node)', ALL_KINDS),
-        ('tell(**{"node": node})', ALL_KINDS),
+        ('self = node', USED_NOUNS),
+        ('return node', USED_NOUNS),
+        ('message.tell(node)', USED_NOUNS),
+        ('print(node)', USED_NOUNS),
+        ("getattr(node, 'publish')('x', 1)", USED_NOUNS),
+        ("node = message\nnode.publish('x', 1)", USED_NOUNS),
+        ("for node in message: node.publish('x', 1)", USED_NOUNS),
+        ('[node.publish for node in message]', USED_NOUNS),
+        ('def tell(n): ...\ntell(node)', USED_NOUNS),
+        ('tell = message\ntell(node)', USED_NOUNS),
+        ('tell(*message, node)', USED_NOUNS),
+        ('tell(**{"node": node})', USED_NOUNS),
     ],
 )
 def test_what_cannot_be_told_is_open(body, kinds):

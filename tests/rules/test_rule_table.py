@@ -8,6 +8,7 @@ import pytest
 
 import composer
 from composer.diagnostics import Diagnostic
+from composer.entity_kinds import USED_KINDS
 from composer.rules import (
     RULES_FOLDER,
     Severity,
@@ -30,8 +31,10 @@ SPEAKING = (
 )
 # Words of the same form that are no rules.
 NO_RULES = {'x-expected', 'site-packages'}
-# Of these names one half is put in when they are emitted.
-COMPOSED = {'duplicate-field', 'duplicate-constant'}
+# Names of which the code has one half, and a table the other.
+COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
+    f'{word}-{kind.slug}' for word in ('unknown', 'unused') for kind in USED_KINDS
+}
 
 
 def names_in_the_code():

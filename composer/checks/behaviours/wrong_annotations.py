@@ -1,10 +1,11 @@
-"""Annotations of behaviours against the types that they are wired to."""
+"""Behaviours are annotated with the types of the entities that they are bound to."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
+from composer.entity_kinds import ENTITY_KINDS, PUBLISHED
 from composer.interfaces.descriptions import (
     ActionDescription,
     MessageDescription,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.entity_kinds import BehaviourKey, EntityKind
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
     from composer.python_source.modules import FunctionNode
@@ -27,29 +29,31 @@ if TYPE_CHECKING:
 
 _RULE = 'wrong-annotation'
 _PARTS = {'Request', 'Response', 'Goal', 'Result', 'Feedback'}
-# What a bare value of a built-in type is held against a field by.
+# A value of each built-in type, to check against the field.
 _SAMPLES: dict[str, object] = {'bool': False, 'float': 0.5, 'int': 1, 'str': 'a'}
 
 
 @dataclass(frozen=True, slots=True)
 class _Wire:
-    """What a behaviour is given and what becomes of what it gives.
+    """The types of what a behaviour gets and of what it gives.
 
     Attributes:
         given: The type of its second argument.
-        yielded: The type that each payload which it yields becomes.
-        returned: The same of what it returns.
-        is_unsure: Whether one of the types is not the real one.
+        yielded: The type that each yielded payload becomes.
+        returned: The type that a returned payload becomes.
+        ended: The type that a payload becomes which a generator returns.
+        is_unsure: Whether the type of the entity is a stand-in.
     """
 
     given: str | None = None
     yielded: str | None = None
     returned: str | None = None
+    ended: str | None = None
     is_unsure: bool = False
 
 
 def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
-    """Behaviours are annotated with the types that they are wired to, or with none."""
+    """Annotations of behaviours, if there are any, have the types of the entities."""
     for node in context.spec.nodes.values():
         wires = _wires_of(context, node)
         for binding in node_bindings(node):
@@ -62,40 +66,41 @@ def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _wires_of(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
-    """Return what each behaviour of a node is wired to, by its path."""
+    """Return the types around each behaviour of a node, by its path."""
     published = {
         name: publisher.type if context.has_real_type(publisher) else None
         for name, publisher in node.publishers.items()
     }
-    wires: dict[DataPath, _Wire] = {}
-    for timer in node.timers.values():
-        sent = published.get(timer.publish or '')
-        wires[*timer.path, 'behaviour'] = _Wire(yielded=sent, returned=sent)
-    for subscription in node.subscriptions.values():
-        sent = published.get(subscription.publish or '')
-        unsure = not context.has_real_type(subscription)
-        wire = _Wire(subscription.type, returned=sent, is_unsure=unsure)
-        wires[*subscription.path, 'behaviour'] = wire
-    for service in node.services.values():
-        name = service.type
-        unsure = not context.has_real_type(service)
-        wire = _Wire(f'{name}_Request', returned=f'{name}_Response', is_unsure=unsure)
-        wires[*service.path, 'behaviour'] = wire
-    return wires | _wires_of_actions(context, node)
+    return {
+        (*entity.path, key.key): _wire_of(context, kind, entity, key, published)
+        for kind in ENTITY_KINDS
+        for entity in getattr(node, kind.section).values()
+        for key in kind.behaviours
+    }
 
 
-def _wires_of_actions(context: CheckContext, node: NodeSpec) -> dict[DataPath, _Wire]:
-    wires: dict[DataPath, _Wire] = {}
-    for action in node.actions.values():
-        name, unsure = action.type, not context.has_real_type(action)
-        goal, feedback, result = (f'{name}_{part}' for part in ('Goal', 'Feedback', 'Result'))
-        wires[*action.path, 'behaviour'] = _Wire(goal, feedback, result, unsure)
-        wires[*action.path, 'accept'] = _Wire(goal, is_unsure=unsure)
-    for client in node.action_clients.values():
-        name, unsure = client.type, not context.has_real_type(client)
-        wires[*client.path, 'feedback'] = _Wire(f'{name}_Feedback', is_unsure=unsure)
-        wires[*client.path, 'result'] = _Wire(f'{name}_Result', is_unsure=unsure)
-    return wires
+def _wire_of(
+    context: CheckContext,
+    kind: EntityKind,
+    entity: Any,
+    key: BehaviourKey,
+    published: dict[str, str | None],
+) -> _Wire:
+    sent = published.get(entity.publish or '') if kind.publishes else None
+
+    def type_of(part: str | None) -> str | None:
+        if part is None or part == PUBLISHED:
+            return sent if part else None
+        return f'{entity.type}_{part}' if part else entity.type
+
+    return _Wire(
+        given=type_of(key.given),
+        yielded=type_of(key.yielded),
+        returned=type_of(key.returned),
+        # Timers do not publish what a generator returns at its end.
+        ended=None if key.returned == PUBLISHED else type_of(key.returned),
+        is_unsure=kind.channel is not None and not context.has_real_type(entity),
+    )
 
 
 def _check_behaviour(
@@ -113,12 +118,10 @@ def _check_behaviour(
     if items:
         yield from _check_payload(context, binding, 'yields', items[0], wire.yielded)
     if items and source.kind is FunctionKind.GENERATOR and len(items) > _RETURNED:
-        is_action = binding.parameters[-1:] == ('goal',)
-        returned = wire.returned if is_action else None
-        yield from _check_payload(context, binding, 'returns', items[_RETURNED], returned)
+        yield from _check_payload(context, binding, 'returns', items[_RETURNED], wire.ended)
 
 
-# The place of what it returns in `Generator[yielded, sent, returned]`.
+# The index of the returned type in `Generator[yielded, sent, returned]`.
 _RETURNED = 2
 
 
@@ -154,7 +157,7 @@ def _check_parameter(
 def _check_payload(
     context: CheckContext, binding: Binding, verb: str, read: Annotation, wanted: str | None
 ) -> Iterator[Diagnostic]:
-    """Check what a behaviour gives: a message, a mapping, or the bare value of a sole field."""
+    """Check a payload: a message, a mapping, or the bare value of a single field."""
     if wanted is None:
         return
     description = _describe(context, wanted)
@@ -183,12 +186,12 @@ def _explain(context: CheckContext, binding: Binding, message: str) -> Diagnosti
         _RULE,
         message,
         part=behaviour.function,
-        help=f'mend the annotation, or the type of {binding.owner}',
+        help=f'change the annotation, or the type of {binding.owner}',
     )
 
 
 def _may_hold(description: MessageDescription | None, interface: str) -> bool:
-    """Return whether a message may have nothing but a field of this type."""
+    """Return whether the only field of a message may have this type."""
     if description is None:
         return True
     fields = description.fields
@@ -196,10 +199,10 @@ def _may_hold(description: MessageDescription | None, interface: str) -> bool:
 
 
 def _are_alike(context: CheckContext, one: str, other: str) -> bool:
-    """Return whether two types are the same to a behaviour.
+    """Return whether two types are the same for a behaviour.
 
-    Types of one name in two packages are, if they have the same fields, or if these are not
-    known: the examples of ROS come in several packages.
+    Types of one name in two packages are the same if they have the same fields, or if their
+    fields are unknown: the examples of ROS come in several packages.
     """
     if one == other:
         return True
