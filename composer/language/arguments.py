@@ -144,7 +144,7 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
     A name that no expression can use, and a default or a choice that does not fit.
     """
     if not is_variable_name(argument.name):
-        yield (), f"'{argument.name}' cannot stand in an expression as a name"
+        yield (), f"'{argument.name}' is not a valid name in expressions"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]

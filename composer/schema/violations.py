@@ -81,13 +81,13 @@ def missing_key(error: ValidationError, key: str, message: str) -> Violation:
 
 
 def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
-    """Return the violation for keys that exclude each other."""
+    """Return the violation for keys that cannot be used together."""
     path = path_of(error)
     last = max(keys, key=list(error.instance).index)
     listed = ' and '.join(f"'{key}'" for key in keys)
     return Violation(
         'conflicting-keys',
-        f'{listed} exclude each other{owner_of(error)}',
+        f'{listed} cannot be used together{owner_of(error)}',
         (*path, last),
         (*path, last),
         at_key=True,
