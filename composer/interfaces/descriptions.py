@@ -100,6 +100,11 @@ class MessageDescription:
     constants: tuple[ConstantDescription, ...] = ()
     comment: str = ''
 
+    @property
+    def parts(self) -> 'tuple[MessageDescription, ...]':
+        """The messages that a definition file defines, in its order: just this one."""
+        return (self,)
+
     def field(self, name: str) -> FieldDescription | None:
         """Look up a field, or None where there is none of that name."""
         return next((field for field in self.fields if field.name == name), None)
@@ -114,6 +119,11 @@ class ServiceDescription:
     response: MessageDescription
     comment: str = ''
 
+    @property
+    def parts(self) -> tuple[MessageDescription, ...]:
+        """Request and response."""
+        return (self.request, self.response)
+
 
 @dataclass(frozen=True, slots=True)
 class ActionDescription:
@@ -124,6 +134,11 @@ class ActionDescription:
     result: MessageDescription
     feedback: MessageDescription
     comment: str = ''
+
+    @property
+    def parts(self) -> tuple[MessageDescription, ...]:
+        """Goal, result and feedback."""
+        return (self.goal, self.result, self.feedback)
 
 
 InterfaceDescription: TypeAlias = MessageDescription | ServiceDescription | ActionDescription
