@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.language.pipeline import LoadedSystem
+    from composer.language.loaded_system import LoadedSystem
 
 
 def load(path: str | Path) -> LoadedSystem:

@@ -29,7 +29,7 @@ from composer.checks.references import check_publish, check_qos, check_types
 from composer.diagnostics import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.python_source.behaviour_uses import UseReader
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
+    from composer.language.loaded_system import LoadedSystem
     from composer.rules import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'

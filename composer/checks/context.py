@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Remarks, Span
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.interfaces.declared_packages import DeclaredPackages
-    from composer.language.pipeline import LoadedSystem
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, SystemSpec
     from composer.python_source.behaviour_uses import UseReader
     from composer.python_source.module_finder import ModuleFinder

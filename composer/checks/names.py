@@ -101,12 +101,9 @@ def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagn
 
 
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
-    for endpoint in node.endpoints:
-        yield from _check_ros_name(context, node, endpoint.path, 'topic', endpoint.topic)
-    for service in node.service_endpoints:
-        yield from _check_ros_name(context, node, service.path, 'service', service.service)
-    for action in node.action_endpoints:
-        yield from _check_ros_name(context, node, action.path, 'action', action.action)
+    for kind, entity in node.ends():
+        channel = str(kind.channel)
+        yield from _check_ros_name(context, node, entity.path, channel, getattr(entity, channel))
 
 
 def _check_ros_name(

@@ -71,8 +71,10 @@ def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_key(profile.path, 'bad-name', message)
     declared: dict[DataPath, QosSpec] = {profile.path: profile for profile in profiles.values()}
     for node in context.spec.nodes.values():
-        for entity in node.endpoints:
-            declared[entity.qos.path] = entity.qos
+        for _, entity in node.ends():
+            qos: QosSpec | None = getattr(entity, 'qos', None)
+            if qos is not None:
+                declared[qos.path] = qos
     reported: set[DataPath] = set()
     for spec in declared.values():
         try:
@@ -103,7 +105,7 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     if not catalogue.available:
         return
     for node in context.spec.nodes.values():
-        for entity in (*node.endpoints, *node.service_endpoints, *node.action_endpoints):
+        for _, entity in node.ends():
             package = entity.type.partition('/')[0]
             unreadable = package in context.interfaces.unreadable or any(
                 context.was_dropped(path) for path in (('interfaces',), ('interfaces', package))

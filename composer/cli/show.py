@@ -18,7 +18,7 @@ from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.paths import resolve_path
-from composer.language.pipeline import LoadedSystem, load_system
+from composer.language.pipeline import load_system
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.diagnostics import Diagnostic
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
 
@@ -59,7 +60,7 @@ def show(
     else:
         remark = (lambda path: describe_origin(system, path)) if origins else None
         comments = find_kept_comments(system, render_yaml(data))
-        click.echo(append_comments(render_yaml(data, remark), comments), nl=False)
+        click.echo(append_comments(render_yaml(data, remark=remark), comments), nl=False)
     return ExitCode.DONE
 
 
@@ -97,7 +98,7 @@ def final_data(system: LoadedSystem) -> dict[str, Any]:
     """Return a system as data that `composer up` accepts, from any folder."""
     data = {
         key: value
-        for key, value in system.data.items()
+        for key, value in system.entries.items()
         if key not in _RESOLVED_KEYS
         and not key.startswith('x-')
         and (value != {} or key == 'nodes')

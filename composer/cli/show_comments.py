@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from composer.diagnostics import SourceFile, Span
-    from composer.language.pipeline import LoadedSystem
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath, SourceMap
 
 

@@ -1,6 +1,6 @@
-"""A system as people draw it: nodes, and the topics, services and actions between them.
+"""Drawings of a system: its nodes, and the topics, services and actions between them.
 
-Each form is one module with a `render_picture`, listed in one table.
+Each format is a module with a `render_picture`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from composer.drawing.picture import Picture
 
-# A run pays for the import of its own form only.
+# A run imports the module of its own format only.
 FORMATS: dict[str, str] = {
     'mermaid': 'composer.drawing.mermaid',
     'dot': 'composer.drawing.dot',
@@ -19,7 +19,7 @@ FORMATS: dict[str, str] = {
     'svg': 'composer.drawing.svg',
     'html': 'composer.drawing.page',
 }
-_ENDINGS = {
+_FORMAT_OF_SUFFIX = {
     '': 'mermaid',
     '.txt': 'mermaid',
     '.mmd': 'mermaid',
@@ -35,15 +35,15 @@ DEFAULT_FORMAT = 'mermaid'
 
 
 def render_picture(picture: Picture, format_name: str) -> str:
-    """Return a picture in one of the forms, with a newline at its end.
+    """Return a picture in one of the formats, with a newline at its end.
 
     Raises:
-        DrawingError: The form needs Graphviz, and it is not there or fails.
+        DrawingError: The format needs Graphviz, which is missing or failed.
     """
     text: str = importlib.import_module(FORMATS[format_name]).render_picture(picture)
     return text
 
 
-def format_of(ending: str) -> str | None:
-    """Return the form that files of an ending, as in `.svg`, are written in, if there is one."""
-    return _ENDINGS.get(ending.lower())
+def format_of(suffix: str) -> str | None:
+    """Return the format for a suffix such as `.svg`, or `None`."""
+    return _FORMAT_OF_SUFFIX.get(suffix.lower())

@@ -9,13 +9,13 @@ import html
 from itertools import count
 from typing import TYPE_CHECKING
 
-from composer.drawing.plan import plan_picture
+from composer.drawing.shapes import arrange_shapes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.drawing.picture import Picture
-    from composer.drawing.plan import Line, Region, Shape
+    from composer.drawing.shapes import Line, Region, Shape
 
 _FONT = 'Helvetica,Arial,sans-serif'
 _SHAPES = {
@@ -43,15 +43,15 @@ _SMALL, _GREY = 9, '#57606a'
 
 def render_picture(picture: Picture) -> str:
     """Return a picture as a directed graph; each element has an `id` and a `class` for SVG."""
-    plan = plan_picture(picture)
+    drawn = arrange_shapes(picture)
     numbers = count()
     lines = [
         f'digraph {_quote(picture.name)} {{',
         f'  graph [rankdir=LR, ranksep=0.7, nodesep=0.2, fontname="{_FONT}", fontsize=11]',
         f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
         f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
-        *_region(plan.root, 1, numbers),
-        *(f'  {_line(line)}' for line in plan.lines),
+        *_region(drawn.root, 1, numbers),
+        *(f'  {_line(line)}' for line in drawn.lines),
         '}',
     ]
     return '\n'.join(lines) + '\n'

@@ -1,4 +1,4 @@
-"""The lines in which a part of a system was written."""
+"""Excerpts: the lines of a file that declare a part of the system."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from composer.diagnostics import SourceFile, Span
     from composer.yaml_text.positions import DataPath, SourceMap
 
-# Of `nodes: {<name>: …}`; all that is asked for lies below such an entry.
-_BOX = 2
+# The depth of `nodes: {<name>: …}`; every part lies below such an entry.
+_NODE = 2
 _MOST_EXCERPTS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """Lines that stand together in a file.
+    """Successive lines of a file.
 
     Attributes:
-        file: As reports show it; for a `--set`, that.
+        file: The path as reports show it, or the `--set` option.
         first: The number of the first line, counted from 1.
     """
 
@@ -40,12 +40,12 @@ class Excerpts:
         self._positions = positions
         self._spans: dict[DataPath, list[tuple[DataPath, Span]]] = defaultdict(list)
         for path, span in positions.values.items():
-            self._spans[path[:_BOX]].append((path, span))
+            self._spans[path[:_NODE]].append((path, span))
 
     def of(self, path: DataPath) -> list[Excerpt]:
-        """Return the lines of an entry: where its key stands, then what other places add to it."""
+        """Return the lines of an entry: those below its key, then those elsewhere."""
         key = self._positions.key(path)
-        spans = [span for at, span in self._spans[path[:_BOX]] if at[: len(path)] == path]
+        spans = [span for at, span in self._spans[path[:_NODE]] if at[: len(path)] == path]
         last = _last_line(key, spans)
         found = [_excerpt(key.source, range(key.line, last + 1))]
         elsewhere: dict[SourceFile, set[int]] = defaultdict(set)
@@ -58,7 +58,7 @@ class Excerpts:
 
 
 def _last_line(key: Span, spans: Iterable[Span]) -> int:
-    """Return the line in which an entry ends: all that is indented below its key belongs to it."""
+    """Return the last line of an entry: all lines that are indented below its key."""
     lines = key.source.lines
     if lines and key.source.line(key.line)[: key.column - 1].strip(' -?'):
         # It stands within brackets, where indentation means nothing.

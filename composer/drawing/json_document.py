@@ -2,22 +2,22 @@
 
 ```
 {
-  "version": 1,                what follows; it grows when a key is removed or changes its meaning
+  "version": 1,                raised when a key is removed or changes its meaning
   "name", "description",       of the system
-  "nodes": [                   nodes, and processes that are not Composer's own
+  "nodes": [                   nodes and external processes
     {"id": "node:/robot/arm", "kind": "node" | "process", "name", "namespace", "description",
      "findings": [0], "file", "line"}],
   "channels": [                topics, services, actions
     {"id": "topic:/robot/scan", "kind": "topic" | "service" | "action", "name",
      "types": ["sensor_msgs/msg/LaserScan"],
-     "external": ["providers" | "users"],   who is in no file: publishers and servers, or
-                                            subscriptions and clients
+     "external": ["providers" | "users"],   which ends are outside the system: publishers
+                                            and servers, or subscriptions and clients
      "findings", "file", "line"}],
-  "edges": [                   an end each
+  "edges": [                   publishers, subscriptions, servers and clients
     {"id": "publisher:/robot/arm:scan", "role": "publisher" | "subscription" | "service server" |
      "service client" | "action server" | "action client", "name", "node": <id>, "channel": <id>,
-     "from": <id>, "to": <id>,              as messages, requests and goals go
-     "type", "qos": {"depth": 5},           what differs from the default; durations in seconds
+     "from": <id>, "to": <id>,              the way of messages, requests and goals
+     "type", "qos": {"depth": 5},           policies that differ from the default; durations in s
      "findings", "file", "line"}],
   "waits": [{"node": <id>, "for": <id>, "file", "line"}],
   "findings": [                those of `composer check`; above they are indices into this list
@@ -38,7 +38,7 @@ from composer.reports.report import relative_path
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
-    from composer.drawing.picture import Box, Edge, Hub, Picture
+    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
     from composer.yaml_text.positions import DataPath
 
 _VERSION = 1
@@ -55,38 +55,38 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
         'version': _VERSION,
         'name': picture.name,
         'description': picture.description,
-        'nodes': [_box(picture, box) for box in picture.boxes],
-        'channels': [_hub(picture, hub) for hub in picture.hubs],
+        'nodes': [_node(picture, node) for node in picture.nodes],
+        'channels': [_channel(picture, channel) for channel in picture.channels],
         'edges': [_edge(picture, edge) for edge in picture.edges],
         'waits': [
-            {'node': wait.box, 'for': wait.target, **_place_of(picture, wait.path)}
+            {'node': wait.waiter, 'for': wait.target, **_place_of(picture, wait.path)}
             for wait in picture.waits
         ],
         'findings': [describe_finding(finding) for finding in picture.findings],
     }
 
 
-def _box(picture: Picture, box: Box) -> dict[str, Any]:
+def _node(picture: Picture, node: NodeBox) -> dict[str, Any]:
     return {
-        'id': box.id,
-        'kind': box.kind,
-        'name': box.name,
-        'namespace': box.namespace,
-        'description': box.description,
-        'findings': list(box.findings),
-        **_place_of(picture, box.path),
+        'id': node.id,
+        'kind': node.kind,
+        'name': node.name,
+        'namespace': node.namespace,
+        'description': node.description,
+        'findings': list(node.findings),
+        **_place_of(picture, node.path),
     }
 
 
-def _hub(picture: Picture, hub: Hub) -> dict[str, Any]:
+def _channel(picture: Picture, channel: ChannelBox) -> dict[str, Any]:
     return {
-        'id': hub.id,
-        'kind': hub.kind,
-        'name': hub.name,
-        'types': list(hub.types),
-        'external': list(hub.external),
-        'findings': list(hub.findings),
-        **_place_of(picture, hub.path),
+        'id': channel.id,
+        'kind': channel.kind,
+        'name': channel.name,
+        'types': list(channel.types),
+        'external': list(channel.external),
+        'findings': list(channel.findings),
+        **_place_of(picture, channel.path),
     }
 
 
@@ -96,8 +96,8 @@ def _edge(picture: Picture, edge: Edge) -> dict[str, Any]:
         'id': edge.id,
         'role': edge.role,
         'name': edge.name,
-        'node': edge.box,
-        'channel': edge.hub,
+        'node': edge.node,
+        'channel': edge.channel,
         'from': start,
         'to': end,
         'type': edge.type,
@@ -126,7 +126,7 @@ def _place_of(picture: Picture, path: DataPath) -> dict[str, Any]:
 
 
 def _place(span: Span) -> dict[str, Any]:
-    # What a --set says lies in no file.
+    # A value of --set is in no file.
     is_file = span.source.home is None
     name = relative_path(span.source.name) if is_file else span.source.name
     return {'file': name, 'line': span.line}

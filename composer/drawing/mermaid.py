@@ -8,13 +8,13 @@ from __future__ import annotations
 from itertools import count
 from typing import TYPE_CHECKING
 
-from composer.drawing.plan import plan_picture
+from composer.drawing.shapes import arrange_shapes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.drawing.picture import Picture
-    from composer.drawing.plan import Line, Region, Shape
+    from composer.drawing.shapes import Line, Region, Shape
 
 _SHAPES = {
     'node': ('([', '])'),
@@ -42,10 +42,10 @@ _PLAIN = frozenset(" _/.,:()=+-'")
 
 def render_picture(picture: Picture) -> str:
     """Return a picture as a flowchart."""
-    plan = plan_picture(picture)
-    lines = ['flowchart LR', *_region(plan.root, 1, count())]
-    lines += [f'  {_line(line)}' for line in plan.lines]
-    marked = [(index, line.mark) for index, line in enumerate(plan.lines) if line.mark]
+    drawn = arrange_shapes(picture)
+    lines = ['flowchart LR', *_region(drawn.root, 1, count())]
+    lines += [f'  {_line(line)}' for line in drawn.lines]
+    marked = [(index, line.mark) for index, line in enumerate(drawn.lines) if line.mark]
     lines += [f'  linkStyle {index} {_LINE_STYLES[mark]}' for index, mark in marked]
     lines += [f'  {each}' for each in _CLASSES]
     return '\n'.join(lines) + '\n'

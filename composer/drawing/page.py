@@ -1,4 +1,4 @@
-"""A picture as one HTML page that needs nothing else: to move in, to search, to look things up.
+"""A picture as one HTML page that needs no other file: it can be moved, zoomed and searched.
 
 The page holds the drawing as SVG, the data as JSON, and `page.css` and `page.js` of this package.
 A Content-Security-Policy lets it run this script only, and load nothing.
@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
-from composer.drawing.plan import tokens_of
-from composer.drawing.policies import describe_policies
+from composer.drawing.qos_labels import describe_policies
+from composer.drawing.shapes import tokens_of
 from composer.names import join_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.drawing.excerpts import Excerpt
-    from composer.drawing.picture import Box, Edge, Hub, Picture
+    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
 
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
 # Of a topic with many ends, the lines of the first ones.
@@ -38,7 +38,7 @@ def render_picture(picture: Picture) -> str:
     """Return a picture as an HTML page.
 
     Raises:
-        DrawingError: There is no Graphviz, or it fails.
+        DrawingError: Graphviz is missing or failed.
     """
     style, script = _asset('page.css'), _asset('page.js')
     texts = {
@@ -88,50 +88,60 @@ def _describe(picture: Picture) -> dict[str, Any]:
 
 
 def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield what the page says of each node, channel and end, by its token."""
+    """Yield the data of each node, channel and edge, by its token."""
     tokens = tokens_of(picture)
     excerpts = Excerpts(picture.positions)
     ends = _ends(picture)
-    names = {box.id: box.name for box in picture.boxes}
-    for box in picture.boxes:
-        near = [tokens[edge.id] for edge in ends[box.id]]
-        yield tokens[box.id], _part(_box_words(box), box, near, excerpts.of(box.path))
-    for hub in picture.hubs:
-        near = [tokens[edge.id] for edge in ends[hub.id]]
-        shown = [each for edge in ends[hub.id][:_MOST_ENDS] for each in excerpts.of(edge.path)]
-        yield tokens[hub.id], _part(_hub_words(hub), hub, near, list(dict.fromkeys(shown)))
+    names = {node.id: node.name for node in picture.nodes}
+    for node in picture.nodes:
+        near = [tokens[edge.id] for edge in ends[node.id]]
+        yield tokens[node.id], _part(_describe_node(node), node, near, excerpts.of(node.path))
+    for channel in picture.channels:
+        near = [tokens[edge.id] for edge in ends[channel.id]]
+        shown = [each for edge in ends[channel.id][:_MOST_ENDS] for each in excerpts.of(edge.path)]
+        yield (
+            tokens[channel.id],
+            _part(_describe_channel(channel), channel, near, list(dict.fromkeys(shown))),
+        )
     for edge in picture.edges:
-        near = [tokens[edge.box], tokens[edge.hub]]
-        words = _edge_words(edge, names[edge.box])
+        near = [tokens[edge.node], tokens[edge.channel]]
+        words = _describe_edge(edge, names[edge.node])
         yield tokens[edge.id], _part(words, edge, near, excerpts.of(edge.path))
 
 
 def _ends(picture: Picture) -> dict[str, list[Edge]]:
-    """Return the ends of each node and channel, by its id."""
+    """Return the edges of each node and channel, by its id."""
     ends: dict[str, list[Edge]] = defaultdict(list)
     for edge in picture.edges:
-        ends[edge.box].append(edge)
-        ends[edge.hub].append(edge)
+        ends[edge.node].append(edge)
+        ends[edge.channel].append(edge)
     return ends
 
 
 def _part(
-    words: dict[str, Any], part: Box | Hub | Edge, near: list[str], excerpts: list[Excerpt]
+    words: dict[str, Any],
+    part: NodeBox | ChannelBox | Edge,
+    near: list[str],
+    excerpts: list[Excerpt],
 ) -> dict[str, Any]:
     shown = [{'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts]
     return {**words, 'findings': part.findings, 'near': near, 'excerpts': shown}
 
 
-def _box_words(box: Box) -> dict[str, Any]:
-    name = join_names(box.namespace, box.name) if box.kind == 'node' else box.name
-    return {'kind': box.kind, 'name': name, 'facts': [box.description] if box.description else []}
+def _describe_node(node: NodeBox) -> dict[str, Any]:
+    name = join_names(node.namespace, node.name) if node.kind == 'node' else node.name
+    return {
+        'kind': node.kind,
+        'name': name,
+        'facts': [node.description] if node.description else [],
+    }
 
 
-def _hub_words(hub: Hub) -> dict[str, Any]:
-    elsewhere = [f'{side} elsewhere, too' for side in hub.external]
-    return {'kind': hub.kind, 'name': hub.name, 'facts': [*hub.types, *elsewhere]}
+def _describe_channel(channel: ChannelBox) -> dict[str, Any]:
+    elsewhere = [f'{side} elsewhere, too' for side in channel.external]
+    return {'kind': channel.kind, 'name': channel.name, 'facts': [*channel.types, *elsewhere]}
 
 
-def _edge_words(edge: Edge, owner: str) -> dict[str, Any]:
+def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:
     qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
     return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': [edge.type, *qos]}

@@ -1,13 +1,14 @@
-"""A checked system → what is to be drawn, the same for all forms."""
+"""A checked system → a picture: its nodes, channels and edges, the same for all formats."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.checks.connections.topology import ChannelKind, Endpoint, Graph, build_graph
-from composer.drawing.marks import Marks
-from composer.drawing.policies import differing_policies
+from composer.checks.connections.topology import Endpoint, Graph, build_graph
+from composer.drawing.finding_places import FindingPlaces
+from composer.drawing.qos_labels import differing_policies
+from composer.entity_kinds import KIND_OF_NOUN
 from composer.names import expand_name, expand_namespace, join_names
 
 if TYPE_CHECKING:
@@ -15,25 +16,26 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.entity_kinds import ChannelKind
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
-BoxKind: TypeAlias = Literal['node', 'process']
+NodeKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class NodeBox:
     """A node or a process.
 
     Attributes:
         id: Its kind and full name, as in `node:/robot/arm`; no two are the same.
         namespace: In full, as in `/robot`.
-        findings: What is wrong with it, as indices into those of the picture.
+        findings: Its findings, as indices into those of the picture.
     """
 
     id: str
-    kind: BoxKind
+    kind: NodeKind
     name: str
     namespace: str
     description: str
@@ -42,16 +44,16 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Hub:
+class ChannelBox:
     """A topic, service or action.
 
     Attributes:
         id: Its kind and full name, as in `topic:/robot/scan`.
-        types: Those that its ends declare; one, if nothing is wrong.
-        namespace: The deepest namespace that all its ends are in.
-        external: Which ends are elsewhere, too.
-        path: Of the end that is declared first.
-        findings: What is wrong with it, as indices into those of the picture.
+        types: The types that its ends declare; more than one is an error.
+        namespace: The deepest one that has all its ends.
+        external: The sides on which an end is outside the system.
+        path: The path of the end that is declared first.
+        findings: Its findings, as indices into those of the picture.
     """
 
     id: str
@@ -66,106 +68,108 @@ class Hub:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A publisher, subscription, server or client: what ties a node to a topic, service or action.
+    """A publisher, subscription, server or client: it connects a node with a channel.
 
     Attributes:
-        id: What it is, of which node, and its name there.
-        role: In words, as in `service client`.
-        qos: The policies that differ from what ROS does by itself; durations in seconds.
-        findings: What is wrong with it, as indices into those of the picture.
+        id: Its kind, the full name of its node, and its name, as in `publisher:/robot/arm:scan`.
+        role: Its kind in words, as in `service client` and `service server`.
+        begins_at_node: Whether messages, requests or goals leave the node here.
+        qos: The policies that differ from the default of ROS; durations in seconds.
+        findings: Its findings, as indices into those of the picture.
     """
 
     id: str
     role: str
+    begins_at_node: bool
     name: str
-    box: str
-    hub: str
+    node: str
+    channel: str
     type: str
     qos: Mapping[str, Any]
     path: DataPath
     findings: tuple[int, ...]
 
     @property
-    def from_box(self) -> bool:
-        """Whether it begins at the node: messages, requests and goals leave it."""
-        return self.role in ('publisher', 'service client', 'action client')
-
-    @property
     def ends(self) -> tuple[str, str]:
-        """Where it begins, and where it ends."""
-        return (self.box, self.hub) if self.from_box else (self.hub, self.box)
+        """The ids of where it begins and where it ends."""
+        return (self.node, self.channel) if self.begins_at_node else (self.channel, self.node)
 
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """That a node or process starts only when something else is there."""
+    """A node or process that starts only when something else is ready.
 
-    box: str
+    Attributes:
+        waiter: The id of the node or process.
+        target: The id of the process or channel.
+    """
+
+    waiter: str
     target: str
     path: DataPath
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A system as it is drawn; all in the order of the file."""
+    """A system as it is drawn, in the order of the file."""
 
     name: str
     description: str
-    boxes: tuple[Box, ...]
-    hubs: tuple[Hub, ...]
+    nodes: tuple[NodeBox, ...]
+    channels: tuple[ChannelBox, ...]
     edges: tuple[Edge, ...]
     waits: tuple[Wait, ...]
     findings: tuple[Diagnostic, ...]
     positions: SourceMap
 
     @property
-    def parts(self) -> tuple[Box | Hub | Edge, ...]:
-        """All that findings may be about."""
-        return (*self.boxes, *self.hubs, *self.edges)
+    def parts(self) -> tuple[NodeBox | ChannelBox | Edge, ...]:
+        """All that may have findings."""
+        return (*self.nodes, *self.channels, *self.edges)
 
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
-    """Return what is to be drawn of a system, and where the findings belong in it."""
+    """Return the picture of a system, with the findings at the parts that they are about."""
     graph = build_graph(context)
-    marks = Marks(context.system.positions, graph, findings)
-    boxes = tuple(_boxes(context, marks))
-    ids = {box.path: box.id for box in boxes}
-    hubs = tuple(_hubs(graph, marks))
+    places = FindingPlaces(context.system.positions, graph, findings)
+    nodes = tuple(_nodes(context, places))
+    ids = {node.path: node.id for node in nodes}
+    channels = tuple(_channels(graph, places))
     return Picture(
         context.spec.name,
         context.spec.description,
-        boxes,
-        hubs,
-        tuple(_edges(context, graph, marks, ids)),
-        tuple(_waits(context, boxes, hubs, ids)),
+        nodes,
+        channels,
+        tuple(_edges(context, graph, places, ids)),
+        tuple(_waits(context, nodes, channels, ids)),
         tuple(findings),
         context.system.positions,
     )
 
 
-def _boxes(context: CheckContext, marks: Marks) -> Iterator[Box]:
+def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:
     taken: set[str] = set()
-    for kind, box in _specs(context):
-        namespace = expand_namespace(box.namespace or '')
-        full = join_names(namespace, box.name) if kind == 'node' else box.name
-        # Two nodes of one name are a fault, and are drawn as two.
+    for kind, node in _specs(context):
+        namespace = expand_namespace(node.namespace or '')
+        full = join_names(namespace, node.name) if kind == 'node' else node.name
+        # Two nodes with one name are an error, and are drawn as two.
         id_ = f'{kind}:{full}'
         while id_ in taken:
             id_ += "'"
         taken.add(id_)
-        yield Box(
-            id_, kind, box.name, namespace, box.description, box.path, marks.of_box(box.path)
+        yield NodeBox(
+            id_, kind, node.name, namespace, node.description, node.path, places.of_node(node.path)
         )
 
 
-def _specs(context: CheckContext) -> Iterator[tuple[BoxKind, NodeSpec | ProcessSpec]]:
+def _specs(context: CheckContext) -> Iterator[tuple[NodeKind, NodeSpec | ProcessSpec]]:
     for node in context.spec.nodes.values():
         yield 'node', node
     for process in context.spec.processes.values():
         yield 'process', process
 
 
-def _hubs(graph: Graph, marks: Marks) -> Iterator[Hub]:
+def _channels(graph: Graph, places: FindingPlaces) -> Iterator[ChannelBox]:
     for channel in graph.channels.values():
         ends = channel.ends
         sides: list[Side] = []
@@ -173,7 +177,7 @@ def _hubs(graph: Graph, marks: Marks) -> Iterator[Hub]:
             sides.append('providers')
         if any(getattr(end.entity, 'external', False) for end in channel.providers):
             sides.append('users')
-        yield Hub(
+        yield ChannelBox(
             f'{channel.kind}:{channel.name}',
             channel.kind,
             channel.name,
@@ -181,7 +185,7 @@ def _hubs(graph: Graph, marks: Marks) -> Iterator[Hub]:
             _common_namespace([end.node.namespace for end in ends]),
             tuple(sides),
             ends[0].path,
-            marks.of_hub((channel.kind, channel.name)),
+            places.of_channel((channel.kind, channel.name)),
         )
 
 
@@ -196,32 +200,41 @@ def _common_namespace(namespaces: Sequence[str]) -> str:
 
 
 def _edges(
-    context: CheckContext, graph: Graph, marks: Marks, ids: Mapping[DataPath, str]
+    context: CheckContext, graph: Graph, places: FindingPlaces, ids: Mapping[DataPath, str]
 ) -> Iterator[Edge]:
     for channel in graph.channels.values():
         for end in channel.ends:
-            box = ids[end.node.path]
+            node = ids[end.node.path]
             yield Edge(
-                f'{end.noun}:{box.partition(":")[2]}:{end.entity.name}',
+                f'{end.noun}:{node.partition(":")[2]}:{end.entity.name}',
                 _role(end),
+                sends(channel.kind, provides=KIND_OF_NOUN[end.noun].provides),
                 end.entity.name,
-                box,
+                node,
                 f'{channel.kind}:{channel.name}',
                 end.entity.type,
                 differing_policies(end.qos, context.spec.qos),
                 end.path,
-                marks.of_edge(end.path),
+                places.of_edge(end.path),
             )
 
 
+def sends(channel: ChannelKind, *, provides: bool) -> bool:
+    """Return whether an end sends: publishers send messages, and clients requests and goals."""
+    return provides == (channel == 'topic')
+
+
 def _role(end: Endpoint) -> str:
-    return f'{end.noun} server' if end.noun in ('service', 'action') else end.noun
+    return f'{end.noun} server' if end.noun == KIND_OF_NOUN[end.noun].channel else end.noun
 
 
 def _waits(
-    context: CheckContext, boxes: Sequence[Box], hubs: Sequence[Hub], ids: Mapping[DataPath, str]
+    context: CheckContext,
+    nodes: Sequence[NodeBox],
+    channels: Sequence[ChannelBox],
+    ids: Mapping[DataPath, str],
 ) -> Iterator[Wait]:
-    known = {box.id for box in boxes} | {hub.id for hub in hubs}
+    known = {node.id for node in nodes} | {channel.id for channel in channels}
     for _, waiter in _specs(context):
         for condition in waiter.wait_for:
             target = _target(waiter, condition)

@@ -7,9 +7,9 @@ import re
 from typing import TYPE_CHECKING
 
 from composer.drawing import dot
-from composer.drawing.layout import lay_out
-from composer.drawing.plan import tokens_of
-from composer.drawing.policies import describe_policies
+from composer.drawing.graphviz import lay_out
+from composer.drawing.qos_labels import describe_policies
+from composer.drawing.shapes import tokens_of
 from composer.names import join_names
 from composer.reports.text import escape
 
@@ -26,7 +26,7 @@ def render_picture(picture: Picture) -> str:
     """Return a picture as an SVG document.
 
     Raises:
-        DrawingError: There is no Graphviz, or it fails.
+        DrawingError: Graphviz is missing or failed.
     """
     drawn = _COMMENT.sub('', lay_out(dot.render_picture(picture)))
     titles = dict(_titles(picture))
@@ -39,17 +39,17 @@ def render_picture(picture: Picture) -> str:
 
 
 def _titles(picture: Picture) -> Iterator[tuple[str, str]]:
-    """Yield the token of each part, and what is shown where the pointer rests on it."""
+    """Yield the token of each part, and its tooltip."""
     tokens = tokens_of(picture)
     names: dict[str, str] = {}
-    for box in picture.boxes:
-        full = join_names(box.namespace, box.name) if box.kind == 'node' else box.name
-        names[box.id] = f'{box.kind} {full}'
-    for hub in picture.hubs:
-        names[hub.id] = f'{hub.kind} {hub.name}: {", ".join(hub.types)}'
+    for node in picture.nodes:
+        full = join_names(node.namespace, node.name) if node.kind == 'node' else node.name
+        names[node.id] = f'{node.kind} {full}'
+    for channel in picture.channels:
+        names[channel.id] = f'{channel.kind} {channel.name}: {", ".join(channel.types)}'
     for edge in picture.edges:
         policies = f', {describe_policies(edge.qos)}' if edge.qos else ''
-        names[edge.id] = f'{edge.role} {edge.name} of {names[edge.box]}: {edge.type}{policies}'
+        names[edge.id] = f'{edge.role} {edge.name} of {names[edge.node]}: {edge.type}{policies}'
     for part in picture.parts:
         said = [picture.findings[index].message for index in part.findings]
         yield tokens[part.id], '\n'.join(map(escape, [names[part.id], *said]))

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
 from composer.expressions import is_variable_name
-from composer.expressions.filling import MAX_ENTRIES, SECTIONS
 from composer.expressions.templates import TemplateEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
-    from composer.expressions.filling import FilledDocument
-    from composer.yaml_text.positions import Branch, DataPath, Key, SourceMap
+    from composer.yaml_text.document import Document
+    from composer.yaml_text.positions import Branch, DataPath, Key
+
+# The sections whose entries may be repeated, and how many they may have unless a file says more.
+SECTIONS = ('nodes', 'include', 'processes')
+MAX_ENTRIES = 10_000
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
@@ -25,31 +28,22 @@ _WHEN = 'when'
 _SAMPLE = 1
 
 
-def has_conditions(data: Mapping[str, Any]) -> bool:
-    """Return whether any entry of a document is to be repeated or may be left out."""
-    return any(
-        _is_conditional(entry)
-        for section in SECTIONS
-        if isinstance(data.get(section), dict)
-        for entry in data[section].values()
-    )
-
-
 def expand_document(
+    document: Document,
     data: dict[str, Any],
     values: Mapping[str, Any],
-    positions: SourceMap,
     samples: Collection[str] = (),
     origins: Mapping[str, str] | None = None,
-) -> FilledDocument:
-    """Evaluate all expressions of a document, and repeat or leave out its entries.
+) -> dict[str, Any]:
+    """Return data with all expressions evaluated, and entries repeated or left out.
 
     Args:
+        document: The document that the data are from; what is learnt on the way goes there.
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
     """
-    evaluator = TemplateEvaluator(values, positions, samples, origins)
+    evaluator = TemplateEvaluator(document, values, samples, origins)
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
     plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
     filled = evaluator.evaluate_mapping(plain, ()) | ignored
@@ -60,8 +54,7 @@ def expand_document(
             filled[section] = expansion.expand(data[section])
         elif section in data:
             filled[section] = evaluator.evaluate(data[section], (section,))
-    evaluator.filled.data = filled
-    return evaluator.filled
+    return filled
 
 
 def _limit_of(data: Mapping[str, Any]) -> int:
@@ -75,7 +68,7 @@ class _Expansion:
 
     def __init__(self, evaluator: TemplateEvaluator, section: str, limit: int) -> None:
         self._evaluator = evaluator
-        self._filled = evaluator.filled
+        self._document = evaluator.document
         self._section = section
         self._limit = limit
         self._entries: dict[str, Any] = {}
@@ -91,9 +84,9 @@ class _Expansion:
             is_repeated = _FOREACH in entry
             if entry.get(_FOREACH) == {}:
                 self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
-                self._filled.failed.append(path)
+                self._document.dropped.add(path)
                 continue
-            before = len(self._filled.faults)
+            before = len(self._document.diagnostics)
             for evaluator in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
                 if len(self._entries) >= self._limit:
                     self._report_limit(path)
@@ -101,9 +94,9 @@ class _Expansion:
                 holds = self._holds(evaluator, entry.get(_WHEN, True), (*path, _WHEN))
                 self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
                 before = -1
-            if len(self._filled.faults) > before >= 0:
+            if len(self._document.diagnostics) > before >= 0:
                 # It is missing for a fault, not for having no values.
-                self._filled.failed.append(path)
+                self._document.dropped.add(path)
         return self._entries
 
     def _add(
@@ -119,8 +112,8 @@ class _Expansion:
         key = evaluator.evaluate_key(written_path)
         path = (self._section, key)
         if key in self._entries:
-            if path in self._filled.left_out:
-                self._filled.left_out.discard(path)
+            if path in self._document.left_out:
+                self._document.left_out.discard(path)
             elif is_left_out:
                 return
             else:
@@ -130,7 +123,7 @@ class _Expansion:
             self._graft(path, written)
         self._entries[key] = evaluator.evaluate(body, path)
         if is_left_out:
-            self._filled.left_out.add(path)
+            self._document.left_out.add(path)
 
     def _graft(self, path: DataPath, written: str) -> None:
         if self._branches is None:
@@ -156,7 +149,7 @@ class _Expansion:
         values = evaluator.evaluate(foreach[name], at)
         is_sample = evaluator.is_sampled(at)
         if not isinstance(values, list):
-            if at not in self._filled.failed:
+            if at not in self._document.dropped:
                 self._report(at, f"'{name}' takes a list of values, not {values!r}")
             # So that the rest of the entry is read once, too.
             values, is_sample = [_SAMPLE], True
@@ -167,7 +160,7 @@ class _Expansion:
 
     def _holds(self, evaluator: TemplateEvaluator, condition: Any, path: DataPath) -> bool:
         holds = evaluator.evaluate(condition, path)
-        if path in self._filled.failed:
+        if path in self._document.dropped:
             return False
         if not isinstance(holds, bool):
             self._report(path, f'{_WHEN} is true or false, not {holds!r}')
@@ -177,13 +170,13 @@ class _Expansion:
     def _report(self, path: DataPath, message: str) -> None:
         rule = 'bad-when' if path[2] == _WHEN else 'bad-foreach'
         span = self._evaluator.positions.value(path)
-        self._filled.faults.append(diagnostic_at(span, rule, message))
+        self._document.diagnostics.append(diagnostic_at(span, rule, message))
 
     def _report_duplicate(self, key: str, path: DataPath, *, is_repeated: bool) -> None:
         if not is_repeated:
             self._evaluator.report_duplicate(key, path, (self._section, key))
             return
-        self._filled.faults.append(
+        self._document.diagnostics.append(
             diagnostic_at(
                 self._evaluator.positions.key(path),
                 'duplicate-key',
@@ -193,7 +186,7 @@ class _Expansion:
         )
 
     def _report_limit(self, path: DataPath) -> None:
-        self._filled.faults.append(
+        self._document.diagnostics.append(
             diagnostic_at(
                 self._evaluator.positions.key((*path, _FOREACH)),
                 'too-many-entries',

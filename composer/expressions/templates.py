@@ -22,16 +22,17 @@ from jinja2.exceptions import SecurityError
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions.evaluation import evaluate_expression
-from composer.expressions.filling import FilledDocument
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
 from composer.spelling import find_nearest, suggest
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from composer.diagnostics import Span
-    from composer.yaml_text.positions import DataPath, SourceMap
+    from composer.yaml_text.document import Document
+    from composer.yaml_text.positions import DataPath
 
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
 # Beyond this no number is even a double; much longer ones Python will not print.
@@ -42,6 +43,7 @@ class TemplateEvaluator:
     """Evaluates the expressions of one document.
 
     Args:
+        document: Findings, and what else is learnt about the values, go there.
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
@@ -49,14 +51,13 @@ class TemplateEvaluator:
 
     def __init__(
         self,
+        document: Document,
         values: Mapping[str, Any],
-        positions: SourceMap,
         samples: Collection[str] = (),
         origins: Mapping[str, str] | None = None,
-        filled: FilledDocument | None = None,
     ) -> None:
-        self.filled = filled or FilledDocument({})
-        self.positions = positions
+        self.document = document
+        self.positions = document.positions
         self._origins = origins or {}
         self._values = values
         self._samples = frozenset(samples)
@@ -65,13 +66,8 @@ class TemplateEvaluator:
     def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> TemplateEvaluator:
         """Return an evaluator with one more name in scope, for the same document."""
         samples = self._samples | {name} if is_sample else self._samples - {name}
-        inner = TemplateEvaluator(
-            {**self._values, name: value},
-            self.positions,
-            samples,
-            {**self._origins, name: origin},
-            self.filled,
-        )
+        values, origins = {**self._values, name: value}, {**self._origins, name: origin}
+        inner = TemplateEvaluator(self.document, values, samples, origins)
         inner._sandbox = self._sandbox
         return inner
 
@@ -103,11 +99,11 @@ class TemplateEvaluator:
         written = str(path[-1])
         if OPEN not in written:
             return written
-        return str(_as_text(self._evaluate(written, path, is_key=True)))
+        return _as_text(self._evaluate(written, path, is_key=True))
 
     def is_sampled(self, path: DataPath) -> bool:
         """Return whether the value at a path hangs on samples."""
-        return path in self.filled.sampled
+        return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
         span = self.positions.key(path) if is_key else self.positions.value(path)
@@ -115,17 +111,17 @@ class TemplateEvaluator:
         try:
             expressions = list(find_expressions(text, self._sandbox))
             names = self._names_in(text, expressions)
-            self.filled.notes[path] = self._note(names)
+            self.document.notes[path] = self._note(names)
             sampled = not self._samples.isdisjoint(names)
             if sampled:
-                self.filled.sampled_spans.append(span)
-                self.filled.sampled += [] if is_key else [path]
+                self.document.sampled.append(span)
+                self.document.sampled_paths |= set() if is_key else {path}
             return self._compute(text, expressions, span)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
-            self.filled.failed.append(path)
+            self.document.dropped.add(path)
             # With the real value it may succeed.
             if not sampled or isinstance(error, UndefinedError):
-                self.filled.faults.append(self._explain(error, span))
+                self.document.diagnostics.append(self._explain(error, span))
             return text
 
     def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
@@ -137,7 +133,7 @@ class TemplateEvaluator:
         start = 0
         for expression in expressions:
             parts.append(text[start : expression.start])
-            parts.append(str(_as_text(self._value_of(text, expression, span))))
+            parts.append(_as_text(self._value_of(text, expression, span)))
             start = expression.stop
         return ''.join([*parts, text[start:]])
 
@@ -175,7 +171,7 @@ class TemplateEvaluator:
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
         """Say that two keys of one mapping come out the same."""
-        self.filled.faults.append(
+        self.document.diagnostics.append(
             diagnostic_at(
                 self.positions.key(path),
                 'duplicate-key',
@@ -216,8 +212,6 @@ def _as_data(value: Any) -> Any:
     raise TemplateRuntimeError(message)
 
 
-def _as_text(value: Any) -> Any:
-    """Write a value inside a text as YAML does."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    return '' if value is None else value
+def _as_text(value: Any) -> str:
+    """Return a value inside a text as YAML writes it, and nothing for null."""
+    return '' if value is None else format_scalar(value)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.interfaces.definitions.package_folder import PackageDefinitions
-    from composer.language.pipeline import LoadedSystem
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
 
 

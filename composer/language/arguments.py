@@ -1,9 +1,10 @@
-"""What a file takes from the command line: declarations, and the words that give values."""
+"""The arguments of a file: how they are declared, and what gives them their values."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
 from composer.expressions import is_variable_name
@@ -16,7 +17,8 @@ from composer.spelling import suggest
 from composer.yaml_text.scalars import ScalarError, parse_plain_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Sequence
+
 
 _SEPARATOR = ':='
 # What a file is checked with where a required argument has no value.
@@ -61,7 +63,52 @@ class ArgumentSpec:
         return f'{text}: {self.description}' if self.description else text
 
 
-def read_arguments(data: Mapping[str, Any]) -> dict[str, ArgumentSpec]:
+@dataclass(frozen=True, slots=True)
+class ArgumentValues:
+    """The values of a file's arguments.
+
+    Attributes:
+        samples: The names of those whose value is a sample of its type.
+        origins: Where they come from, in words; those that have their default are not in it.
+    """
+
+    values: Mapping[str, Any]
+    samples: Collection[str] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+
+GiveValues: TypeAlias = Callable[[Mapping[str, ArgumentSpec]], ArgumentValues]
+
+
+def sample_values(declared: Mapping[str, ArgumentSpec]) -> ArgumentValues:
+    """Return values to check a file with: defaults, and samples where there are none."""
+    return ArgumentValues(
+        {name: argument.sample for name, argument in declared.items()},
+        {name for name, argument in declared.items() if _is_unknown(argument)},
+    )
+
+
+def _is_unknown(argument: ArgumentSpec) -> bool:
+    """Return whether the declaration gives no value, or a wrong one."""
+    is_wrong = isinstance(argument.default, list | dict) or any(find_declaration_errors(argument))
+    return argument.is_open or is_wrong
+
+
+def values_from_words(
+    declared: Mapping[str, ArgumentSpec], words: Sequence[str] | None
+) -> ArgumentValues:
+    """Return the values that a command line gives; samples if there is no command line.
+
+    Raises:
+        UsageError: The words do not fit the declarations.
+    """
+    if words is None:
+        return sample_values(declared)
+    values, given = parse_arguments(declared, words)
+    return ArgumentValues(values, origins=dict.fromkeys(given, 'command line'))
+
+
+def parse_declarations(data: Mapping[str, Any]) -> dict[str, ArgumentSpec]:
     """Return the arguments that a file declares.
 
     Declarations that the schema refuses are read as far as they make sense: the schema reports
@@ -91,7 +138,7 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
     )
 
 
-def find_argument_faults(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Yield what is wrong with a declaration beyond the schema, each with the keys to its place.
 
     A name that no expression can use, and a default or a choice that does not fit.

@@ -1,14 +1,17 @@
-"""Which behaviours a node has, and what each of them is called with."""
+"""The behaviours of a node, and what each of them is called with."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from composer.entity_kinds import NODE_BEHAVIOURS
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.language.specs import BehaviourSpec, NodeSpec
+    from composer.entity_kinds import BehaviourKey, EntityKind
+    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,14 +20,26 @@ class Binding:
 
     Attributes:
         owner: The place in words, as in `timer 'tick'`.
-        parameters: The names of the positional arguments that it is called with.
-        may_yield: Whether it may be a generator.
+        key: The key that names it there, with what it is called with.
+        kind: The kind of its entity; `None` for a behaviour of the node itself.
+        entity: Its entity; `None` for a behaviour of the node itself.
     """
 
     behaviour: BehaviourSpec
     owner: str
-    parameters: tuple[str, ...]
-    may_yield: bool = False
+    key: BehaviourKey
+    kind: EntityKind | None = None
+    entity: EntitySpec | None = None
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of the positional arguments that it is called with."""
+        return self.key.arguments
+
+    @property
+    def may_yield(self) -> bool:
+        """Whether it may be a generator."""
+        return self.key.may_yield
 
     @property
     def call(self) -> str:
@@ -35,39 +50,13 @@ class Binding:
 
 def node_bindings(node: NodeSpec) -> Iterator[Binding]:
     """Yield all behaviours of a node."""
-    for timer in node.timers.values():
-        if timer.behaviour:
-            yield Binding(timer.behaviour, f"timer '{timer.name}'", ('node',), may_yield=True)
-    for subscription in node.subscriptions.values():
-        if subscription.behaviour:
-            owner = f"subscription '{subscription.name}'"
-            yield Binding(subscription.behaviour, owner, ('node', 'message'))
-    yield from _serving_bindings(node)
-    yield from _hook_bindings(node)
-
-
-def _serving_bindings(node: NodeSpec) -> Iterator[Binding]:
-    for service in node.services.values():
-        yield Binding(service.behaviour, f"service '{service.name}'", ('node', 'request'))
-    for action in node.actions.values():
-        owner = f"action '{action.name}'"
-        yield Binding(action.behaviour, owner, ('node', 'goal'), may_yield=True)
-        if action.accept:
-            yield Binding(action.accept, f'{owner} (accept)', ('node', 'goal'))
-    for client in node.action_clients.values():
-        owner = f"action client '{client.name}'"
-        if client.feedback:
-            yield Binding(client.feedback, f'{owner} (feedback)', ('node', 'feedback'))
-        if client.result:
-            yield Binding(client.result, f'{owner} (result)', ('node', 'result'))
-
-
-def _hook_bindings(node: NodeSpec) -> Iterator[Binding]:
-    hooks = (
-        ('on_start', node.on_start, ('node',)),
-        ('on_stop', node.on_stop, ('node',)),
-        ('on_parameters', node.on_parameters, ('node', 'changes')),
-    )
-    for key, behaviour, parameters in hooks:
+    for kind, entity in node.entities():
+        for key in kind.behaviours:
+            behaviour: BehaviourSpec | None = getattr(entity, key.key)
+            if behaviour:
+                part = '' if key.key == 'behaviour' else f' ({key.key})'
+                yield Binding(behaviour, f"{kind.noun} '{entity.name}'{part}", key, kind, entity)
+    for key in NODE_BEHAVIOURS:
+        behaviour = getattr(node, key.key)
         if behaviour:
-            yield Binding(behaviour, key, parameters)
+            yield Binding(behaviour, key.key, key)

@@ -1,42 +1,46 @@
-"""The defaults of a file: written into its nodes and processes, so that they hold nowhere else."""
+"""The defaults of a file, written into its nodes and processes: they hold nowhere else."""
 
 from __future__ import annotations
 
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
+from composer.entity_kinds import CHANNEL_KINDS
+from composer.language.includes.profile_names import drop_unknown_profiles
 from composer.language.namespaces import join_namespaces, note_namespace
 from composer.language.parsing.process_parser import takes_ros_arguments, with_defaults, with_waits
 
 if TYPE_CHECKING:
-    from composer.language.instances import Instance
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 # What defaults hold that is not simply a key of each node.
 _SPECIAL_DEFAULTS = ('namespace', 'qos')
-_WITH_QOS = ('publishers', 'subscriptions')
+# The QoS of defaults is for topics; rmw has a profile of its own for services.
+_WITH_QOS = [kind.section for kind in CHANNEL_KINDS if kind.has_qos and kind.channel == 'topic']
 
 
-def push_defaults(instance: Instance) -> None:
-    """Write the defaults of a file into its nodes, so that they hold nowhere else."""
-    defaults = instance.data.pop('defaults', {})
-    if not defaults:
-        return
-    pushing = _Pushing(instance, defaults)
-    for section, write in (('nodes', pushing.in_node), ('processes', pushing.in_process)):
-        entries = instance.data.get(section, {})
-        for name in entries:
-            entries[name] = write(name, entries[name])
+def apply_defaults(system: LoadedSystem) -> None:
+    """Write the defaults of a file into its nodes and processes, and drop unknown profiles."""
+    data = system.entries
+    defaults = data.pop('defaults', {})
+    if defaults:
+        writer = _DefaultsWriter(system, defaults)
+        for section, write in (('nodes', writer.in_node), ('processes', writer.in_process)):
+            if section in data:
+                entries = data[section].items()
+                data[section] = {name: write(name, entry) for name, entry in entries}
+    drop_unknown_profiles(system)
 
 
-class _Pushing:
+class _DefaultsWriter:
     """Writes the defaults of one file into its nodes and processes."""
 
-    def __init__(self, instance: Instance, defaults: dict[str, Any]) -> None:
-        self._instance = instance
+    def __init__(self, system: LoadedSystem, defaults: dict[str, Any]) -> None:
+        self._system = system
         self._defaults = defaults
-        self._branches = instance.positions.branches(('defaults',))
-        self._notes = [(at, note) for at, note in instance.notes.items() if at[0] == 'defaults']
+        self._branches = system.positions.branches(('defaults',))
+        self._notes = [(at, note) for at, note in system.notes.items() if at[0] == 'defaults']
 
     def in_node(self, name: str, node: dict[str, Any]) -> dict[str, Any]:
         at = ('nodes', name)
@@ -70,12 +74,12 @@ class _Pushing:
         outer, inner = self._defaults.get('namespace', ''), entry.get('namespace', '')
         namespace = join_namespaces(outer, inner)
         if namespace != inner:
-            note_namespace(self._instance, (*at, 'namespace'), ('defaults', 'namespace'), inner)
+            note_namespace(self._system, (*at, 'namespace'), ('defaults', 'namespace'), inner)
         return {'namespace': namespace} if namespace else {}
 
     def _with_qos(self, at: DataPath, entries: dict[str, Any]) -> dict[str, Any]:
         changed = {}
-        positions = self._instance.positions
+        positions = self._system.positions
         for name, entry in entries.items():
             path = (*at, name)
             mapping = {'type': entry} if isinstance(entry, str) else entry
@@ -88,7 +92,7 @@ class _Pushing:
         return changed
 
     def _graft(self, path: DataPath, key: str) -> None:
-        self._instance.positions.graft(path, self._branches[key])
+        self._system.positions.graft(path, self._branches[key])
         for at, note in self._notes:
             if at[1] == key:
-                self._instance.notes[path + at[2:]] = note
+                self._system.notes[path + at[2:]] = note

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
 from composer.spelling import suggest
-from composer.yaml_text.reader import Document
+from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,12 +31,12 @@ def merge_documents(documents: Sequence[Document]) -> Document:
 
 
 def _merge(below: Document, above: Document) -> Document:
-    diagnostics = (*below.diagnostics, *above.diagnostics)
+    diagnostics = [*below.diagnostics, *above.diagnostics]
     if below.data is None or above.data is None:
         return Document(None, below.positions, diagnostics)
     merging = _Merging(below.positions.copy(), above.positions)
     data = merging.merge(below.data, above.data, ())
-    return Document(data, merging.positions, (*diagnostics, *merging.findings))
+    return Document(data, merging.positions, [*diagnostics, *merging.findings])
 
 
 class _Merging:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from composer.language.instances import Instance
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 
-def note_namespace(instance: Instance, path: DataPath, outer: DataPath, inner: str) -> None:
+def note_namespace(system: LoadedSystem, path: DataPath, outer: DataPath, inner: str) -> None:
     """Note that the namespace at a path lies in the one that is written at another path."""
-    positions, notes = instance.positions, instance.notes
+    positions, notes = system.positions, system.notes
     place = ', '.join(filter(None, (positions.value(outer).place, notes.get(outer))))
     if inner:
         own = notes.get(path)

@@ -11,6 +11,7 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath, SourceMap
 
 _PACKAGE = 'package://'
@@ -50,11 +51,12 @@ def list_neighbours(path: Path) -> list[str]:
     return [] if path.name in names else names
 
 
-def resolve_paths(data: dict[str, Any], positions: SourceMap) -> dict[str, Any]:
-    """Return a file's data with paths that hold wherever the data go.
+def resolve_paths(system: LoadedSystem) -> None:
+    """Resolve the paths of a file, so that its data hold in any file.
 
     Paths into packages stay as they are: what is wrong with them is for the checks to say.
     """
+    data, positions = system.entries, system.positions
     resolved = dict(data)
     if 'interfaces' in data:
         resolved['interfaces'] = {
@@ -67,7 +69,7 @@ def resolve_paths(data: dict[str, Any], positions: SourceMap) -> dict[str, Any]:
                 name: _with_paths(entry, (section, name), positions)
                 for name, entry in data[section].items()
             }
-    return resolved
+    system.data = resolved
 
 
 def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import SourceFile, Span
+from composer.entity_kinds import KIND_OF_SECTION
 from composer.errors import UsageError
 from composer.language.layers import is_null_a_value
 from composer.spelling import suggest
-from composer.yaml_text.reader import Document, parse_document
+from composer.yaml_text.document import Document
+from composer.yaml_text.reader import parse_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,18 +19,6 @@ if TYPE_CHECKING:
 
 # Sections whose keys are names that the file gives; all other keys are those of the schema.
 _NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
-_NAMED_IN_NODES = frozenset(
-    (
-        'action_clients',
-        'actions',
-        'parameters',
-        'publishers',
-        'service_clients',
-        'services',
-        'subscriptions',
-        'timers',
-    )
-)
 
 
 def apply_set_values(document: Document, set_values: Sequence[str]) -> Document:
@@ -117,7 +107,7 @@ def _has_given_names(path: list[str]) -> bool:
         case [section]:
             return section in _NAMED
         case ['nodes', _, section]:
-            return section in _NAMED_IN_NODES
+            return section in KIND_OF_SECTION
         case _:
             return False
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS
 from composer.names import join_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
+    from composer.entity_kinds import EntityKind
     from composer.yaml_text.positions import DataPath
 
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
@@ -227,6 +229,10 @@ EndSpec: TypeAlias = (
 )
 
 
+# All that stands in a section of a node.
+EntitySpec: TypeAlias = ParameterSpec | TimerSpec | EndSpec
+
+
 @dataclass(frozen=True, slots=True)
 class ConditionSpec:
     """Something that must be there before a node or process starts.
@@ -344,20 +350,17 @@ class NodeSpec:
         """Its name in its namespace, as in `/robot/arm`."""
         return join_names(self.namespace, self.name)
 
-    @property
-    def endpoints(self) -> tuple[PublisherSpec | SubscriptionSpec, ...]:
-        """All that has a topic."""
-        return (*self.publishers.values(), *self.subscriptions.values())
+    def entities(self) -> Iterator[tuple[EntityKind, EntitySpec]]:
+        """Yield all that the node has, each with its kind."""
+        for kind in ENTITY_KINDS:
+            for entity in getattr(self, kind.section).values():
+                yield kind, entity
 
-    @property
-    def service_endpoints(self) -> tuple[ServiceSpec | ServiceClientSpec, ...]:
-        """All that has a service."""
-        return (*self.services.values(), *self.service_clients.values())
-
-    @property
-    def action_endpoints(self) -> tuple[ActionSpec | ActionClientSpec, ...]:
-        """All that has an action."""
-        return (*self.actions.values(), *self.action_clients.values())
+    def ends(self) -> Iterator[tuple[EntityKind, EndSpec]]:
+        """Yield all that meets others on a topic, service or action, each with its kind."""
+        for kind in CHANNEL_KINDS:
+            for entity in getattr(self, kind.section).values():
+                yield kind, entity
 
     @property
     def triggers(self) -> tuple[TimerSpec | SubscriptionSpec, ...]:

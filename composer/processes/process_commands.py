@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import yaml
+from typing import TYPE_CHECKING
 
 from composer.ament import list_executables
 from composer.errors import StartError
 from composer.language.paths import PathError, resolve_path
-from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+from composer.ros_parameters.file_writer import render_parameters_for_all
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -57,7 +55,7 @@ class CommandWriter:
         arguments = ['--ros-args']
         if spec.parameters:
             path = self._folder / f'{len(list(self._folder.iterdir()))}.yaml'
-            path.write_text(render_parameters(spec.parameters), encoding='utf-8')
+            path.write_text(render_parameters_for_all(spec.parameters), encoding='utf-8')
             arguments += ['--params-file', str(path)]
         for text in spec.parameter_files:
             arguments += ['--params-file', str(_find_file(spec, text))]
@@ -90,12 +88,6 @@ def find_folder(spec: ProcessSpec) -> str | None:
     return str(folder)
 
 
-def render_parameters(parameters: Mapping[str, Any]) -> str:
-    """Return a parameter file for all nodes of a process, from which rcl reads the right types."""
-    values = _converted(dict(parameters))
-    return yaml.dump({'/**': {'ros__parameters': values}}, Dumper=_Dumper, allow_unicode=True)
-
-
 def _with_absolute_files(ros_arguments: Sequence[str]) -> list[str]:
     """Return the arguments with paths that hold in any working directory."""
     before = ['', *ros_arguments[:-1]]
@@ -109,26 +101,6 @@ def _level_for_rcl(request: str) -> str:
     """Return `robot.talker:=debug` for `/robot/talker:=debug`."""
     name, separator, level = request.rpartition(':=')
     return f'{name.strip("/").replace("/", ".")}{separator}{level}'
-
-
-class _Dumper(yaml.SafeDumper):
-    """Quotes all strings: rcl and PyYAML disagree on which are numbers or booleans."""
-
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - as it is called
-        return True  # rcl does not support aliases
-
-
-def _quote(dumper: _Dumper, text: str) -> yaml.Node:
-    return dumper.represent_scalar('tag:yaml.org,2002:str', text, style='"')
-
-
-_Dumper.add_representer(str, _quote)
-
-
-def _converted(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _converted(each) for name, each in value.items()}
-    return convert_parameter_value(value, infer_parameter_type(value))
 
 
 def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str]:

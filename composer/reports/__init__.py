@@ -1,4 +1,4 @@
-"""Findings → what people and programs read. Each format is one module with a `render_report`."""
+"""Reports of findings. Each format is a module with a `render_report`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from composer.reports.report import Report
 
-# A run pays for the import of its own format only.
+# A run imports the module of its own format only.
 FORMATS: dict[str, str] = {
     'text': 'composer.reports.text',
     'json': 'composer.reports.json_document',

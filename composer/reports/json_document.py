@@ -1,4 +1,4 @@
-"""A report as JSON, of the form that `schemas/report.schema.json` describes."""
+"""A report as JSON; `schemas/report.schema.json` is its schema."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.reports.report import Report
 
-# It grows when a key is removed or changes its meaning, not when one is added.
+# Raised when a key is removed or changes its meaning, not when one is added.
 _VERSION = 1
 
 

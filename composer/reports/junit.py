@@ -1,6 +1,6 @@
-"""A report as JUnit XML: a test case for each file, which fails with what is wrong with it.
+"""A report as JUnit XML: a test case for each file, which fails with its findings.
 
-Source of the form: the schema of Jenkins' xUnit plugin, which GitLab reads too.
+Source: the schema of Jenkins' xUnit plugin, which GitLab reads too.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from composer.reports.report import CheckedFile, Report
 
-# All that XML 1.0 has no place for, not even as an escape (https://www.w3.org/TR/xml/#charsets).
+# The characters that XML 1.0 does not allow, not even as an escape (https://www.w3.org/TR/xml/#charsets).
 _NOT_XML = re.compile('[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
 
 

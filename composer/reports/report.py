@@ -1,4 +1,4 @@
-"""What a check found, as every format shows it."""
+"""The result of a check, which every format shows."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CheckedFile:
-    """A file and what is wrong with it.
+    """A file and its findings.
 
     Attributes:
         name: The path as the user wrote it.
-        findings: From top to bottom; also those in files that this one names.
+        findings: From top to bottom, with those in the files that it includes.
         nodes: How many nodes it declares; `None` if it could not be read.
     """
 
@@ -34,8 +34,8 @@ class Report:
     """All that a run of `composer check` found.
 
     Attributes:
-        not_checked: What could not be looked at on this machine, a line each.
-        is_strict: Whether warnings count as faults.
+        not_checked: What could not be checked on this machine, a line each.
+        is_strict: Whether warnings count as errors.
     """
 
     files: tuple[CheckedFile, ...]
@@ -44,18 +44,18 @@ class Report:
 
     @property
     def findings(self) -> list[Diagnostic]:
-        """All findings, file by file; what several files share is found once."""
+        """All findings, file by file; one that several files share is listed once."""
         found = [finding for file in self.files for finding in file.findings]
         return list({finding.sort_key: finding for finding in reversed(found)}.values())[::-1]
 
     @property
     def has_failed(self) -> bool:
-        """Whether anything found forbids a start, or counts as if it did."""
+        """Whether there are errors, or warnings that count as errors."""
         return has_errors(self.findings) or (self.is_strict and bool(self.findings))
 
 
 def count_severities(findings: list[Diagnostic]) -> tuple[int, int]:
-    """Return how many errors and how many warnings there are."""
+    """Return the number of errors and of warnings."""
     errors = sum(finding.severity is Severity.ERROR for finding in findings)
     return errors, len(findings) - errors
 

@@ -1,4 +1,4 @@
-"""Findings as text: where, what, the line with a caret below it, and what to do."""
+"""A report as text: place, message, an excerpt with a caret, and help."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.reports.report import Report
 
-# Of longer lines only the surroundings of the fault are shown.
+# Of a longer line, only the part around the finding is shown.
 _WIDEST_LINE = 160
 
 _COLOURS = {Severity.ERROR: 'red', Severity.WARNING: 'yellow'}
@@ -53,7 +53,7 @@ def count(number: int, noun: str) -> str:
 
 
 def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
-    """Return a finding as it is shown on a terminal; without a newline at its end."""
+    """Return a finding as text, without a newline at its end."""
     style = click.style if colour else _plain
     span = finding.span
     place = f'{finding.file}:{span.line}:{span.column}' if span else finding.file
@@ -72,7 +72,7 @@ def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
 
 
 def escape(text: str) -> str:
-    """Return a text on one line, with what a terminal would obey written as escapes."""
+    """Return a text on one line; control characters, which a terminal obeys, become escapes."""
     if text.isprintable():
         return text
     return ''.join(

@@ -1,65 +1,51 @@
-"""Parameters of nodes as a file in ROS's own format, which rcl reads back as the same values."""
+"""Parameters → files in ROS's own format, which rcl reads back as the same values."""
 
 from __future__ import annotations
 
-import math
-import re
-import sys
 from typing import TYPE_CHECKING, Any
 
-from composer.yaml_text.writer import quote_text
+from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+from composer.yaml_text.writer import RCL, render_key, render_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-_PLAIN_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_.]*')
-
 
 def render_parameter_file(nodes: Mapping[str, Mapping[str, tuple[str, Any]]]) -> str:
-    """Return the text of a parameter file.
+    """Return a parameter file for nodes.
 
     Args:
         nodes: Type and value of each parameter, by its name, by the full name of its node.
     """
-    lines = [line for name, values in nodes.items() for line in _node_lines(name, values)]
-    return '\n'.join(lines or ['# no node has parameters']) + '\n'
+    parts = [part for name, values in nodes.items() for part in _render_node(name, values)]
+    return ''.join(parts) or '# no node has parameters\n'
 
 
-def _node_lines(name: str, values: Mapping[str, tuple[str, Any]]) -> Iterator[str]:
+def render_parameters_for_all(parameters: Mapping[str, Any]) -> str:
+    """Return a parameter file for all nodes of a process; integers among doubles are doubles."""
+    return render_yaml({'/**': {'ros__parameters': _converted(parameters)}}, RCL)
+
+
+def _render_node(name: str, values: Mapping[str, tuple[str, Any]]) -> Iterator[str]:
     if not values:
         return
-    yield f'{name}:'
-    written = list(_parameter_lines(values))
-    has_some = any(not line.lstrip().startswith('#') for line in written)
-    yield '  ros__parameters:' if has_some else '  ros__parameters: {}'
-    yield from written
-
-
-def _parameter_lines(values: Mapping[str, tuple[str, Any]]) -> Iterator[str]:
-    for name, (type_name, value) in values.items():
-        key = name if _PLAIN_NAME.fullmatch(name) else quote_text(name)
-        if type_name == 'byte_array':
-            yield f'    # {key}: a parameter file has no bytes'
-        elif value == []:
-            yield f'    # {key}: an empty list has no type in a parameter file'
-        elif isinstance(value, list):
-            yield f'    {key}: [{", ".join(map(_scalar, value))}]'
+    reasons = {key: _why_unwritable(*typed) for key, typed in values.items()}
+    yield f'{name}:\n'
+    yield '  ros__parameters: {}\n' if all(reasons.values()) else '  ros__parameters:\n'
+    for key, (_, value) in values.items():
+        if reasons[key]:
+            yield f'    # {render_key(key, RCL)}: {reasons[key]}\n'
         else:
-            yield f'    {key}: {_scalar(value)}'
+            yield f'    {render_yaml({key: value}, RCL)}'
 
 
-def _scalar(value: Any) -> str:
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    if isinstance(value, str):
-        return quote_text(value)
-    return _double(value) if isinstance(value, float) else str(value)
+def _why_unwritable(type_name: str, value: Any) -> str | None:
+    if type_name == 'byte_array':
+        return 'a parameter file has no bytes'
+    return 'an empty list has no type in a parameter file' if value == [] else None
 
 
-def _double(value: float) -> str:
-    if math.isnan(value):
-        return '.nan'
-    if math.isinf(value):
-        return '.inf' if value > 0 else '-.inf'
-    # Of the smallest numbers rcl reads only those that are written exactly.
-    return value.hex() if 0 < abs(value) < sys.float_info.min else repr(value)
+def _converted(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _converted(each) for name, each in value.items()}
+    return convert_parameter_value(value, infer_parameter_type(value))

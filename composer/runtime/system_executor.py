@@ -12,7 +12,7 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
-from composer.runtime.behaviours.tracebacks import format_fault
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class SystemExecutor(ComposerExecutor):
         if not isinstance(error, NoResponseError):
             # An error raised here would end the thread that spins.
             with suppress(Exception):
-                self._log(format_fault(error))
+                self._log(format_internal_error(error))
 
     def _keep_spinning(self) -> None:
         self._spin_on()

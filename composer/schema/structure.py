@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.schema.violations import StructureFault
+    from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key, SourceMap
 
 # What editors accept in place of a number, a word and the like. Here, the values are in place.
@@ -39,60 +40,46 @@ _OUTER_SECTIONS = {
 _DEPTH_OF_ENTRIES = 3
 
 
-def check_structure(
-    data: dict[str, Any],
-    positions: SourceMap,
-    failed: Sequence[DataPath] = (),
-    sampled: Sequence[DataPath] = (),
-) -> tuple[dict[str, Any], frozenset[DataPath], list[Diagnostic]]:
-    """Hold data against the schema.
+def check_structure(document: Document) -> None:
+    """Check the data of a document against the schema, and drop from them what is wrong.
 
-    A misspelt key is reported and then read as the one that was meant, so that what lies below
-    it is checked in the same run; `positions` follow it.
-
-    Args:
-        data: They stay as they are.
-        failed: The paths of expressions that could not be evaluated; they are left out.
-        sampled: The paths of values that only stand for others; what is wrong with them is left
-            out as well, and not reported.
-
-    Returns:
-        The data without what was wrong, the paths that were dropped for it, and the findings. Of
-        data with more than a thousand faults nothing is left.
+    What was dropped before, since its expression could not be evaluated, is removed as well. A
+    misspelt key is reported and then read as the nearest right one, so that what lies below it is
+    checked in the same run. What is wrong with values that depend on samples is dropped, and not
+    reported. Of data with more than a thousand errors nothing is left.
     """
-    failed = [_entry_of(path) for path in failed]
+    positions, data = document.positions, document.data or {}
+    failed = [_entry_of(path) for path in document.dropped]
     if failed or not _schema().accepts(data):
         data = _copied(data)
     _remove_entries(data, failed)
     findings = _mend_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
-    passed_over = set(sampled)
     faults = _find_faults(data)
     missing = {fault.path for fault in faults if fault.rule == 'missing-key'}
     for fault in faults:
         # What one key needs beside it is missing once, also if its entry needs it anyway.
         known = fault.path in incomplete or (fault.path and fault.path[:-1] in missing)
-        if fault.path not in passed_over and not (fault.rule == 'missing-key' and known):
+        if fault.path not in document.sampled_paths and not (
+            fault.rule == 'missing-key' and known
+        ):
             findings.append(fault.diagnostic(positions))
+    document.diagnostics += findings
     if len(findings) >= MAX_FINDINGS:
-        return dict(_REQUIRED), frozenset(), findings
-    return data, frozenset([*failed, *_drop_faulty(data, faults)]), findings
+        document.data, document.dropped = dict(_REQUIRED), set()
+    else:
+        document.data, document.dropped = data, {*failed, *_drop_faulty(data, faults)}
 
 
-def mend_outer_keys(
-    data: dict[str, Any], positions: SourceMap
-) -> tuple[dict[str, Any], list[Diagnostic]]:
-    """Give misspelt keys their right names where they count before the schema does.
+def correct_outer_keys(document: Document) -> None:
+    """Correct misspelt keys that are read before the schema is checked.
 
     These are the keys of the file, of the declarations of arguments, and `foreach` and `when`.
-
-    Returns:
-        The data, copied if anything is mended, and the findings.
     """
-    if all(map(_is_known, _outer_keys(data))):
-        return data, []
-    mended = _copied(data)
-    return mended, _mend_keys(mended, positions, _is_outer)
+    data = document.data or {}
+    if not all(map(_is_known, _outer_keys(data))):
+        document.data = _copied(data)
+        document.diagnostics += _mend_keys(document.data, document.positions, _is_outer)
 
 
 def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:

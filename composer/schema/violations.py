@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.entity_kinds import ENTITY_KINDS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from jsonschema.exceptions import ValidationError
 
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -25,14 +28,8 @@ _LONGEST_SHOWN = 40
 
 # What an entry without one of these keys is read on with; the checks pass over them, since the
 # paths of stand-ins count as dropped.
-_STAND_INS: dict[str, dict[str, Any]] = {
-    'publisher': {'type': 'unknown/msg/Unknown'},
-    'subscription': {'type': 'unknown/msg/Unknown', 'behaviour': 'unknown:unknown'},
-    'timer': {'period': 1.0, 'behaviour': 'unknown:unknown'},
-    'service': {'type': 'unknown/srv/Unknown', 'behaviour': 'unknown:unknown'},
-    'service client': {'type': 'unknown/srv/Unknown'},
-    'action': {'type': 'unknown/action/Unknown', 'behaviour': 'unknown:unknown'},
-    'action client': {'type': 'unknown/action/Unknown'},
+_STAND_INS: dict[str, Mapping[str, Any]] = {
+    **{kind.noun: kind.stand_in for kind in ENTITY_KINDS},
     'condition': {'topic': 'unknown'},
 }
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, SourceFile
+from composer.yaml_text.document import Document
 from composer.yaml_text.plain_data import construct_data
 from composer.yaml_text.positions import SourceMap
 from composer.yaml_text.tree import CompositionError, compose_tree
@@ -15,20 +15,6 @@ if TYPE_CHECKING:
 
 # A file of a thousand nodes with five thousand entities has one megabyte.
 MAX_BYTES = 10_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Document:
-    """A YAML file as it was read.
-
-    Attributes:
-        data: Mappings, lists and scalars of the core schema; `None` if nothing could be read.
-        diagnostics: What was wrong with the text.
-    """
-
-    data: dict[str, Any] | None
-    positions: SourceMap
-    diagnostics: tuple[Diagnostic, ...] = ()
 
 
 def read_document(path: Path, name: str | None = None) -> Document:
@@ -81,9 +67,9 @@ def parse_document(content: bytes, name: str) -> Document:
         tree = compose_tree(text, positions.source)
         data, faults = construct_data(tree, positions)
     except CompositionError as error:
-        return Document(None, positions, (error.diagnostic,))
+        return Document(None, positions, [error.diagnostic])
     if isinstance(data, dict):
-        return Document(data, positions, faults)
+        return Document(data, positions, [*faults])
     if tree is None:
         return _without_data(
             _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
@@ -95,7 +81,7 @@ def parse_document(content: bytes, name: str) -> Document:
         tree.span,
         help="begin with 'version: 1'",
     )
-    return Document(None, positions, (*faults, top))
+    return Document(None, positions, [*faults, top])
 
 
 def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:  # noqa: A002
@@ -103,4 +89,4 @@ def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:
 
 
 def _without_data(finding: Diagnostic) -> Document:
-    return Document(None, SourceMap(SourceFile(finding.file, ())), (finding,))
+    return Document(None, SourceMap(SourceFile(finding.file, ())), [finding])

@@ -71,6 +71,13 @@ def parse_tagged_scalar(text: str, tag: str) -> Scalar:
     return float(value) if float in types and isinstance(value, int) else value
 
 
+def format_scalar(value: Scalar) -> str:
+    """Return a scalar other than null as YAML has it, without quotes."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    return str(value)
+
+
 def short_tag(tag: str) -> str:
     """Return a tag as people write it: `!!str` for YAML's own ones."""
     return '!!' + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag

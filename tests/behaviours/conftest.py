@@ -10,7 +10,7 @@ def face(node):
     """Return the face of a live node for one entity."""
     from composer.runtime.nodes.behaviour_node import Node
 
-    return Node(node, SimpleNamespace(), {}, lambda code: None)
+    return Node(node, SimpleNamespace(), {}, SimpleNamespace(), lambda code: None)
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def test_topics_of_one_node_are_watched_apart(face, set_time):
     set_time(100.0)
     scans, images = (watch(face, name, minimum_rate=1.0) for name in ('scan', 'image'))
     assert (next(scans), next(images)) == (None, None)
-    count(face.for_entity(), None, 'image')
+    count(face.with_own_state(), None, 'image')
     set_time(101.0)
     assert (next(scans), next(images)) == (False, True)
 
@@ -74,7 +74,7 @@ def test_diagnostics_tell_rate_age_and_fault(face, set_time):
         (
             b'\x01',
             '/node: scan',
-            '1 messages a second, 5 are expected',
+            '1 messages/s, at least 5 expected',
             {'rate (Hz)': '1', 'age (s)': '0.5'},
         ),
     ]

@@ -54,7 +54,7 @@ def test_drop_drops_the_first_of_each_few_messages(face):
 
 
 def test_two_uses_of_a_behaviour_in_one_node_count_for_themselves(face):
-    first, second = face.for_entity(), face.for_entity()
+    first, second = face.with_own_state(), face.with_own_state()
     assert drop(first, Int32(), count=1, of=2) is None
     assert drop(second, Int32(), count=1, of=2) is None
     assert drop(first, Int32(), count=1, of=2) is not None
@@ -110,9 +110,9 @@ def test_transform_says_why_a_field_has_no_value(face, expression, reason):
     with pytest.raises(TransformError) as raised:
         transform(face, Float64(), {'linear.x': expression})
     text = str(raised.value)
-    assert text.startswith(f"'linear.x' has no value by '{expression}': ")
+    assert text.startswith(f"cannot evaluate '{expression}' for 'linear.x': ")
     assert reason in text
-    assert raised.value.help == 'in scope are message, data'
+    assert raised.value.help == 'expressions can use message, data'
 
 
 def test_transform_leaves_what_is_not_a_number_to_the_message(face):

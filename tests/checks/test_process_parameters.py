@@ -5,7 +5,6 @@ import pytest
 from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system_text
-from composer.processes.process_commands import render_parameters
 
 SYSTEM = """
 version: 1
@@ -81,9 +80,3 @@ def test_what_is_left_out_is_checked_too():
 )
 def test_what_ros_takes_has_no_finding(parameters):
     assert findings(parameters) == []
-
-
-def test_integers_among_doubles_are_written_as_doubles():
-    text = render_parameters({'f': [1, 2.5], 'g': {'h': [1, 2]}})
-    assert '1.0' in text
-    assert text.count('- 2\n') == 1

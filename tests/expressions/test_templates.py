@@ -28,7 +28,7 @@ def load(state):
 def value(scalar):
     """Return what becomes of a scalar."""
     loaded = load(f'x: {scalar}')
-    assert loaded.diagnostics == ()
+    assert loaded.diagnostics == []
     return loaded.spec.nodes['n'].state['x']
 
 
@@ -92,7 +92,7 @@ def test_a_whole_expression_keeps_its_type_and_any_other_becomes_text(scalar, ex
 
 def test_keys_and_items_are_filled_too():
     loaded = load('{"{{ name }}_a": ["{{ count }}", {"b{{ count }}": 1}], "{{ loud }}": 2}')
-    assert loaded.diagnostics == ()
+    assert loaded.diagnostics == []
     assert loaded.spec.nodes['n'].state == {'rover_a': [3, {'b3': 1}], 'true': 2}
 
 

@@ -33,7 +33,7 @@ def values(*words, text=ARGUMENTS):
     state = ', '.join(f'{name}: "{{{{ {name} }}}}"' for name in declared)
     text = text.replace('nodes: {}', f'nodes: {{n: {{state: {{{state}}}}}}}')
     loaded = load_system_text(text, words=words)
-    assert loaded.diagnostics == ()
+    assert loaded.diagnostics == []
     return dict(loaded.spec.nodes['n'].state)
 
 

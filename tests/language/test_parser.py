@@ -9,7 +9,7 @@ from composer.language.specs import BehaviourSpec, ParameterSpec, QosSpec
 def load(text):
     """Return the spec of a text in which nothing is wrong."""
     loaded = load_system_text('version: 1\n' + text)
-    assert loaded.diagnostics == ()
+    assert loaded.diagnostics == []
     return loaded.spec
 
 
@@ -126,7 +126,8 @@ def test_nodes_inherit_what_they_do_not_say():
     assert (own.namespace, own.log_level, own.use_sim_time, own.on_error) == (
         '/elsewhere', 'debug', False, 'shutdown'
     )  # fmt: skip
-    assert heir.publishers['a'].qos == QosSpec('default', {'depth': 3}, ('defaults', 'qos'))
+    path = ('nodes', 'heir', 'publishers', 'a', 'qos')
+    assert heir.publishers['a'].qos == QosSpec('default', {'depth': 3}, path)
     assert own.publishers['a'].qos.policies == {'depth': 4}
 
 
@@ -207,7 +208,8 @@ def test_a_publisher_may_be_its_type_alone():
     ],
 )
 def test_qos_has_three_forms(text, profile, policies):
-    qos = load_node(f'{{publishers: {{a: {{type: p/msg/T, qos: {text}}}}}}}').publishers['a'].qos
+    node = f'{{publishers: {{a: {{type: p/msg/T, qos: {text}}}}}}}'
+    qos = load_node(node, 'qos: {fast: {depth: 1}}').publishers['a'].qos
     assert (qos.profile, qos.policies) == (profile, policies)
     assert all(type(value) is not float for key, value in policies.items() if key == 'depth')
 

@@ -75,7 +75,7 @@ def test_what_a_plain_command_waits_for_lies_in_the_namespace_of_its_file(load):
 
     assert conditions(plain) == [
         ('process', 'camera'),
-        ('topic', '/drivers/image'),
+        ('topic', 'drivers/image'),
         ('node', '/far'),
     ]
 

@@ -23,7 +23,7 @@ def own_profiles():
 @pytest.mark.ros
 @pytest.mark.parametrize('name', BUILTIN_PROFILES)
 def test_a_profile_of_ros_is_rclpys_own(name):
-    from composer.runtime.entities.qos_profiles import create_qos_profile
+    from composer.runtime.messages.qos_profiles import create_qos_profile
 
     theirs = own_profiles()[name]
     ours = create_qos_profile(qos(name), {})

@@ -69,7 +69,7 @@ def test_a_conflict_names_what_is_offered_and_requested(policy, offered, request
 def test_rclpy_says_the_same_but_for_what_the_module_names():
     from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-    from composer.runtime.entities.qos_profiles import create_qos_profile
+    from composer.runtime.messages.qos_profiles import create_qos_profile
 
     def as_rclpy_sees_it(policies, is_publisher):
         seen = {key: value for key, value in policies.items() if value != 'infinite'}
@@ -100,7 +100,7 @@ def test_publishers_and_subscriptions_connect_if_and_only_if_nothing_is_said(con
     import rclpy
     from std_msgs.msg import String
 
-    from composer.runtime.entities.qos_profiles import create_qos_profile
+    from composer.runtime.messages.qos_profiles import create_qos_profile
 
     pairs = [
         pair
@@ -137,7 +137,7 @@ def test_clients_find_servers_if_and_only_if_nothing_is_said(context, wait_for):
     import rclpy
     from std_srvs.srv import Empty
 
-    from composer.runtime.entities.qos_profiles import create_qos_profile
+    from composer.runtime.messages.qos_profiles import create_qos_profile
 
     values = {
         'reliability': ['reliable', 'best_effort'],

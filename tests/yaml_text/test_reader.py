@@ -296,7 +296,7 @@ def test_ten_thousand_levels_of_indentation_are_one_finding():
 
 def test_a_hundred_levels_are_read():
     document = parse('a: ' + '[' * 99 + ']' * 99)
-    assert document.diagnostics == ()
+    assert document.diagnostics == []
     assert document.data['a'][0][0][0]
 
 

@@ -5,8 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.language.instances import read_instance, sample_values
-from composer.yaml_text.reader import parse_document
+from composer.language.pipeline import load_system_text
 from composer.yaml_text.writer import render_yaml
 
 SCALARS = (
@@ -30,9 +29,7 @@ DATA = st.recursive(
 @given(st.dictionaries(KEYS, DATA, max_size=4))
 def test_what_is_rendered_reads_back_as_the_same_data(data):
     text = render_yaml({'version': 1, 'nodes': {'n': {'state': data}}})
-    document = parse_document(text.encode(), 'x')
-    instance = read_instance(document, sample_values)
-    assert instance.data['nodes']['n']['state'] == data
+    assert load_system_text(text).data['nodes']['n']['state'] == data
 
 
 def test_numbers_that_are_none_are_written_as_yaml_has_them():
@@ -41,7 +38,7 @@ def test_numbers_that_are_none_are_written_as_yaml_has_them():
 
 
 def test_remarks_stand_beside_the_values():
-    text = render_yaml({'a': {'b': 1, 'c': [1, 2]}}, '.'.join)
+    text = render_yaml({'a': {'b': 1, 'c': [1, 2]}}, remark='.'.join)
     assert [line.split('  #') for line in text.splitlines()] == [
         ['a:'],
         [f'{"  b: 1":<48}', ' a.b'],

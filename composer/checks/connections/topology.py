@@ -169,8 +169,9 @@ def is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
     """Return whether a name, or the namespace that this node alone has, is none of ROS."""
     if _is_misnamed(name):
         return True
-    own = (*node.path, 'namespace')
-    is_own = own in context.system.positions.values
+    spans = context.system.positions.values
+    own = spans.get((*node.path, 'namespace'))
+    is_own = own is not None and own != spans.get(('defaults', 'namespace'))
     return is_own and find_namespace_fault(node.namespace) is not None
 
 

@@ -144,9 +144,7 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _names_of(node: NodeSpec) -> set[str]:
-    topics = [end.topic for end in node.endpoints]
-    services = [end.service for end in node.service_endpoints]
-    names = [*topics, *services, *(end.action for end in node.action_endpoints)]
+    names = [str(getattr(end, str(kind.channel))) for kind, end in node.ends()]
     return {expand_name(name, node.name, node.namespace) for name in names}
 
 

@@ -43,7 +43,7 @@ _MESSAGES = {
 
 def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
     """Everyone who needs another end has one, or says that it is elsewhere."""
-    if context.system.data.get('processes'):
+    if context.spec.processes:
         # Nobody knows what programs publish, hear and serve.
         return
     partners = _Partners(graph)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
-from composer.language.instances import ArgumentValues, sample_values
+from composer.language.arguments import ArgumentValues, sample_values
 from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_fault
 from composer.spelling import suggest
 
@@ -13,20 +13,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.language.arguments import ArgumentSpec
-    from composer.language.includes.include_entry import IncludePlace
-    from composer.language.instances import Instance
+    from composer.language.includes.include_entry import IncludeEntry
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 
-def give_arguments(
-    declared: Mapping[str, ArgumentSpec], place: IncludePlace, faults: list[Diagnostic]
+def values_from_include(
+    declared: Mapping[str, ArgumentSpec], place: IncludeEntry
 ) -> ArgumentValues:
-    """Return the values that an include gives; what is wrong with them is added to `faults`."""
-    given = place.entry.get('args', {})
+    """Return the values that an include gives; errors in them are added to its file."""
+    findings = place.system.diagnostics
+    given = place.data.get('args', {})
     values = dict(sample_values(declared).values)
     origins: dict[str, str] = {}
     section = (*place.at, 'args')
-    faults += _find_unknown(declared, given, place)
+    findings += _find_unknown(declared, given, place)
     unknown: list[str] = []
     for name, argument in declared.items():
         path = (*section, name)
@@ -35,39 +36,39 @@ def give_arguments(
             fault = _find_fault(argument, value)
             if not fault:
                 values[name] = value
-                origins[name] = _origin(place.instance, path)
+                origins[name] = _origin(place.system, path)
             elif not place.is_open(path):
-                span = place.instance.positions.value(path)
+                span = place.system.positions.value(path)
                 near = _nearest_choice(argument, value)
-                faults.append(diagnostic_at(span, 'argument-type', fault, help=near))
+                findings.append(diagnostic_at(span, 'argument-type', fault, help=near))
             if fault or place.is_open(path):
                 unknown.append(name)
-        elif not place.instance.dropped.isdisjoint((path, section)):
+        elif not place.system.dropped.isdisjoint((path, section)):
             unknown.append(name)
         elif argument.default is None:
             unknown.append(name)
-            faults.append(_missing_argument(argument, place))
+            findings.append(_missing_argument(argument, place))
     return ArgumentValues(values, unknown, origins)
 
 
 def _find_unknown(
-    declared: Mapping[str, ArgumentSpec], given: Mapping[str, Any], place: IncludePlace
+    declared: Mapping[str, ArgumentSpec], given: Mapping[str, Any], place: IncludeEntry
 ) -> Iterator[Diagnostic]:
     for name in [each for each in given if each not in declared]:
         yield diagnostic_at(
-            place.instance.positions.key((*place.at, 'args', name)),
+            place.system.positions.key((*place.at, 'args', name)),
             'unknown-argument',
             f"'{place.file}' takes no argument '{name}'",
             help=suggest(name, declared, 'it takes'),
         )
 
 
-def _origin(instance: Instance, path: DataPath) -> str:
-    note = instance.notes.get(path)
-    return instance.positions.value(path).place + (f', {note}' if note else '')
+def _origin(system: LoadedSystem, path: DataPath) -> str:
+    note = system.notes.get(path)
+    return system.positions.value(path).place + (f', {note}' if note else '')
 
 
-def _missing_argument(argument: ArgumentSpec, place: IncludePlace) -> Diagnostic:
+def _missing_argument(argument: ArgumentSpec, place: IncludeEntry) -> Diagnostic:
     message = f"'{place.file}' wants the argument '{argument.name}'"
     help_text = f"give it under 'args': {argument}"
     return diagnostic_at(place.span, 'missing-argument', message, help=help_text)

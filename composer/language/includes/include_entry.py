@@ -1,72 +1,140 @@
-"""An include as it stands in a file: where, what it says, and whether it is left out."""
+"""An include as it is written in a file: its file, its namespace, and whether it is left out."""
 
 from __future__ import annotations
 
+import os
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import diagnostic_at
-from composer.language.paths import is_in_package
+from composer.diagnostics import Related, diagnostic_at
+from composer.language.paths import PathError, is_in_package, list_neighbours, resolve_path
+from composer.names import find_namespace_fault
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from composer.diagnostics import Related, Span
-    from composer.language.instances import Instance
+    from composer.diagnostics import Span
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 
 @dataclass(frozen=True, slots=True)
-class IncludePlace:
+class IncludeEntry:
     """An include of a file.
 
     Attributes:
-        instance: The file that it stands in.
+        system: The file that it is written in.
         at: Its path there.
-        entry: What it says.
+        data: What it says.
     """
 
-    instance: Instance
+    system: LoadedSystem
     at: DataPath
-    entry: dict[str, Any]
+    data: dict[str, Any]
 
     @property
     def file(self) -> str:
         """The file that is included, as written."""
-        return str(self.entry['file'])
+        return str(self.data['file'])
+
+    @property
+    def label(self) -> str:
+        """The name of the include."""
+        return str(self.at[-1])
+
+    @property
+    def remap(self) -> dict[str, str]:
+        """Rules for all that comes out of the file."""
+        rules: dict[str, str] = self.data.get('remap', {})
+        return rules
 
     @property
     def span(self) -> Span:
         """Where the file is named."""
-        return self.instance.positions.value((*self.at, 'file'))
+        return self.system.positions.value((*self.at, 'file'))
+
+    @property
+    def here(self) -> Related:
+        """The include, as findings in its file refer to it."""
+        return Related('included here', self.span)
 
     @property
     def is_left_out(self) -> bool:
         """Whether its `when` does not hold."""
-        return self.at in self.instance.left_out
-
-    @property
-    def may_be_absent(self) -> bool:
-        """Whether nothing is wrong if the file is not there.
-
-        What is left out may be in a package of other machines, and have a name that is whole only
-        when it is used.
-        """
-        return self.is_left_out and (is_in_package(self.file) or self.is_open((*self.at, 'file')))
+        return self.at in self.system.left_out
 
     def is_open(self, path: DataPath) -> bool:
         """Return whether the value at a path may be another one when the include is used."""
-        instance = self.instance
-        is_computed = self.is_left_out and path in instance.notes
-        return is_computed or instance.positions.value(path) in instance.sampled_spans
+        is_computed = self.is_left_out and path in self.system.notes
+        return is_computed or self.system.positions.value(path) in self.system.sampled
+
+    def find_file(self) -> Path | None:
+        """Return the file that is named; report it if there is none, and return `None`."""
+        try:
+            return _locate_file(self.file, self.span)
+        except PathError as error:
+            # What is left out may be in a package of other machines, and have a name that is whole
+            # only when it is used.
+            may_be_absent = is_in_package(self.file) or self.is_open((*self.at, 'file'))
+            if not (self.is_left_out and may_be_absent):
+                self.report('missing-include', str(error), error.help)
+        return None
+
+    def find_namespace(self) -> str:
+        """Return the namespace of all that comes out of the file.
+
+        One that ROS does not allow is reported here, once, and not for each node in it; another
+        one is returned in its place.
+        """
+        path = (*self.at, 'namespace')
+        if path in self.system.dropped:
+            # Without one of their own, its nodes might be called like others.
+            return _allowed(self.label)
+        namespace = str(self.data.get('namespace', ''))
+        fault = find_namespace_fault(namespace) if namespace else None
+        if fault is None:
+            return namespace
+        span = self.system.positions.value(path)
+        finding = diagnostic_at(span, 'bad-name', f"'{namespace}': {fault}")
+        self.system.diagnostics.append(finding)
+        self.system.dropped.add(path)
+        return _allowed(namespace)
 
     def report(
         self,
         rule: str,
         message: str,
-        chain: Iterable[Related],
         help: str | None = None,  # noqa: A002 - the word that the finding shows
     ) -> None:
         """Add a finding about the file that is named."""
-        finding = diagnostic_at(self.span, rule, message, help=help, related=chain)
-        self.instance.diagnostics.append(finding)
+        finding = diagnostic_at(self.span, rule, message, help=help)
+        self.system.diagnostics.append(finding)
+
+
+def shown_path(path: Path) -> str:
+    """Return a path as findings show it: relative to the working folder if it is inside it."""
+    plain = Path(os.path.normpath(path))
+    try:
+        return str(plain.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(plain)
+
+
+def _locate_file(text: str, place: Span) -> Path:
+    """Return the file that an include names.
+
+    Raises:
+        PathError: There is no such file.
+    """
+    path = resolve_path(text, place.source.folder)
+    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
+        message = f"there is no file '{shown_path(path)}'"
+        raise PathError(message, help=suggest(path.name, list_neighbours(path), 'there are'))
+    return path
+
+
+def _allowed(namespace: str) -> str:
+    tokens = (re.sub(r'\W|^(?=\d)', '_', token, flags=re.ASCII) for token in namespace.split('/'))
+    slash = '/' if namespace.startswith('/') else ''
+    return slash + '/'.join(filter(None, tokens))

@@ -1,32 +1,33 @@
 """Includes: other files as parts of this one, each with the arguments that it is given.
 
 A file sees its own arguments, defaults and QoS profiles, and nothing of who includes it. What the
-include says beside (`namespace`, `remap`) is applied to all that comes out of it.
+include says beside (`namespace`, `remap`) applies to all that comes out of it.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic, Related, diagnostic_at
-from composer.expressions.filling import MAX_ENTRIES, SECTIONS
-from composer.language.defaults import push_defaults
-from composer.language.includes.include_arguments import give_arguments
-from composer.language.includes.include_entry import IncludePlace
-from composer.language.includes.included_files import locate_file, shown_path
-from composer.language.includes.included_namespaces import mend_namespace
-from composer.language.includes.merging import Flattening, Inclusion
-from composer.language.includes.profile_names import drop_unknown_profiles
-from composer.language.instances import Instance, read_instance
-from composer.language.paths import PathError
-from composer.yaml_text.reader import Document, read_document
+from composer.diagnostics import diagnostic_at
+from composer.language.includes.include_arguments import values_from_include
+from composer.language.includes.include_entry import IncludeEntry, shown_path
+from composer.language.includes.merging import IncludeMerger, Inclusion
+from composer.language.loaded_system import LoadedSystem
+from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
+    from typing import Any
 
+    from composer.diagnostics import Diagnostic
+    from composer.language.arguments import GiveValues
+    from composer.yaml_text.document import Document
 
-_HERE = 'included here'
+_SECTIONS = ('nodes', 'include', 'processes')
+# How many entries a section of all files may have, unless a file says more.
+_MAX_ENTRIES = 10_000
 
 
 class Includer:
@@ -35,64 +36,59 @@ class Includer:
     What an include brings whose `when` does not hold is read as well, and left out as a whole.
 
     Args:
-        environment: The variables that the file sets which is started: no other file sets any.
+        system: The file that is started: no other one sets environment variables.
+        load_file: Takes an included file through the steps before this one.
     """
 
-    def __init__(self, environment: Collection[str]) -> None:
-        self._environment = environment
+    def __init__(
+        self, system: LoadedSystem, load_file: Callable[[LoadedSystem, GiveValues], None]
+    ) -> None:
+        self._system = system
+        self._load_file = load_file
         self._documents: dict[Path, Document] = {}
-        self._limit = 0
+        self._limit = system.entries.get('max_nodes', _MAX_ENTRIES)
         self._inclusions = 0
         # Entries and includes that were read although they are left out.
         self._left_out = 0
 
-    def include(
-        self,
-        instance: Instance,
-        path: Path,
-        chain: tuple[Related, ...] = (),
-        *,
-        is_left_out: bool = False,
-    ) -> Instance:
-        """Return an instance with all that it includes in it.
+    def include_all(self) -> None:
+        """Add all that the file includes to it."""
+        self._include(self._system, (self._system.path,), is_left_out=False)
+
+    def _include(
+        self, system: LoadedSystem, stack: tuple[Path, ...], *, is_left_out: bool
+    ) -> None:
+        """Add what a file includes to it.
 
         Args:
-            path: The file of the instance.
-            chain: Where it is included itself, innermost first.
-            is_left_out: Whether it is read for its faults alone.
+            stack: The file, and those that it is included in, innermost first.
+            is_left_out: Whether it is read for its errors alone.
         """
-        # An included file may ask for more; one that asks for nothing changes nothing.
-        asked = instance.data.get('max_nodes', 0 if chain else MAX_ENTRIES)
-        self._limit = max(self._limit, asked)
-        entries = instance.data.pop('include', {})
-        if not entries:
-            return instance
-        _settle(instance)
-        flattening = Flattening(instance, chain)
-        for place in _used_first(entries, instance):
-            aside = is_left_out or place.is_left_out
+        entries = system.entries.pop('include', {})
+        merger = IncludeMerger(system)
+        for entry in _used_first(entries, system):
+            aside = is_left_out or entry.is_left_out
             if aside and self._left_out > self._limit:
                 break
-            part = self._read(place, path, chain, is_left_out=aside)
+            part = self._read(entry, stack, is_left_out=aside)
             if part is None:
-                instance.dropped.add(place.at)
+                system.dropped.add(entry.at)
                 continue
-            if place.is_left_out:
+            system.diagnostics += [each.with_related((entry.here,)) for each in part.diagnostics]
+            if entry.is_left_out:
                 part.leave_out_all()
-            entry = mend_namespace(instance, place.at, place.entry)
-            flattening.add(Inclusion(part, place.at, entry))
+            merger.add(Inclusion(part, entry, entry.find_namespace()))
             if aside:
-                self._left_out += 1 + sum(len(part.data.get(each, ())) for each in SECTIONS)
-            elif self._is_too_large(place, chain):
+                self._left_out += 1 + sum(len(part.entries.get(each, ())) for each in _SECTIONS)
+            elif self._is_too_large(entry):
                 break
-        return instance
 
-    def _is_too_large(self, place: IncludePlace, chain: tuple[Related, ...]) -> bool:
-        """Return whether a system has grown beyond its limit; say so once."""
+    def _is_too_large(self, entry: IncludeEntry) -> bool:
+        """Return whether a system has grown beyond its limit; report it once."""
         if self._inclusions > self._limit:
             return True
         self._inclusions += 1
-        counts = {each: _count_used(place.instance, each, self._limit) for each in SECTIONS}
+        counts = {each: _count_used(entry.system, each, self._limit) for each in _SECTIONS}
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
         if counts[section] <= self._limit:
@@ -100,41 +96,31 @@ class Includer:
         self._inclusions = self._limit + 1
         message = f'there are more than {self._limit:,} entries in {section} of all files'
         help_text = "if that is meant, raise 'max_nodes' at the top of the file"
-        place.report('too-many-entries', message, chain, help_text)
+        entry.report('too-many-entries', message, help_text)
         return True
 
     def _read(
-        self,
-        place: IncludePlace,
-        parent: Path,
-        chain: tuple[Related, ...],
-        *,
-        is_left_out: bool,
-    ) -> Instance | None:
-        """Return what an include brings, or say what is wrong with it and return `None`."""
-        path = _find_file(place, chain)
+        self, entry: IncludeEntry, stack: tuple[Path, ...], *, is_left_out: bool
+    ) -> LoadedSystem | None:
+        """Return what an include brings; report it if nothing can be read, and return `None`."""
+        path = entry.find_file()
         if path is None:
             return None
-        stack = (parent, *(Path(each.span.source.name) for each in chain))
         if path.resolve() in [each.resolve() for each in stack]:
-            place.report('include-cycle', f"'{place.file}' includes itself", chain)
+            entry.report('include-cycle', f"'{entry.file}' includes itself")
             return None
-        instance, document = place.instance, self._document(path)
-        faults: list[Diagnostic] = []
-        part = read_instance(document, lambda declared: give_arguments(declared, place, faults))
-        instance.diagnostics += _with_chain(faults, chain)
-        inner_chain = (Related(_HERE, place.span), *chain)
-        if part is None:
-            instance.diagnostics += _with_chain(document.diagnostics, inner_chain)
+        part = LoadedSystem.of(self._document(path), path)
+        if part.data is None:
+            entry.system.diagnostics += [
+                each.with_related((entry.here,)) for each in part.diagnostics
+            ]
             return None
-        _settle(part)
-        own = part.diagnostics
+        self._load_file(part, partial(values_from_include, place=entry))
         if not is_left_out:
-            own += _find_unset(part, self._environment)
-        part.diagnostics = []
-        part = self.include(part, path, inner_chain, is_left_out=is_left_out)
-        instance.diagnostics += [*_with_chain(own, inner_chain), *part.diagnostics]
-        instance.included |= {part.positions.source: None} | part.included
+            part.diagnostics += self._find_unset(part)
+        # An included file may ask for more; one that asks for nothing changes nothing.
+        self._limit = max(self._limit, part.entries.get('max_nodes', 0))
+        self._include(part, (path, *stack), is_left_out=is_left_out)
         return part
 
     def _document(self, path: Path) -> Document:
@@ -143,49 +129,29 @@ class Includer:
             self._documents[resolved] = read_document(path, shown_path(path))
         return self._documents[resolved]
 
+    def _find_unset(self, part: LoadedSystem) -> Iterator[Diagnostic]:
+        """Yield warnings of environment variables that only the started file could set."""
+        environment = self._system.entries.get('environment', {})
+        for name in part.entries.get('environment', {}):
+            if name not in environment:
+                yield diagnostic_at(
+                    part.positions.key(('environment', name)),
+                    'ignored-environment',
+                    f"'{name}' is not set: only the environment of the file that is started "
+                    'counts',
+                    help="set it in that file, or for a process under 'env'",
+                )
 
-def _used_first(entries: Mapping[str, dict[str, Any]], instance: Instance) -> list[IncludePlace]:
+
+def _used_first(entries: Mapping[str, dict[str, Any]], system: LoadedSystem) -> list[IncludeEntry]:
     """Return the includes of a file; what is left out must not take names from what is used."""
-    places = [IncludePlace(instance, ('include', name), entries[name]) for name in entries]
-    return sorted(places, key=lambda place: place.is_left_out)
+    includes = [IncludeEntry(system, ('include', name), entries[name]) for name in entries]
+    return sorted(includes, key=lambda entry: entry.is_left_out)
 
 
-def _count_used(instance: Instance, section: str, limit: int) -> int:
+def _count_used(system: LoadedSystem, section: str, limit: int) -> int:
     """Return how many entries a section has; those that are left out count up to a limit."""
-    count = len(instance.data.get(section, ()))
+    count = len(system.entries.get(section, ()))
     if count <= limit:
         return count
-    return count - sum(path[0] == section for path in instance.left_out)
-
-
-def _find_unset(part: Instance, environment: Collection[str]) -> Iterator[Diagnostic]:
-    for name in part.data.get('environment', {}):
-        if name not in environment:
-            yield diagnostic_at(
-                part.positions.key(('environment', name)),
-                'ignored-environment',
-                f"'{name}' is not set: only the environment of the file that is started counts",
-                help="set it in that file, or for a process under 'env'",
-            )
-
-
-def _find_file(place: IncludePlace, chain: tuple[Related, ...]) -> Path | None:
-    """Return the file that an include names; if there is none, say so and return `None`."""
-    try:
-        return locate_file(place.file, place.span)
-    except PathError as error:
-        if not place.may_be_absent:
-            place.report('missing-include', str(error), chain, error.help)
-    return None
-
-
-def _settle(instance: Instance) -> None:
-    """Let a file's defaults and profiles hold in this file alone."""
-    push_defaults(instance)
-    drop_unknown_profiles(instance)
-
-
-def _with_chain(
-    diagnostics: Collection[Diagnostic], chain: tuple[Related, ...]
-) -> list[Diagnostic]:
-    return [finding.with_related(chain) for finding in diagnostics]
+    return count - sum(path[0] == section for path in system.left_out)

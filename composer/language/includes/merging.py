@@ -1,11 +1,11 @@
-"""What an included file declares becomes part of the including one, under names of its own."""
+"""What an included file declares, added to the file that includes it under names of its own."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Related, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.language.includes.profile_names import (
     ProfileRenaming,
     free_name,
@@ -20,7 +20,8 @@ from composer.language.namespaces import (
 from composer.language.parsing.process_parser import takes_ros_arguments, with_waits
 
 if TYPE_CHECKING:
-    from composer.language.instances import Instance
+    from composer.language.includes.include_entry import IncludeEntry
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 
@@ -29,45 +30,24 @@ class Inclusion:
     """A file that was read for an include.
 
     Attributes:
-        at: Where the include stands.
-        entry: What it says.
+        entry: The include.
+        namespace: The namespace of all that comes out of the file.
     """
 
-    part: Instance
-    at: DataPath
-    entry: dict[str, Any]
-
-    @property
-    def label(self) -> str:
-        """The name of the include."""
-        return str(self.at[-1])
-
-    @property
-    def namespace(self) -> str:
-        """The namespace of all that comes out of the file."""
-        return str(self.entry.get('namespace', ''))
-
-    @property
-    def remap(self) -> dict[str, str]:
-        """Rules for all that comes out of the file."""
-        rules: dict[str, str] = self.entry.get('remap', {})
-        return rules
+    part: LoadedSystem
+    entry: IncludeEntry
+    namespace: str
 
 
-class Flattening:
-    """Adds what included files declare to the instance of the file that includes them.
+class IncludeMerger:
+    """Adds what included files declare to the file that includes them."""
 
-    Args:
-        chain: Where that file is included itself, innermost first.
-    """
-
-    def __init__(self, instance: Instance, chain: tuple[Related, ...] = ()) -> None:
-        self._whole = instance
-        self._chain = chain
+    def __init__(self, system: LoadedSystem) -> None:
+        self._whole = system
         self._full_names = {
             full_node_name(*split_node_name(name, node))
-            for name, node in instance.data.get('nodes', {}).items()
-            if ('nodes', name) not in instance.left_out
+            for name, node in system.entries.get('nodes', {}).items()
+            if ('nodes', name) not in system.left_out
         }
 
     def add(self, inclusion: Inclusion) -> None:
@@ -75,7 +55,7 @@ class Flattening:
         part = inclusion.part
         renaming = self._add_profiles(inclusion)
         keys = self._process_keys(inclusion)
-        for name, node in part.data.get('nodes', {}).items():
+        for name, node in part.entries.get('nodes', {}).items():
             inner, simple = part.inner_names.get(name) or split_node_name(name, node)
             full = join_namespaces(inclusion.namespace, inner)
             is_left_out = ('nodes', name) in part.left_out
@@ -88,18 +68,19 @@ class Flattening:
                 self._add_entry(inclusion, ('nodes', name), key, entry)
             elif not is_left_out:
                 self._report_duplicate(inclusion, name, full_node_name(full, simple))
-        for name, process in part.data.get('processes', {}).items():
+        for name, process in part.entries.get('processes', {}).items():
             entry = with_waits(process, keys)
             if not takes_ros_arguments(process):
                 entry = with_waits(entry, {}, inclusion.namespace)
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
         self._add_interfaces(part)
-        self._whole.sampled_spans += part.sampled_spans
-        self._whole.spans_left_out += part.spans_left_out
+        self._whole.sampled += part.sampled
+        self._whole.sampled_unused += part.sampled_unused
+        self._whole.included |= {part.positions.source: None} | part.included
 
     def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""
-        nodes = self._whole.data.setdefault('nodes', {})
+        nodes = self._whole.entries.setdefault('nodes', {})
         full = full_node_name(namespace, simple)
         key = full if simple in nodes else simple
         if is_left_out:
@@ -111,19 +92,20 @@ class Flattening:
 
     def _process_keys(self, inclusion: Inclusion) -> dict[str, str]:
         """Return what the processes of a file are called in the whole system."""
-        processes, left_out = self._whole.data.get('processes', {}), self._whole.left_out
+        processes, left_out = self._whole.entries.get('processes', {}), self._whole.left_out
         # What is left out gives way.
         own = [name for name in processes if ('processes', name) not in left_out]
-        names = inclusion.part.data.get('processes', {})
+        names = inclusion.part.entries.get('processes', {})
         taken = {*own, *names}
         keys = {}
         for name in names:
-            keys[name] = free_name(f'{inclusion.label}_{name}', taken) if name in own else name
+            keys[name] = (
+                free_name(f'{inclusion.entry.label}_{name}', taken) if name in own else name
+            )
             taken.add(keys[name])
         return keys
 
     def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
-        here = Related('included here', self._whole.positions.value((*inclusion.at, 'file')))
         inner = inclusion.part.chains.get(('nodes', name), ())
         self._whole.diagnostics.append(
             diagnostic_at(
@@ -131,7 +113,7 @@ class Flattening:
                 'duplicate-node',
                 f"there is a node '{full}' already",
                 help="give the include a 'namespace'",
-                related=[*inner, here, *self._chain],
+                related=[*inner, inclusion.entry.here],
             )
         )
 
@@ -146,10 +128,9 @@ class Flattening:
             whole.notes[new + path] = note
         if section == 'nodes' or takes_ros_arguments(entry):
             entry = self._with_outer(inclusion, new, entry)
-        whole.data.setdefault(section, {})[key] = entry
+        whole.entries.setdefault(section, {})[key] = entry
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
-        here = Related('included here', whole.positions.value((*inclusion.at, 'file')))
-        whole.chains[new] = (*part.chains.get(old, ()), here)
+        whole.chains[new] = (*part.chains.get(old, ()), inclusion.entry.here)
         self._leave_out(new, is_left_out=old in part.left_out)
 
     def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
@@ -166,14 +147,19 @@ class Flattening:
         inner = plain.pop('namespace', '')
         namespace = join_namespaces(inclusion.namespace, inner)
         if namespace != inner:
-            note_namespace(self._whole, (*path, 'namespace'), (*inclusion.at, 'namespace'), inner)
+            note_namespace(
+                self._whole, (*path, 'namespace'), (*inclusion.entry.at, 'namespace'), inner
+            )
         if namespace and not str(path[-1]).startswith('/'):
             plain = {'namespace': namespace} | plain
-        if inclusion.remap:
+        if inclusion.entry.remap:
             # The first rule that fits wins: those from outside do, as in ROS launch.
-            plain['remap'] = {**inclusion.remap, **_beside(inclusion.remap, plain.get('remap'))}
-            for rule in inclusion.remap:
-                self._copy_place((*inclusion.at, 'remap', rule), (*path, 'remap', rule))
+            plain['remap'] = {
+                **inclusion.entry.remap,
+                **_beside(inclusion.entry.remap, plain.get('remap')),
+            }
+            for rule in inclusion.entry.remap:
+                self._copy_place((*inclusion.entry.at, 'remap', rule), (*path, 'remap', rule))
         return plain
 
     def _copy_place(self, old: DataPath, new: DataPath) -> None:
@@ -187,11 +173,13 @@ class Flattening:
     def _add_profiles(self, inclusion: Inclusion) -> ProfileRenaming:
         """Add the QoS profiles of a file; return the new names of those that had to be renamed."""
         part = inclusion.part
-        profiles = part.data.get('qos', {})
-        renaming = rename_profiles(self._whole.data.get('qos', {}), profiles, inclusion.label)
+        profiles = part.entries.get('qos', {})
+        renaming = rename_profiles(
+            self._whole.entries.get('qos', {}), profiles, inclusion.entry.label
+        )
         for name, profile in profiles.items():
             key = str(renaming.in_qos(name))
-            own = self._whole.data.setdefault('qos', {})
+            own = self._whole.entries.setdefault('qos', {})
             is_left_out = ('qos', name) in part.left_out
             if not (key in own and is_left_out):
                 self._leave_out(('qos', key), is_left_out=is_left_out)
@@ -204,15 +192,15 @@ class Flattening:
         self._whole.dropped |= {path for path in part.dropped if path[:1] == ('qos',)}
         return renaming
 
-    def _add_interfaces(self, part: Instance) -> None:
-        for package in part.data.get('interfaces', {}):
-            declared = self._whole.data.setdefault('interfaces', {})
+    def _add_interfaces(self, part: LoadedSystem) -> None:
+        for package in part.entries.get('interfaces', {}):
+            declared = self._whole.entries.setdefault('interfaces', {})
             path = ('interfaces', package)
             is_left_out = path in part.left_out
             if not (package in declared and is_left_out):
                 self._leave_out(path, is_left_out=is_left_out)
             if package not in declared:
-                declared[package] = part.data['interfaces'][package]
+                declared[package] = part.entries['interfaces'][package]
                 branch = part.branches('interfaces')[package]
                 self._whole.positions.graft(path, branch)
 

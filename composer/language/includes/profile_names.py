@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
+from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import BUILTIN_PROFILES
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from composer.language.instances import Instance
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
-_WITH_QOS = ('publishers', 'subscriptions', 'services', 'service_clients')
+_WITH_QOS = [kind.section for kind in ENTITY_KINDS if kind.has_qos]
 
 
 class ProfileRenaming:
@@ -69,18 +70,18 @@ def rename_profiles(own: dict[str, Any], profiles: dict[str, Any], label: str) -
     return ProfileRenaming(names)
 
 
-def drop_unknown_profiles(instance: Instance) -> None:
+def drop_unknown_profiles(system: LoadedSystem) -> None:
     """Report the profiles that a file uses and does not declare, and leave out these uses.
 
     Another file may declare one of the name, which is none of this file's.
     """
-    declared = instance.data.get('qos', {})
+    declared = system.entries.get('qos', {})
     reported = set()
-    for holder, key, path in list(_uses(instance.data)):
+    for holder, key, path in list(_uses(system.entries)):
         name = holder[key]
         if name in declared or name in BUILTIN_PROFILES:
             continue
-        span = instance.positions.value(path)
+        span = system.positions.value(path)
         if span not in reported:
             reported.add(span)
             finding = diagnostic_at(
@@ -89,9 +90,9 @@ def drop_unknown_profiles(instance: Instance) -> None:
                 f"no QoS profile is called '{name}'",
                 help=suggest(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
             )
-            instance.diagnostics.append(finding)
+            system.diagnostics.append(finding)
         del holder[key]
-        instance.dropped.add(path)
+        system.dropped.add(path)
 
 
 def free_name(name: str, taken: Iterable[str]) -> str:

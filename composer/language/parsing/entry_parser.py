@@ -1,8 +1,7 @@
-"""Parts that entries of several sorts have: names, behaviours, QoS."""
+"""Parts that entries of several sections have: names, behaviours, QoS."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -28,18 +27,13 @@ def parse_entries(
     )
 
 
-def parse_behaviour(
-    data: Data, path: DataPath, own_path: DataPath | None = None
-) -> BehaviourSpec | None:
-    """Return the behaviour of an entry, if it has one."""
-    if 'behaviour' not in data:
-        return None
-    spec = behaviour_at(data, path, 'behaviour')
-    return replace(spec, path=own_path) if own_path else spec
+def parse_behaviour(data: Data, path: DataPath, key: str = 'behaviour') -> BehaviourSpec | None:
+    """Return the behaviour under a key, if there is one; `with:` is for `behaviour:` alone."""
+    return behaviour_at(data, path, key) if key in data else None
 
 
-def behaviour_at(data: Data, path: DataPath, key: str) -> BehaviourSpec:
-    """Return the behaviour under a key; constant arguments go to `behaviour:` alone."""
+def behaviour_at(data: Data, path: DataPath, key: str = 'behaviour') -> BehaviourSpec:
+    """Return the behaviour under a key that is there."""
     module, _, function = data[key].partition(':')
     arguments = data.get('with', {}) if key == 'behaviour' else {}
     return BehaviourSpec(module, function, MappingProxyType(arguments), (*path, key))
@@ -57,9 +51,9 @@ def parse_qos(data: float | str | Data, path: DataPath, base: str = DEFAULT_PROF
     return QosSpec(data.get('profile', base), policies, path)
 
 
-def parse_service_qos(data: Data, path: DataPath) -> QosSpec:
-    """Return the QoS of a service or its client."""
-    # The QoS of defaults is for topics; rmw has a profile of its own for services.
+def parse_entity_qos(data: Data, path: DataPath, *, is_service: bool = False) -> QosSpec:
+    """Return the QoS of an entity; services have a profile of their own, as in rmw."""
+    base = SERVICES_PROFILE if is_service else DEFAULT_PROFILE
     if 'qos' in data:
-        return parse_qos(data['qos'], (*path, 'qos'), SERVICES_PROFILE)
-    return QosSpec(SERVICES_PROFILE, {}, ())
+        return parse_qos(data['qos'], (*path, 'qos'), base)
+    return QosSpec(base, {}, ())

@@ -12,6 +12,7 @@ from composer.language.specs import (
     ProcessSpec,
 )
 from composer.names import expand_namespace
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -75,39 +76,25 @@ def with_waits(
     return entry | {'wait_for': [renamed(each) for each in written]}
 
 
-def parse_process(
-    outer_namespace: str | None,
-    defaults: dict[str, Any],
-    name: str,
-    data: dict[str, Any],
-    path: DataPath,
-) -> ProcessSpec:
-    """Return a process.
-
-    Args:
-        outer_namespace: That of the file's defaults, `None` if they have none.
-        defaults: The rest of them.
-    """
-    data = with_defaults(data, defaults)
-    if not takes_ros_arguments(data):
-        data = with_waits(data, {}, outer_namespace or '')
+def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpec:
+    """Return a process."""
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
-        command=tuple(map(write_scalar, data.get('command', ()))),
+        command=tuple(map(format_scalar, data.get('command', ()))),
         package=data.get('package'),
         executable=data.get('executable'),
-        arguments=tuple(map(write_scalar, data.get('arguments', ()))),
+        arguments=tuple(map(format_scalar, data.get('arguments', ()))),
         node_name=data.get('name'),
-        namespace=_parse_namespace(outer_namespace, data),
+        namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         parameters=MappingProxyType(data.get('parameters', {})),
         parameter_files=tuple(data.get('parameter_files', ())),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
         env=MappingProxyType(
-            {key: write_scalar(value) for key, value in data.get('env', {}).items()}
+            {key: format_scalar(value) for key, value in data.get('env', {}).items()}
         ),
         cwd=data.get('cwd'),
         required=data.get('required', False),
@@ -130,13 +117,6 @@ def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpe
     return tuple(_parse_condition(each, (*at, index)) for index, each in enumerate(written))
 
 
-def write_scalar(value: Any) -> str:
-    """Return a value as a program gets it: as YAML would write it."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    return str(value)
-
-
 def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
     kind = _kind_of(data)
     timeout_sec = float(data.get('timeout', DEFAULT_WAIT_SEC))
@@ -145,9 +125,3 @@ def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
 
 def _kind_of(condition: dict[str, Any]) -> ConditionKind:
     return next(each for each in _CONDITION_KINDS if each in condition)
-
-
-def _parse_namespace(outer: str | None, data: dict[str, Any]) -> str | None:
-    if 'namespace' in data:
-        return expand_namespace(data['namespace'], outer or '/')
-    return outer if takes_ros_arguments(data) else None

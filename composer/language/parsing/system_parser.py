@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
-from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from composer.language.loaded_system import PARTS
 from composer.language.parsing.entry_parser import Data, parse_entries, parse_qos
-from composer.language.parsing.node_parser import NodeParser, parse_defaults
-from composer.language.parsing.process_parser import parse_process, write_scalar
+from composer.language.parsing.node_parser import parse_node
+from composer.language.parsing.process_parser import parse_process
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
     QosSpec,
     SystemSpec,
 )
+from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
+    from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
+
+
+def parse_specs(system: LoadedSystem) -> None:
+    """Parse the data of a system; what is left out becomes a system of its own.
+
+    Both have the QoS profiles and interfaces.
+    """
+    name, used = system.path.stem, dict(system.entries)
+    if system.left_out:
+        unused = dict(used)
+        for section in PARTS:
+            entries = used.get(section, {})
+            used[section] = {
+                k: v for k, v in entries.items() if (section, k) not in system.left_out
+            }
+            if section in ('nodes', 'processes'):
+                unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
+        system.unused = parse_system(unused, name)
+    system.data = used
+    system.spec = parse_system(used, name)
 
 
 def parse_system(data: Data, name: str) -> SystemSpec:
@@ -28,7 +50,6 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         name: The file's name without its ending.
     """
     executor = data.get('executor', {})
-    defaults = parse_defaults(data.get('defaults', {}))
     return SystemSpec(
         name=name,
         description=data.get('description', ''),
@@ -37,18 +58,11 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
         diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
-        nodes=parse_entries(
-            data,
-            (),
-            'nodes',
-            lambda name, node, path: NodeParser(defaults, node, path).parse(name),
-        ),
+        nodes=parse_entries(data, (), 'nodes', parse_node),
         environment=MappingProxyType(
-            {name: write_scalar(value) for name, value in data.get('environment', {}).items()}
+            {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
-        processes=parse_entries(
-            data, (), 'processes', partial(parse_process, defaults.given_namespace, defaults.node)
-        ),
+        processes=parse_entries(data, (), 'processes', parse_process),
     )
 
 

@@ -1,1 +1,1 @@
-"""Behaviours: imported, called, waited for, and what happens when they raise."""
+"""Behaviours: importing and calling them, what they wait for, and their errors."""

@@ -64,7 +64,7 @@ def kind_of(function: Callable[..., Any]) -> FunctionKind:
 
 
 def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
-    """Return a function's signature; `None` for those of C that tell none."""
+    """Return a function's signature; `None` for functions of C that have none."""
     try:
         return inspect.signature(function)
     except (TypeError, ValueError):
@@ -73,7 +73,7 @@ def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
 
 @contextmanager
 def project_on_path(search_path: list[Path]) -> Iterator[None]:
-    """Let modules of the project be imported, before the installed ones of the same name."""
+    """Import modules of the project before installed ones of the same name."""
     entries = [str(folder) for folder in search_path]
     sys.path[:0] = entries
     importlib.invalidate_caches()

@@ -1,4 +1,4 @@
-"""Where a behaviour is: the frames of its thread, or those down the chain of what it awaits."""
+"""The stacks of running behaviours: of a thread, or of a coroutine and what it awaits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SUSPENDABLE = (CoroutineType, GeneratorType, AsyncGeneratorType)
 _FRAMES = ('cr_frame', 'gi_frame', 'ag_frame')
 _AWAITED = ('cr_await', 'gi_yieldfrom', 'ag_await')
 _OWN_FOLDER = str(Path(__file__).resolve().parents[2])
-# What calls behaviours; the frames outside of it say nothing about them.
+# What calls behaviours; the frames around it are of no interest.
 _WRAPPER = str(Path(__file__).resolve().with_name('calls.py'))
 _MOST_FRAMES = 200
 
@@ -34,7 +34,7 @@ def format_thread(thread: int) -> str:
 def format_coroutine(coroutine: CoroutineType[Any, Any, Any]) -> str:
     """Return the stack of a coroutine, innermost call last, whether it waits or runs."""
     if coroutine.cr_running:
-        # Python tells what a coroutine awaits only while it waits; now a thread has its frames.
+        # What it awaits is known only while it waits; while it runs, a thread has its frames.
         for frame in sys._current_frames().values():  # noqa: SLF001 - the only way
             frames = _stack(frame)
             if coroutine.cr_frame in frames:
@@ -65,7 +65,7 @@ def _awaited_frames(suspended: Any) -> list[FrameType]:
         elif isinstance(suspended, _SUSPENDABLE):
             break
         else:
-            # A step of an async generator, say: only the collector knows of which one.
+            # For example a step of an async generator, which only the garbage collector can name.
             held = gc.get_referents(suspended)
             suspended = next((one for one in held if isinstance(one, _SUSPENDABLE)), None)
     return frames

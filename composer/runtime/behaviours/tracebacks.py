@@ -1,4 +1,4 @@
-"""What a behaviour raised, in words: whatever the exception is, and never too much of it."""
+"""Exceptions as text of limited length, whatever they are."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _LONGEST_TRACEBACK = 12_000
 
 
 def summarize(error: BaseException) -> str:
-    """Return its type and message, and never raise."""
+    """Return its type and message; never raise."""
     try:
         text = str(error)
-    except BaseException as fault:  # noqa: BLE001 - it is the behaviour's code that runs here
-        text = f'<its __str__ raised {type(fault).__name__}>'
+    except BaseException as other:  # noqa: BLE001 - it is the behaviour's code that runs here
+        text = f'<its __str__ raised {type(other).__name__}>'
     return f'{_cut(type(error).__name__, _LONGEST_SUMMARY)}: {_cut(text, _LONGEST_SUMMARY)}'
 
 
 def represent(error: BaseException) -> str:
-    """Return it as Python shows values, and never raise."""
+    """Return its `repr`; never raise."""
     try:
         text = repr(error)
     except BaseException:  # noqa: BLE001 - as above
@@ -39,20 +39,20 @@ def place_of(error: BaseException) -> tuple[str, int | None]:
     return trace.tb_frame.f_code.co_filename, trace.tb_lineno
 
 
-def format_error(error: BaseException) -> str:
-    """Return its traceback without Composer's own frames around the behaviour, and the help."""
+def format_behaviour_error(error: BaseException) -> str:
+    """Return its traceback, without Composer's own frames around the behaviour, and its help."""
     try:
         described = traceback.TracebackException.from_exception(error, compact=True)
         _drop_own_frames(described, error)
         text = ''.join(described.format()).rstrip()
-    except BaseException as fault:  # noqa: BLE001 - an exception can be made to break anything
-        text = f'(its traceback cannot be shown: {type(fault).__name__})'
+    except BaseException as other:  # noqa: BLE001 - an exception can be made to break anything
+        text = f'(its traceback cannot be shown: {type(other).__name__})'
     help_text = _help_of(error)
     return _cut(text, _LONGEST_TRACEBACK) + (f'\nhelp: {help_text}' if help_text else '')
 
 
-def format_fault(error: BaseException) -> str:
-    """Return its traceback with all frames, for what is no error of a behaviour; never raise."""
+def format_internal_error(error: BaseException) -> str:
+    """Return the full traceback of an error outside of all behaviours; never raise."""
     try:
         text = ''.join(traceback.format_exception(error)).rstrip()
     except BaseException:  # noqa: BLE001 - as above
@@ -67,21 +67,21 @@ def _help_of(error: BaseException) -> str | None:
 
 
 def _drop_own_frames(described: traceback.TracebackException, error: BaseException | None) -> None:
-    """Leave the frames from the first of the behaviour on.
+    """Drop the frames before those of the behaviour.
 
-    Those at the end go too if Composer raised the error on purpose: the behaviour's call is what
-    is wrong then.
+    If Composer raised the error on purpose, its frames at the end are dropped too: the call in the
+    behaviour is the wrong line then.
     """
     frames = list(described.stack)
-    foreign = [index for index, frame in enumerate(frames) if not is_own(frame.filename)]
+    others = [index for index, frame in enumerate(frames) if not is_own(frame.filename)]
     if isinstance(error, ComposerError):
-        frames = frames[foreign[0] : foreign[-1] + 1] if foreign else []
-    elif foreign:
-        frames = frames[foreign[0] :]
+        frames = frames[others[0] : others[-1] + 1] if others else []
+    elif others:
+        frames = frames[others[0] :]
     if frames:
         described.stack[:] = frames
     else:
-        # So that no heading is printed either.
+        # Without a heading either.
         described.stack = None  # type: ignore[assignment]
     if described.__cause__ is not None:
         _drop_own_frames(described.__cause__, error.__cause__ if error else None)
@@ -92,9 +92,9 @@ def _drop_own_frames(described: traceback.TracebackException, error: BaseExcepti
 
 
 def _cut(text: str, longest: int) -> str:
-    """Return no more than `longest` characters of it, all of which ROS can log.
+    """Return at most `longest` characters, with those escaped that ROS cannot log.
 
-    What it cannot is in the names of files that are not in UTF-8, for example.
+    Names of files that are not in UTF-8 have such characters, for example.
     """
     if len(text) > longest:
         half = longest // 2

@@ -28,7 +28,7 @@ _POLL_SEC = 0.01
 
 def stopping_error() -> SystemStoppingError:
     """Return the error that ends a wait."""
-    return SystemStoppingError('the system stops, and nothing more is waited for')
+    return SystemStoppingError('the system is stopping')
 
 
 class Waits:

@@ -1,4 +1,4 @@
-"""Which of an action's accepted goals run: the four rules of `concurrency:`."""
+"""The order in which accepted goals run, as `concurrency` says."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class GoalQueue:
-    """Starts the goals of one action.
+    """The goals of one action that run or wait.
 
     Args:
-        start: Begins the execution of a goal handle; `finished` is called when it has ended.
+        start: Begins to execute a goal; `finished` is called when it has ended.
     """
 
     def __init__(self, concurrency: Concurrency, start: Callable[[Any], None]) -> None:
@@ -33,7 +33,7 @@ class GoalQueue:
             return self._concurrency != 'reject' or not self._running
 
     def add(self, goal: Any) -> None:
-        """Run an accepted goal now or later, as the rule says."""
+        """Run an accepted goal now or later."""
         superseded: list[Any] = []
         with self._lock:
             waits = bool(self._running) and self._concurrency in ('queue', 'preempt')
@@ -47,7 +47,7 @@ class GoalQueue:
             else:
                 self._running[goal_key(goal)] = goal
         for other in superseded:
-            # It never ran: its execution only gives it its final state.
+            # It never ran: executing it only gives it its final state.
             self._start(other)
         if not waits:
             self._start(goal)
@@ -57,7 +57,7 @@ class GoalQueue:
         return goal_key(goal) in self._superseded
 
     def take_out(self, goal: Any) -> bool:
-        """Forget a goal that waits; return whether it was waiting."""
+        """Remove a goal that waits; return whether it was waiting."""
         with self._lock:
             if goal not in self._waiting:
                 return False
@@ -65,7 +65,7 @@ class GoalQueue:
             return True
 
     def finished(self, goal: Any) -> None:
-        """Start what waited for this goal."""
+        """Remove a goal that has ended, and start the one that waited for it."""
         following = None
         with self._lock:
             was_running = self._running.pop(goal_key(goal), None) is not None
@@ -78,5 +78,5 @@ class GoalQueue:
 
 
 def goal_key(goal: Any) -> bytes:
-    """Return what tells a goal handle from others; it is not hashable itself."""
+    """Return the identifier of a goal handle, which is not hashable itself."""
     return bytes(goal.goal_id.uuid)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
-from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.payloads import converter_for
+from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
     from composer.language.specs import PublisherSpec

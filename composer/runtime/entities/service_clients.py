@@ -13,8 +13,8 @@ from composer.errors import (
 )
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
-from composer.runtime.entities.qos_profiles import create_qos_profile
 from composer.runtime.messages.payloads import converter_for
+from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
     from composer.language.specs import ServiceClientSpec

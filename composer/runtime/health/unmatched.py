@@ -15,8 +15,8 @@ from rclpy.exceptions import InvalidHandle
 from composer.executor import checked_seldom
 from composer.language.qos_conflicts import find_qos_conflicts
 from composer.language.specs import PublisherSpec
-from composer.runtime.entities.qos_profiles import read_policies
 from composer.runtime.health.watcher import Watcher
+from composer.runtime.messages.qos_profiles import read_policies
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

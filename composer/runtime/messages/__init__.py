@@ -1,1 +1,1 @@
-"""What behaviours give and get: plain data ⇄ messages."""
+"""Plain data ⇄ what rclpy takes: messages, arrays in them, QoS profiles."""

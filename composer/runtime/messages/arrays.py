@@ -1,12 +1,12 @@
-"""Arrays in payloads become the containers that rclpy's generated classes keep.
+"""Arrays in payloads → the containers of rclpy's message classes.
 
-Those are an `array.array` for sequences of numbers, a NumPy array for numbers of a fixed count,
-and a list for all else. Any sequence will do as input, and so do NumPy's arrays (of more than one
-dimension too, in row-major order, as ROS lays out its matrices) and `array.array`; where the items
-are octets, so do `bytes`, `bytearray` and a `memoryview` of octets.
+These are an `array.array` for sequences of numbers, a NumPy array for a fixed count of numbers,
+and a list for everything else. The input may be any sequence, a NumPy array (of several dimensions
+too, in row-major order, as ROS lays out its matrices) or an `array.array`; for octets also
+`bytes`, `bytearray` or a `memoryview` of octets.
 
-Numbers in their container already are not looked into again, so that checking a message costs the
-same whether its image has ten pixels or a million. Lists are, since anything may be in them.
+Numbers that are in their container already are not checked again: a message costs the same whether
+its image has ten pixels or a million. Lists are checked, since anything may be in them.
 """
 
 from array import array
@@ -40,11 +40,11 @@ _OCTET_FORMATS: Final = frozenset({'B', 'c'})
 
 
 def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
-    """Get the rule for arrays of a type.
+    """Return the function that reads arrays of a type.
 
     Args:
-        field_type: the type of the array.
-        read_item: the rule for its items.
+        field_type: The type of the array.
+        read_item: Reads its items.
     """
     read_list = _list_reader(field_type, read_item)
     if field_type.kind not in _TYPE_CODES:
@@ -52,8 +52,8 @@ def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
     read_numbers = _number_reader(field_type, read_list)
     if field_type.array != 'fixed':
         return read_numbers
-    # NumPy takes a tenth of a second to import, and most messages do without it. The class of one
-    # with a fixed array of numbers has imported it by now.
+    # NumPy takes a tenth of a second to import, and most messages do not need it. The class of a
+    # message with a fixed array of numbers has imported it already.
     from composer.runtime.messages.numpy_arrays import fixed_reader
 
     return fixed_reader(field_type, read_numbers)
@@ -93,7 +93,7 @@ def _number_reader(field_type: FieldType, read_list: _SequenceReader) -> Reader:
 
 
 def _copy_fast(kind: str, value: object) -> 'array[Any] | None':
-    """Copy numbers that are right as a whole, or return None where each must be looked at."""
+    """Return a copy of numbers that are valid as a whole, None if each must be checked."""
     code = _TYPE_CODES[kind]
     if isinstance(value, list | tuple):
         return _copy_list(code, value)
@@ -101,7 +101,7 @@ def _copy_fast(kind: str, value: object) -> 'array[Any] | None':
     if kind in OCTET_KINDS and isinstance(octets, bytes | bytearray):
         return array(code, octets)
     if hasattr(value, '__array_interface__'):
-        # Only NumPy's arrays get here, so it is imported already.
+        # Only NumPy's arrays get here, so NumPy is imported already.
         from composer.runtime.messages.numpy_arrays import read_array
 
         exact = read_array(kind, value)
@@ -117,17 +117,17 @@ def _copy_list(code: str, value: 'list[Any] | tuple[Any, ...]') -> 'array[Any] |
         numbers = array(code, value)
     except OverflowError:
         return None
-    # A finite number beyond the range of a float32 would be infinite by now.
+    # A finite number beyond the range of a float32 has become infinite.
     return None if code == 'f' and not all(map(isfinite, numbers)) else numbers
 
 
 def _unpack(value: Any) -> object:
-    """Get the items of NumPy's arrays and `array.array` as Python values, views as their bytes."""
+    """Return arrays of NumPy and `array.array` as lists, and views of octets as bytes."""
     if isinstance(value, memoryview):
         return value.tobytes() if value.format in _OCTET_FORMATS else value
     if isinstance(value, array):
         return value.tolist()
     if hasattr(value, '__array_interface__'):
-        # NumPy's scalars and arrays of no dimension are no arrays here: they remain single values.
+        # NumPy's scalars and arrays without dimensions are single values here.
         return value.reshape(-1).tolist() if value.shape else value.item()
     return value

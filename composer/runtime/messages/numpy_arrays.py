@@ -1,6 +1,6 @@
-"""Arrays of NumPy, as payloads and as rclpy keeps fixed arrays of numbers.
+"""NumPy arrays, as payloads and in messages with fixed arrays of numbers.
 
-Apart from `composer.runtime.messages.arrays`, so that NumPy is imported only where it is in use.
+This module is apart from `arrays`, because NumPy is imported only where it is used.
 """
 
 from typing import Any
@@ -13,11 +13,11 @@ from composer.interfaces.field_values import INTEGER_RANGES, Reader, check_lengt
 
 
 def fixed_reader(field_type: FieldType, read_numbers: Reader) -> Reader:
-    """Get the rule for arrays of a fixed count of numbers.
+    """Return the function that reads arrays of a fixed count of numbers.
 
     Args:
-        field_type: the type of the array.
-        read_numbers: the rule that reads other containers into an `array.array`.
+        field_type: The type of the array.
+        read_numbers: Reads other containers into an `array.array`.
     """
     dtype = _dtype(field_type.kind)
     shape = (field_type.array_bound,)
@@ -35,11 +35,10 @@ def fixed_reader(field_type: FieldType, read_numbers: Reader) -> Reader:
 
 
 def read_array(kind: str, value: object) -> NDArray[Any] | None:
-    """Read an array as numbers of a kind, in one dimension.
+    """Return an array as numbers of a kind, in one dimension.
 
     Returns:
-        None where the numbers are not all of the kind, or do not all fit it: then they are to be
-        looked at one by one.
+        None if some numbers are of another kind or out of range: then each must be checked.
     """
     given: NDArray[Any] = np.asarray(value)
     wanted = _dtype(kind)

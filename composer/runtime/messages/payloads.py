@@ -1,18 +1,18 @@
-"""What a behaviour gives becomes a message that is safe to publish.
+"""Payloads of behaviours → messages that are safe to publish.
 
-A *payload* is a message, a mapping of (nested) fields, or the bare value when the message has one
-field. The same holds inside: wherever a message is wanted, all three will do. In detail:
+A *payload* is a message, a mapping of (nested) fields, or the bare value if the message has one
+field. The same holds for the messages inside it. In detail:
 
-- A mapping always names the fields of the message itself, also where there is only one; fields
-  that it leaves out keep their defaults.
+- A mapping always names the fields of the message itself, even if there is only one; fields that
+  it leaves out keep their defaults.
 - An empty message is `{}` or None.
-- Objects with a `to_msg()` stand for its result: `rclpy`'s `Time` and `Duration` do.
-- A message is checked and returned itself, not a copy. What it holds in another form than rclpy
-  wants (an `int` in a `float64` field, a tuple for a list) is replaced in place: rclpy 7 checks
-  no fields unless `ROS_PYTHON_CHECK_FIELDS=1`, and publishes such an `int` as garbage.
+- An object with a method `to_msg()`, such as rclpy's `Time` and `Duration`, stands for its result.
+- A message is checked and returned itself, not as a copy. Values in another form than rclpy wants
+  (an `int` in a `float64` field, a tuple for a list) are replaced in place: rclpy 7 checks no
+  fields unless `ROS_PYTHON_CHECK_FIELDS=1`, and publishes such an `int` as garbage.
 
-Which values fit which field is the business of `composer.interfaces.field_values`, for arrays of
-`composer.runtime.messages.arrays`. Both stop at the first fault.
+`composer.interfaces.field_values` decides which values fit a field, `arrays` does so for arrays.
+Both stop at the first error.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ from composer.interfaces.field_errors import (
 from composer.interfaces.field_values import Reader, scalar_reader
 from composer.runtime.messages.arrays import array_reader
 
-# The types of most bare values, told at once from messages and mappings.
+# The types of most bare values, quickly distinguished from messages and mappings.
 _SCALARS: Final = frozenset({str, int, float, bool})
 
 
@@ -40,12 +40,12 @@ class PayloadError(ComposerError):
     """A payload does not fit its message.
 
     Attributes:
-        type_name: full name of the message.
-        path: names and indices that lead to the value at fault, outermost first.
+        type_name: The full name of the message's type.
+        path: The names and indices that lead to the wrong value, outermost first.
     """
 
     def __init__(self, type_name: str, error: FieldError) -> None:
-        """Say where in a message of this type the error lies."""
+        """Describe an error in a message of this type."""
         super().__init__(format_field_error(type_name, error.path, str(error)), help=error.help)
         self.type_name = type_name
         self.path = error.path
@@ -64,11 +64,11 @@ class PayloadConverter:
     )
 
     def __init__(self, message_class: type) -> None:
-        """Compile the rules for a message class, and for those of its nested messages.
+        """Compile the converter of a message class, and those of its nested messages.
 
         Raises:
-            InterfaceNotFoundError: the class of a nested message cannot be loaded.
-            UnsupportedFieldError: a field has a type that `.msg` files do not have.
+            InterfaceNotFoundError: The class of a nested message cannot be loaded.
+            UnsupportedFieldError: A field has a type that `.msg` files do not have.
         """
         description = describe_class(message_class)
         self.message_class = message_class
@@ -86,11 +86,11 @@ class PayloadConverter:
         """Convert a payload to a message, or check the message that it is.
 
         Raises:
-            PayloadError: the payload does not fit; it names the first field at fault, the type
-                that it has and what it was given.
+            PayloadError: The payload does not fit; the message names the first wrong field, its
+                type and the value.
         """
         try:
-            # What behaviours give most often, without a detour.
+            # The most frequent payload first.
             if type(payload) is self.message_class:
                 return self._check(payload)
             return self.read(payload)
@@ -98,10 +98,10 @@ class PayloadConverter:
             raise PayloadError(self.type_name, error) from None
 
     def read(self, payload: object) -> object:
-        """Convert a payload that lies inside another one.
+        """Convert a payload inside another one.
 
         Raises:
-            FieldError: the payload does not fit; its path begins at this message.
+            FieldError: The payload does not fit; the path begins at this message.
         """
         kind = type(payload)
         if kind is self.message_class:
@@ -121,8 +121,8 @@ class PayloadConverter:
             return self._build(value)
         if value is None and not self._readers:
             return self.message_class()
-        foreign = is_message_class(type(value)) and not self._takes_bare_messages
-        if self._single is None or foreign:
+        is_other = is_message_class(type(value)) and not self._takes_bare_messages
+        if self._single is None or is_other:
             raise no_message(self.type_name, value, self._readers)
         return self._build({self._single: value})
 
@@ -156,17 +156,17 @@ class PayloadConverter:
 
 @cache
 def converter_for(message_class: type) -> PayloadConverter:
-    """Get the converter of a message class; it is compiled once.
+    """Return the converter of a message class; it is compiled once.
 
     Raises:
-        InterfaceNotFoundError: the class of a nested message cannot be loaded.
-        UnsupportedFieldError: a field has a type that `.msg` files do not have.
+        InterfaceNotFoundError: The class of a nested message cannot be loaded.
+        UnsupportedFieldError: A field has a type that `.msg` files do not have.
     """
     return PayloadConverter(message_class)
 
 
 def _type_that_fits(field_type: FieldType) -> type | None:
-    """Return the Python type whose every value a field can hold as it is, if there is one."""
+    """Return the Python type whose values all fit a field as they are, if there is one."""
     if field_type.array is not None:
         return None
     return {'float64': float, 'bool': bool}.get(field_type.kind)

@@ -1,1 +1,1 @@
-"""One node from start to stop."""
+"""Nodes without their entities: what these share, and what behaviours see."""

@@ -1,4 +1,4 @@
-"""`composer.Node`: what a behaviour sees of its node."""
+"""`composer.Node`: the node that behaviours are called with."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ class Publish(Protocol):
 
 
 class UndeclaredError(ComposerError):
-    """A behaviour asks for something that its node does not declare in the file."""
+    """A behaviour uses something that its node does not declare in the file."""
 
 
 class UndeclaredParameterError(UndeclaredError, KeyError, AttributeError):
-    """A behaviour asks for a parameter that its node does not declare in the file.
+    """A behaviour uses a parameter that its node does not declare in the file.
 
-    As a `KeyError` and an `AttributeError` it lets `in`, `get` and `getattr` do what they promise.
+    It is a `KeyError` and an `AttributeError` for `in`, `get` and `getattr` to work as usual.
     """
 
     __str__ = Exception.__str__
 
 
 class Parameters(Mapping[str, Any]):
-    """The values of a node's parameters, as they are now.
+    """The current values of a node's parameters.
 
-    `parameters.speed` and `parameters['speed']` are the same; names with dots, and those that a
-    mapping has itself (`keys`, `get`, …), need the second form.
+    `parameters.speed` and `parameters['speed']` are the same; names with dots, and names of a
+    mapping's own methods (`keys`, `get`, …), need the second form.
     """
 
     def __init__(self, ros: rclpy.node.Node) -> None:
@@ -83,13 +83,13 @@ class Node:
 
     Attributes:
         name: The node's name, without its namespace.
-        parameters: The values of its parameters, always those of now.
-        state: What the behaviours of the node share; starts as the file's `state:`. Behaviours of
-            one callback group never run at the same time, so it needs no lock.
-        own_state: What the behaviour of one timer, subscription, service or action keeps for
-            itself from call to call; empty at the start. Two uses of a behaviour in one node have
-            one each; the goals of an action share theirs.
-        ros: The rclpy node beneath, for what is not here.
+        parameters: The current values of its parameters.
+        state: What the behaviours of the node share; it starts as the file's `state:`. Behaviours
+            of one callback group never run at the same time, so it needs no lock.
+        own_state: What the behaviour of one timer, subscription, service or action keeps from
+            call to call; empty at the start. Two entities with the same behaviour have one each;
+            the goals of an action share theirs.
+        ros: The rclpy node, for everything else.
     """
 
     __slots__ = (
@@ -156,7 +156,7 @@ class Node:
             name: The service client's name in the file.
             payload: The request.
             timeout: How long to wait for the server and its response, in seconds; `None` for
-                no end.
+                no limit.
 
         Raises:
             UndeclaredError: The node declares no such service client.
@@ -185,7 +185,7 @@ class Node:
             name: The action client's name in the file.
             payload: The goal.
             timeout: How long to wait for the server and its answer, in seconds; `None` for no
-                end.
+                limit.
 
         Raises:
             UndeclaredError: The node declares no such action client.
@@ -223,7 +223,7 @@ class Node:
         return self._remote_parameters.get(node_name, names, timeout)
 
     def shutdown(self, code: int = 0) -> None:
-        """End the whole system with this exit code; it stops after this behaviour has returned."""
+        """Stop the whole system, after this behaviour has returned, with an exit code."""
         self._shutdown(code)
 
     def _entity(self, section: str, name: str) -> Any:

@@ -1,6 +1,6 @@
-"""The rclpy node beneath a node of the file, with those of ROS's own services that it needs.
+"""The rclpy node of a node in the file, with only those of ROS's own services that it needs.
 
-What they cost, each, per node (rclpy 7.1.6 and Fast DDS 2.14 on two cores, 40 nodes in a process;
+Their costs for each node (rclpy 7.1.6 and Fast DDS 2.14 on two cores, 40 nodes in a process;
 a node without any takes 0.01 MB and 0.3 ms):
 
 | | MB | ms |
@@ -13,21 +13,21 @@ a node without any takes 0.01 MB and 0.3 ms):
 
 So a node has
 
-- parameter services if it declares parameters: without, there is nothing to list or set, and
-  `ros2 param list` passes over a node that has none. `use_sim_time` is given by the file or the
+- parameter services if it declares parameters: otherwise there is nothing to list or set, and
+  `ros2 param list` skips a node without them. `use_sim_time` is given by the file or the
   command line; rclpy subscribes to `/clock` only where it is true.
-- `/rosout`, as every node of ROS: it is cheap, and people look there for what a node has to say.
-  It is made with the node, not with the first line: subscriptions that are not transient local
-  would miss that line.
-- `/parameter_events` from the start if it declares parameters or has their services, else from the
-  first change of one on.
+- `/rosout`, as every ROS node: it is cheap, and users expect a node's log there. It is created
+  with the node, not with the first line: subscriptions that are not transient local would miss
+  that line.
+- `/parameter_events` from the start if it declares parameters or has their services, otherwise
+  from the first change of a parameter.
 - no type description service: no tool of Jazzy calls it.
-- no logger services, which rclpy leaves out, too.
+- no logger services: rclpy leaves them out, too.
 
 The file turns each of them on or off.
 
-Parameter files are read by rcl itself. What `-p` of the command line says wins over them: rcl
-would let a value win that a file gives to this node by name, or one whose type comes first (see
+Parameter files are read by rcl itself. Values of `-p` on the command line win over them: rcl would
+prefer a value that a file gives to this node by name, or one whose type comes first (see
 `composer.ros_parameters.overrides`).
 """
 
@@ -62,19 +62,19 @@ _POLL_SEC = 0.001
 
 
 class ComposedRosNode(Node):
-    """A node of rclpy as a file declares it, without the entities of the file.
+    """A node of rclpy as a file declares it, without its entities.
 
     Args:
         ros_arguments: The arguments after `--ros-args` of the command line.
 
     Attributes:
-        from_files: What the node takes from its parameter files, by the parameters' names.
+        from_files: The parameters that the node has from its parameter files, by name.
     """
 
     def __init__(self, spec: NodeSpec, context: Context, ros_arguments: Sequence[str]) -> None:
         files = [str(resolve_path(text, Path())) for text in spec.parameter_files]
-        by_hand = parse_command_line(ros_arguments, spec.full_name) if files else {}
-        self.from_files = _read_files(files, spec.full_name, by_hand)
+        overrides = parse_command_line(ros_arguments, spec.full_name) if files else {}
+        self.from_files = _read_files(files, spec.full_name, overrides)
         self._late_events: _LatePublisher | None = None
         self._events_are_late = not (spec.parameter_services or spec.parameters)
         # Global arguments hold for every node of the process, where a __node rule would give all
@@ -86,7 +86,7 @@ class ComposedRosNode(Node):
             cli_args=_node_arguments(spec, files, self.from_files, ros_arguments),
             parameter_overrides=[
                 Parameter(name, Parameter.Type[type_name.upper()], value)
-                for name, (value, type_name) in by_hand.items()
+                for name, (value, type_name) in overrides.items()
             ],
             use_global_arguments=False,
             enable_rosout=spec.rosout,
@@ -97,7 +97,7 @@ class ComposedRosNode(Node):
             self._late_events.open()
 
     def create_publisher(self, msg_type: Any, topic: str, *arguments: Any, **options: Any) -> Any:
-        """See the base class, whose constructor makes the publisher of parameter events here."""
+        """See the base class, whose constructor creates the publisher of parameter events."""
         if topic != _PARAMETER_EVENTS or not self._events_are_late:
             return super().create_publisher(msg_type, topic, *arguments, **options)
         self._events_are_late = False
@@ -109,9 +109,9 @@ class ComposedRosNode(Node):
     def wait_until_gone(self, timeout_sec: float) -> bool:
         """Wait until the destroyed node is gone; return whether it went in time.
 
-        An executor that waits for an entity of the node keeps the entity, and that one the node,
+        An executor that waits for an entity of the node keeps the entity, and with it the node,
         until it wakes up. A new node of that name would meanwhile get no publisher of `/rosout`,
-        and lose the next one with the end of the old node.
+        and lose its next one when the old node ends.
         """
         deadline = monotonic() + timeout_sec
         name = self.get_logger().name
@@ -123,10 +123,10 @@ class ComposedRosNode(Node):
 
 
 class _LatePublisher:
-    """Makes its publisher when there is something to publish.
+    """Creates its publisher when there is something to publish.
 
-    Until it is opened nothing is published: while a node is constructed, it declares the
-    parameters that every node has, which nobody listens for.
+    It publishes nothing before it is opened: the constructor of a node declares the parameters
+    that every node has, which are of no interest.
     """
 
     def __init__(self, create: Callable[[], Publisher]) -> None:
@@ -170,8 +170,8 @@ def _node_arguments(
 
 
 def _read_files(
-    files: Sequence[str], full_name: str, by_hand: Collection[str]
+    files: Sequence[str], full_name: str, overrides: Collection[str]
 ) -> dict[str, ParameterEntry]:
     read = [read_parameter_file(Path(file)) for file in files]
     found = find_overrides(read, full_name)
-    return {name: entry for name, entry in found.items() if name not in by_hand}
+    return {name: entry for name, entry in found.items() if name not in overrides}

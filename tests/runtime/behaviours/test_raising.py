@@ -147,7 +147,7 @@ def test_subscriptions_services_and_parameters_may_raise_anything(compose, peer,
         (result,) = peer.call(
             SetParameters, f'on_{name}/set_parameters', parameters=[change]
         ).results
-        assert result.reason == 'the behaviour that decides on it raised an error'
+        assert result.reason == 'on_parameters raised an error'
         for entity in ("subscription 'number'", f"service 'ask_{name}'", 'on_parameters'):
             line = child.wait_for_line(f'[ERROR] [on_{name}]: {entity} (')
             assert f' raised {error}' in line

@@ -304,7 +304,7 @@ def test_on_parameters_may_be_async(change, get):
 def test_on_parameters_that_raises_refuses_and_is_logged(child, change, get):
     assert change('limit', 2, 'stumbling') == (
         False,
-        'the behaviour that decides on it raised an error',
+        'on_parameters raised an error',
     )
     assert get('limit', 'stumbling') == 1
     line = SYSTEM.splitlines().index('    on_parameters: parts:stumble') + 1

@@ -1,4 +1,4 @@
-"""QoS in words: only what differs from what ROS does by itself."""
+"""The QoS of an edge as text: the policies that differ from the default of ROS."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from composer.language.specs import QosSpec
 
-# Their values say which policy is meant.
-_SPEAKING = ('reliability', 'durability', 'history')
+# Policies whose values are clear without their names.
+_SELF_EXPLANATORY = ('reliability', 'durability', 'history')
 
 
 def differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
-    """Return the policies that are not those of the profile `default`; none of a broken QoS.
+    """Return the policies that differ from the profile `default`; none if the QoS is faulty.
 
-    Topics and services have the same ones by themselves (`rmw/qos_profiles.h`).
+    Topics and services have the same defaults (`rmw/qos_profiles.h`).
 
     Args:
         profiles: The named profiles of the file.
@@ -44,6 +44,6 @@ def describe_policies(policies: Mapping[str, Any]) -> str:
 
 
 def _describe(key: str, value: Any) -> str:
-    if key in _SPEAKING and value not in ('system_default', 'best_available'):
+    if key in _SELF_EXPLANATORY and value not in ('system_default', 'best_available'):
         return str(value)
     return f'{key.replace("_", " ")} {format_policy_value(key, value)}'

@@ -1,6 +1,6 @@
-"""Graphviz: from its language to SVG. The program `dot` is used, or the library in pygraphviz.
+"""Runs Graphviz, which lays out a drawing: the program `dot`, or the library in pygraphviz.
 
-Either runs in a process of its own, where it can be stopped and no fault of it does harm.
+Either runs in a process of its own, where it can be stopped, and a crash does no harm.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _MISSING_HELP = (
 
 
 class DrawingError(ComposerError):
-    """Nothing can lay the picture out, or it fails to."""
+    """Graphviz is missing or failed."""
 
 
 def lay_out(text: str) -> str:
-    """Return the SVG document that Graphviz makes of a text in its language.
+    """Return a text in the DOT language as an SVG document.
 
     Raises:
-        DrawingError: There is no Graphviz, or it fails.
+        DrawingError: Graphviz is missing or failed.
     """
     try:
         done = subprocess.run(  # noqa: S603 - the program is Graphviz, the text its input
@@ -57,7 +57,7 @@ def _command() -> list[str]:
     if program:
         return [program, '-Tsvg']
     if importlib.util.find_spec('pygraphviz'):
-        # -P: the folder that the command runs in is nobody's place for modules.
+        # -P: import nothing from the working folder.
         return [sys.executable, '-P', '-c', _WITH_LIBRARY]
     message = 'svg and html are laid out by Graphviz, which is not installed'
     raise DrawingError(message, help=_MISSING_HELP)

@@ -13,7 +13,7 @@ from rclpy.qos import (
 )
 
 from composer.language.specs import QosSpec
-from composer.runtime.entities.qos_profiles import create_qos_profile
+from composer.runtime.messages.qos_profiles import create_qos_profile
 
 pytestmark = pytest.mark.ros
 

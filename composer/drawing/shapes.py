@@ -1,6 +1,6 @@
-"""A picture → shapes in nested regions, and the lines between them: what mermaid and dot write.
+"""A picture → shapes in nested regions, and lines between them: what mermaid and dot write.
 
-Shapes have short tokens instead of names, so that no name can clash with a word of a language.
+Shapes have short tokens instead of names: no name can clash with a keyword of a language.
 """
 
 from __future__ import annotations
@@ -9,14 +9,15 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.drawing.policies import describe_policies
+from composer.drawing.picture import sends
+from composer.drawing.qos_labels import describe_policies
 from composer.reports.text import escape
 from composer.rules import Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from composer.drawing.picture import Box, Edge, Hub, Picture
+    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
 
 _REMARK_WIDTH = 44
 # Of a part with more findings, the rest is counted.
@@ -25,14 +26,14 @@ _MOST_REMARKS = 2
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Something drawn at one place; its texts have nothing in them that cannot be printed.
+    """A node, process or channel as it is drawn; all of its texts are printable.
 
     Attributes:
-        id: Of what it shows; that of its channel if it stands for ends elsewhere.
+        id: The id of what it shows; of the channel, if it stands for ends outside the system.
         kind: `node`, `process`, `topic`, `service`, `action` or `external`.
         details: Smaller lines below the title.
-        remarks: What is wrong with it, in lines.
-        mark: `error` or `warning`, the worst of its findings; empty if nothing is wrong.
+        remarks: The messages of its findings, in lines.
+        mark: The worst of its findings, `error` or `warning`; empty if it has none.
     """
 
     token: str
@@ -46,14 +47,14 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Something drawn between two shapes, with an arrow at its end.
+    """An arrow between two shapes.
 
     Attributes:
-        id: Of what it shows; empty for waits and ends elsewhere.
+        id: The id of what it shows; empty for waits and ends outside the system.
         kind: `topic`, `service`, `action`, `external` or `wait`.
-        details: What is written beside it.
-        remarks: What is wrong with it, in lines.
-        mark: As of a shape.
+        details: The text beside it.
+        remarks: The messages of its findings, in lines.
+        mark: As for a shape.
     """
 
     token: str
@@ -68,7 +69,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A namespace, with what is in it and in no deeper one."""
+    """A namespace, with the shapes in it that are in no deeper one."""
 
     namespace: str
     shapes: list[Shape] = field(default_factory=list)
@@ -80,7 +81,7 @@ class Region:
         return escape(self.namespace)
 
     def within(self, namespace: str) -> Region:
-        """Return the region of a namespace below this one, which is made if need be."""
+        """Return the region of a namespace below this one; add it if it is missing."""
         region = self
         for part in (part for part in namespace.split('/') if part):
             full = f'{region.namespace.rstrip("/")}/{part}'
@@ -89,37 +90,39 @@ class Region:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """All that is drawn; what has no namespace is in `root` itself."""
+class Arrangement:
+    """All shapes and lines; shapes without a namespace are in `root` itself."""
 
     root: Region
     lines: tuple[Line, ...]
 
 
-def plan_picture(picture: Picture) -> Plan:
-    """Return what is drawn of a picture, and where."""
+def arrange_shapes(picture: Picture) -> Arrangement:
+    """Return the shapes and lines of a picture."""
     root = Region('/')
     remarks = _Remarks(picture)
     tokens = tokens_of(picture)
-    for box in picture.boxes:
-        root.within(box.namespace).shapes.append(_box_shape(tokens[box.id], box, remarks))
-    for hub in picture.hubs:
-        root.within(hub.namespace).shapes.append(_hub_shape(tokens[hub.id], hub, remarks))
+    for node in picture.nodes:
+        root.within(node.namespace).shapes.append(_node_shape(tokens[node.id], node, remarks))
+    for channel in picture.channels:
+        root.within(channel.namespace).shapes.append(
+            _channel_shape(tokens[channel.id], channel, remarks)
+        )
     lines = [_edge_line(edge, tokens, remarks) for edge in picture.edges]
-    for shape, line in _ends_elsewhere(picture.hubs, tokens):
+    for shape, line in _ends_elsewhere(picture.channels, tokens):
         root.shapes.append(shape)
         lines.append(line)
     for index, wait in enumerate(picture.waits):
-        ends = tokens[wait.target], tokens[wait.box]
+        ends = tokens[wait.target], tokens[wait.waiter]
         lines.append(Line(f'w{index}', '', 'wait', *ends, details=('before',)))
-    return Plan(root, tuple(lines))
+    return Arrangement(root, tuple(lines))
 
 
 def tokens_of(picture: Picture) -> dict[str, str]:
     """Return the tokens of nodes, processes, channels and their ends, by their ids."""
     return {
-        **{box.id: f'n{index}' for index, box in enumerate(picture.boxes)},
-        **{hub.id: f'c{index}' for index, hub in enumerate(picture.hubs)},
+        **{node.id: f'n{index}' for index, node in enumerate(picture.nodes)},
+        **{channel.id: f'c{index}' for index, channel in enumerate(picture.channels)},
         **{edge.id: f'e{index}' for index, edge in enumerate(picture.edges)},
     }
 
@@ -133,22 +136,22 @@ def worst_mark(picture: Picture, findings: Iterable[int]) -> str:
 
 
 class _Remarks:
-    """What findings say, each where it is met first; where else it belongs, a mark must do."""
+    """The messages of findings: each is shown once, and its other places are only marked."""
 
     def __init__(self, picture: Picture) -> None:
         self._picture = picture
-        self._told: set[int] = set()
+        self._shown: set[int] = set()
 
-    def tell(self, findings: Sequence[int]) -> tuple[str, ...]:
-        """Return the lines of those findings that nothing else has told."""
-        fresh = [index for index in findings if index not in self._told]
-        self._told.update(fresh)
+    def take(self, findings: Sequence[int]) -> tuple[str, ...]:
+        """Return the lines of those findings that are not shown yet."""
+        fresh = [index for index in findings if index not in self._shown]
+        self._shown.update(fresh)
         lines = [line for index in fresh[:_MOST_REMARKS] for line in self._lines(index)]
         rest = len(fresh) - _MOST_REMARKS
         return (*lines, f'and {rest} more') if rest > 0 else tuple(lines)
 
     def mark(self, findings: Sequence[int]) -> str:
-        """Return the worst that they are."""
+        """Return the worst severity; see `worst_mark`."""
         return worst_mark(self._picture, findings)
 
     def _lines(self, index: int) -> Iterator[str]:
@@ -157,26 +160,26 @@ class _Remarks:
         yield from textwrap.wrap(text, _REMARK_WIDTH)
 
 
-def _box_shape(token: str, box: Box, remarks: _Remarks) -> Shape:
+def _node_shape(token: str, node: NodeBox, remarks: _Remarks) -> Shape:
     return Shape(
         token,
-        box.id,
-        box.kind,
-        escape(box.name),
-        remarks=remarks.tell(box.findings),
-        mark=remarks.mark(box.findings),
+        node.id,
+        node.kind,
+        escape(node.name),
+        remarks=remarks.take(node.findings),
+        mark=remarks.mark(node.findings),
     )
 
 
-def _hub_shape(token: str, hub: Hub, remarks: _Remarks) -> Shape:
+def _channel_shape(token: str, channel: ChannelBox, remarks: _Remarks) -> Shape:
     return Shape(
         token,
-        hub.id,
-        hub.kind,
-        escape(hub.name),
-        tuple(map(escape, hub.types)),
-        remarks.tell(hub.findings),
-        remarks.mark(hub.findings),
+        channel.id,
+        channel.kind,
+        escape(channel.name),
+        tuple(map(escape, channel.types)),
+        remarks.take(channel.findings),
+        remarks.mark(channel.findings),
     )
 
 
@@ -186,21 +189,23 @@ def _edge_line(edge: Edge, tokens: dict[str, str], remarks: _Remarks) -> Line:
     return Line(
         tokens[edge.id],
         edge.id,
-        edge.hub.partition(':')[0],
+        edge.channel.partition(':')[0],
         tokens[start],
         tokens[end],
         (escape(policies),) if policies else (),
-        remarks.tell(edge.findings),
+        remarks.take(edge.findings),
         remarks.mark(edge.findings),
     )
 
 
-def _ends_elsewhere(hubs: Iterable[Hub], tokens: dict[str, str]) -> Iterator[tuple[Shape, Line]]:
-    for hub in hubs:
-        for side in hub.external:
-            token = f'x{tokens[hub.id]}{side[0]}'
-            # Messages come from publishers, but requests and goals from clients.
-            begins = (side == 'providers') == (hub.kind == 'topic')
-            ends = (token, tokens[hub.id]) if begins else (tokens[hub.id], token)
-            shape = Shape(token, hub.id, 'external', 'elsewhere')
+def _ends_elsewhere(
+    channels: Iterable[ChannelBox], tokens: dict[str, str]
+) -> Iterator[tuple[Shape, Line]]:
+    for channel in channels:
+        for side in channel.external:
+            token = f'x{tokens[channel.id]}{side[0]}'
+            ends = (token, tokens[channel.id])
+            if not sends(channel.kind, provides=side == 'providers'):
+                ends = ends[::-1]
+            shape = Shape(token, channel.id, 'external', 'elsewhere')
             yield shape, Line(f'{token}l', '', 'external', *ends)

@@ -1,0 +1,86 @@
+"""The steps in which arguments get their values, and expressions are evaluated with these."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.diagnostics import diagnostic_at
+from composer.language.arguments import (
+    find_declaration_errors,
+    parse_declarations,
+    sample_values,
+)
+from composer.schema.structure import correct_outer_keys, is_sound
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from composer.diagnostics import Diagnostic
+    from composer.language.arguments import ArgumentSpec, GiveValues
+    from composer.language.loaded_system import LoadedSystem
+    from composer.yaml_text.positions import SourceMap
+
+
+def give_arguments(system: LoadedSystem, give_values: GiveValues) -> None:
+    """Read which arguments a file declares, and give each its value.
+
+    Args:
+        give_values: Returns the values of the declared arguments. It is not called if a
+            declaration is wrong, which has to be corrected first: samples are taken then.
+    """
+    written = system.entries.get('args', {})
+    correct_outer_keys(system)
+    system.arguments = parse_declarations(system.entries)
+    findings = list(_check_declarations(system.arguments, system.positions))
+    system.diagnostics += findings
+    is_usable = not findings and is_sound({'args': written})
+    system.given = (give_values if is_usable else sample_values)(system.arguments)
+
+
+def evaluate_expressions(system: LoadedSystem) -> None:
+    """Evaluate the expressions of a file, and repeat or leave out its entries."""
+    data = system.entries
+    if not (_has_expressions(system.positions) or _has_conditions(data)):
+        return
+    # jinja2 takes a tenth of a check's time to import, and most files have no expressions.
+    from composer.expressions.foreach import expand_document
+
+    declarations = {key: data[key] for key in ('args',) if key in data}
+    rest = {key: value for key, value in data.items() if key not in declarations}
+    given, before = system.given, len(system.diagnostics)
+    origins = {name: _origin(name, system) for name in given.values}
+    expanded = expand_document(system, rest, given.values, given.samples, origins)
+    system.data = expanded | declarations
+    if not isinstance(data.get('args', {}), dict):
+        # Nothing is known of the arguments, not even their names.
+        found = system.diagnostics[before:]
+        system.diagnostics[before:] = [each for each in found if each.rule != 'undefined-name']
+
+
+def _origin(name: str, system: LoadedSystem) -> str:
+    place = system.positions.value(('args', name, 'default'))
+    return system.given.origins.get(name) or f'default, {place.place}'
+
+
+def _has_expressions(positions: SourceMap) -> bool:
+    return any('{{' in line for source in positions.sources() for line in source.lines)
+
+
+def _has_conditions(data: Mapping[str, Any]) -> bool:
+    sections = (data.get(section) for section in ('nodes', 'include', 'processes'))
+    return any(
+        isinstance(entry, dict) and ('foreach' in entry or 'when' in entry)
+        for section in sections
+        if isinstance(section, dict)
+        for entry in section.values()
+    )
+
+
+def _check_declarations(
+    declared: Mapping[str, ArgumentSpec], positions: SourceMap
+) -> Iterable[Diagnostic]:
+    for name, argument in declared.items():
+        for key, fault in find_declaration_errors(argument):
+            path = ('args', name, *key)
+            span = positions.value(path) if key else positions.key(path)
+            yield diagnostic_at(span, 'bad-argument-declaration', fault)

@@ -1,0 +1,189 @@
+"""The entities of a node → specs: one parser for each kind of entity."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from composer.language.parsing.entry_parser import (
+    Data,
+    behaviour_at,
+    parse_behaviour,
+    parse_entity_qos,
+    parse_entries,
+)
+from composer.language.specs import (
+    DEFAULT_WARN_AFTER_SEC,
+    ActionClientSpec,
+    ActionSpec,
+    ParameterSpec,
+    PublisherSpec,
+    ServiceClientSpec,
+    ServiceSpec,
+    SubscriptionSpec,
+    TimerSpec,
+)
+from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from composer.language.specs import OnError
+    from composer.yaml_text.positions import DataPath
+
+
+def parse_entities(node: Data, path: DataPath) -> dict[str, Mapping[str, Any]]:
+    """Return the specs of all entities of a node, by section and name."""
+    return {
+        section: parse_entries(node, path, section, partial(parse, node))
+        for section, parse in _PARSERS.items()
+    }
+
+
+class RunOptions(TypedDict):
+    """What all that calls behaviours has: an entity's own value, or its node's."""
+
+    on_error: OnError
+    warn_after_sec: float | None
+
+
+def parse_run_options(data: Data, node: Data) -> RunOptions:
+    """Return how behaviours of an entity, or of its node, are run."""
+    warn_after = data.get('warn_after', node.get('warn_after', DEFAULT_WARN_AFTER_SEC))
+    on_error: OnError = data.get('on_error') or node.get('on_error', 'log')
+    return {
+        'on_error': on_error,
+        'warn_after_sec': None if warn_after is None else float(warn_after),
+    }
+
+
+def _parse_parameter(_: Data, name: str, data: Any, path: DataPath) -> ParameterSpec:
+    declaration = data if isinstance(data, dict) else {'default': data}
+    value = declaration.get('default')
+    type_name = declaration.get('type') or infer_parameter_type(value)
+    choices = declaration.get('choices')
+    return ParameterSpec(
+        name=name,
+        type=type_name,
+        value=convert_parameter_value(value, type_name),
+        description=declaration.get('description', ''),
+        read_only=declaration.get('read_only', False),
+        minimum=declaration.get('minimum'),
+        maximum=declaration.get('maximum'),
+        step=declaration.get('step'),
+        choices=None
+        if choices is None
+        else tuple(convert_parameter_value(choice, type_name) for choice in choices),
+        path=path,
+    )
+
+
+def _parse_publisher(_: Data, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
+    data = _full(data)
+    return PublisherSpec(
+        name=name,
+        type=data['type'],
+        topic=data.get('topic', name),
+        qos=parse_entity_qos(data, path),
+        external=data.get('external', False),
+        path=path,
+    )
+
+
+def _parse_subscription(node: Data, name: str, data: Data, path: DataPath) -> SubscriptionSpec:
+    return SubscriptionSpec(
+        name=name,
+        type=data['type'],
+        topic=data.get('topic', name),
+        qos=parse_entity_qos(data, path),
+        behaviour=parse_behaviour(data, path),
+        publish=data.get('publish'),
+        group=data.get('group'),
+        external=data.get('external', False),
+        path=path,
+        **parse_run_options(data, node),
+    )
+
+
+def _parse_timer(node: Data, name: str, data: Data, path: DataPath) -> TimerSpec:
+    return TimerSpec(
+        name=name,
+        period_sec=float(data['period']) if 'period' in data else 1.0 / data['rate'],
+        behaviour=parse_behaviour(data, path),
+        publish=data.get('publish'),
+        message=data.get('message'),
+        clock=data.get('clock', 'ros'),
+        group=data.get('group'),
+        path=path,
+        **parse_run_options(data, node),
+    )
+
+
+def _parse_service(node: Data, name: str, data: Data, path: DataPath) -> ServiceSpec:
+    return ServiceSpec(
+        name=name,
+        type=data['type'],
+        service=data.get('service', name),
+        qos=parse_entity_qos(data, path, is_service=True),
+        behaviour=behaviour_at(data, path),
+        group=data.get('group'),
+        path=path,
+        **parse_run_options(data, node),
+    )
+
+
+def _parse_service_client(
+    _: Data, name: str, data: str | Data, path: DataPath
+) -> ServiceClientSpec:
+    data = _full(data)
+    return ServiceClientSpec(
+        name=name,
+        type=data['type'],
+        service=data.get('service', name),
+        qos=parse_entity_qos(data, path, is_service=True),
+        external=data.get('external', False),
+        path=path,
+    )
+
+
+def _parse_action(node: Data, name: str, data: Data, path: DataPath) -> ActionSpec:
+    return ActionSpec(
+        name=name,
+        type=data['type'],
+        action=data.get('action', name),
+        behaviour=behaviour_at(data, path),
+        accept=parse_behaviour(data, path, 'accept'),
+        concurrency=data.get('concurrency', 'parallel'),
+        path=path,
+        **parse_run_options(data, node),
+    )
+
+
+def _parse_action_client(_: Data, name: str, data: str | Data, path: DataPath) -> ActionClientSpec:
+    data = _full(data)
+    return ActionClientSpec(
+        name=name,
+        type=data['type'],
+        action=data.get('action', name),
+        feedback=parse_behaviour(data, path, 'feedback'),
+        result=parse_behaviour(data, path, 'result'),
+        external=data.get('external', False),
+        path=path,
+    )
+
+
+def _full(data: str | Data) -> Data:
+    """Return an entity as a mapping, of which the type alone may be written."""
+    return {'type': data} if isinstance(data, str) else data
+
+
+_PARSERS: dict[str, Callable[[Data, str, Any, DataPath], Any]] = {
+    'parameters': _parse_parameter,
+    'publishers': _parse_publisher,
+    'subscriptions': _parse_subscription,
+    'timers': _parse_timer,
+    'services': _parse_service,
+    'service_clients': _parse_service_client,
+    'actions': _parse_action,
+    'action_clients': _parse_action_client,
+}
