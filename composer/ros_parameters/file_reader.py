@@ -170,7 +170,7 @@ class _Reader:
             message = f"ROS reads '{key}' as '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
         if place is None:
-            message = f"'{PARAMETERS_KEY}' must be below the name of a node"
+            message = f"'{PARAMETERS_KEY}' belongs below the name of a node"
             self._fault(key_node.span, message, _SHAPE_HELP)
         elif fault := find_pattern_fault(pattern):
             self._fault(place, f"'{pattern}': {fault}")
@@ -249,14 +249,16 @@ class _Reader:
                 'remove it',
             )
         elif key.startswith(PARAMETERS_KEY):
-            message = f"'{PARAMETERS_KEY}' is inside of another '{PARAMETERS_KEY}'"
-            self._fault(key_node.span, message, 'the names of nodes go above it')
+            message = f"'{PARAMETERS_KEY}' is inside another '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, 'put it below the name of a node')
 
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
         what = (
-            'and this one is empty' if isinstance(node, ScalarNode) else 'not a list or a mapping'
+            'this one is empty'
+            if isinstance(node, ScalarNode)
+            else 'this one is a list or a mapping'
         )
         self._fault(node.span, f'a key must be a string, {what}')
         return None
@@ -267,7 +269,7 @@ class _Reader:
             self._fault(node.span, message, advice)
             return
         help_text = _help_for(node) or _SHAPE_HELP
-        self._fault(node.span, f"there is no '{PARAMETERS_KEY}' above this value", help_text)
+        self._fault(node.span, f"this value has no '{PARAMETERS_KEY}' above it", help_text)
 
     def _fault(self, span: Span, message: str, help_text: str | None = None) -> None:
         self.faults.append(diagnostic_at(span, RULE, message, help=help_text))

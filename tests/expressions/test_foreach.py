@@ -92,7 +92,7 @@ nodes:
         ('[1, 2]', 'bad-foreach', "foreach must be a mapping, as in 'foreach: {i: [1, 2]}'"),
         ('{}', 'bad-foreach', 'foreach has no variables'),
         ('{i: 3}', 'bad-foreach', "'i' takes a list of values, not 3"),
-        ('{in: [3]}', 'bad-foreach', "'in' is not a valid name in expressions"),
+        ('{in: [3]}', 'bad-foreach', "'in' cannot be used as a name in expressions"),
         ('{i: "{{ nope }}"}', 'undefined-name', "'nope' is not defined"),
     ],
 )

@@ -177,7 +177,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
         (
             '{subscriptions: {a: {type: a/msg/B, publish: b, with: {c: 1}}}}',
-            ('missing-key', "'with' needs 'behaviour' beside it", None),
+            ('missing-key', "'with' needs 'behaviour', too", None),
         ),
         (
             '{timers: {a: {behaviour: b:c}}}',
