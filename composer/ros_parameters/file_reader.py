@@ -255,11 +255,8 @@ class _Reader:
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
-        what = (
-            'this one is empty'
-            if isinstance(node, ScalarNode)
-            else 'this one is a list or a mapping'
-        )
+        is_empty = isinstance(node, ScalarNode)
+        what = 'and this one is empty' if is_empty else 'not a list or a mapping'
         self._fault(node.span, f'a key must be a string, {what}')
         return None
 

@@ -185,7 +185,7 @@ def test_nothing_is_in_scope_that_is_not_promised(name):
         ('name.upper', 'the expression returns a '),
         ('range(3)|pprint', "there is no filter 'pprint'"),
         ('1 is odder', "there is no test 'odder'"),
-        ('{1: 2}', 'the expression gives a dict, which YAML cannot represent'),
+        ('{1: 2}', 'the expression returns a dict, which YAML cannot represent'),
         ('9 ** 99999', "the result of '**' is too large"),
         ("'a' * 10 ** 12", "the result of '*' is too large"),
         ('1' * 400, 'a number of 1326 bits does not fit any ROS type'),

@@ -93,10 +93,10 @@ FAULTS = {
     'a: 1': ("1:4 this value has no 'ros__parameters' above it"),
     '- a': ("1:1 this value has no 'ros__parameters' above it"),
     'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is not a key of parameter files",
-    'a:\n  ros__parameterss: {b: 1}': "2:3 'ros__parameterss' is taken as 'ros__parameters'",
+    'a:\n  ros__parameterss: {b: 1}': "2:3 ROS reads 'ros__parameterss' as 'ros__parameters'",
     'ros__parameters: {b: 1}': "1:1 'ros__parameters' belongs below the name of a node",
-    'a: {ros__parameters: 5}': "1:22 'ros__parameters' is a mapping of parameters",
-    'a: {ros__parameters: }': "1:22 'ros__parameters' is a mapping of parameters",
+    'a: {ros__parameters: 5}': "1:22 'ros__parameters' must be a mapping of parameters",
+    'a: {ros__parameters: }': "1:22 'ros__parameters' must be a mapping of parameters",
     'a: {ros__parameters: {b: }}': "1:26 'b' has no value",
     'a: {ros__parameters: {b: [1, ~]}}': (
         '1:30 all items of a list have one type: this is a string, the first is an integer'
@@ -129,8 +129,8 @@ FAULTS = {
         "1:1 '/ar*': a node name has only letters, digits and underscores; "
         "'*' and '**' must be alone between slashes"
     ),
-    'a: {ros__parameters: {"": 1}}': '1:23 a key is a text, and this one is empty',
-    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key is a text, and this one is a list or a mapping',
+    'a: {ros__parameters: {"": 1}}': '1:23 a key must be a string, and this one is empty',
+    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key must be a string, not a list or a mapping',
 }
 
 

@@ -195,7 +195,7 @@ def test_a_duplicate_key_shows_both_places():
         '  3 |   "rover": {}\n'
         '    |   ^^^^^^^\n'
         '  file.yaml:2:3: first used here\n'
-        '  help: keep one; the first is in line 2'
+        '  help: keep one; the first is on line 2'
     ]
 
 
@@ -341,7 +341,7 @@ def test_yaml_is_read_by_the_core_schema():
 @pytest.mark.parametrize(
     ('text', 'line'),
     [
-        ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not one of YAML's core schema"),
+        ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not part of YAML's core schema"),
         ('a: !!int x', "1:4: error[bad-scalar]: 'x' is not a !!int"),
         ('a: !!set {b}', '1:4: error[bad-tag]: a !!set is not allowed here'),
         (
@@ -349,10 +349,10 @@ def test_yaml_is_read_by_the_core_schema():
             '1:4: error[bad-tag]: a !!python/object/apply:os.system is not allowed here',
         ),
         ('a: !!map [b]', '1:4: error[bad-tag]: a !!map is not allowed here'),
-        ('1: a', '1:1: error[bad-key]: a key is a string, and 1 is not one'),
-        ('null: a', '1:1: error[bad-key]: a key is a string, and null is not one'),
+        ('1: a', '1:1: error[bad-key]: a key must be a string, and 1 is not'),
+        ('null: a', '1:1: error[bad-key]: a key must be a string, and null is not'),
         ('?\n: a', '1:2: error[bad-key]: a key is a string, and this one is empty'),
-        ('[a]: b', '1:1: error[bad-key]: a key is a string, not a list or a mapping'),
+        ('[a]: b', '1:1: error[bad-key]: a key must be a string, not a list or a mapping'),
     ],
 )
 def test_tags_and_keys_are_those_of_plain_data(text, line):
