@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def add(node: Node, request: AddTwoInts.Request) -> int:
-    """Answer with the sum of both numbers."""
+    """Return the sum of both numbers."""
     total: int = request.a + request.b
     node.logger.info(f'Incoming request\na: {request.a} b: {request.b}')
     node.logger.info(f'Sending back response: [{total}]')
@@ -21,7 +21,7 @@ def add(node: Node, request: AddTwoInts.Request) -> int:
 
 
 def ask(node: Node, a: int, b: int) -> None:
-    """Wait for the service, ask for one sum, and end the system."""
+    """Wait for the service, request one sum, and shut the system down."""
     while True:
         try:
             response = node.call('add_two_ints', {'a': a, 'b': b}, timeout=1.0)

@@ -1,4 +1,4 @@
-"""A service whose parameter decides what it computes, and its client."""
+"""A service that adds or subtracts, as a parameter says, and its client."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def calculate(node: Node, request: AddTwoInts.Request) -> int:
-    """Add or subtract, as the parameter `operation` says now."""
+    """Add or subtract, depending on the parameter `operation`."""
     subtracts = node.parameters.operation == 'subtract'
     result: int = request.a - request.b if subtracts else request.a + request.b
     sign = '-' if subtracts else '+'
@@ -20,7 +20,7 @@ def calculate(node: Node, request: AddTwoInts.Request) -> int:
 
 
 def ask(node: Node, a: int, b: int, operation: str) -> None:
-    """Set the operation if there is one, ask for one result, and end the system."""
+    """Set the operation if one is given, request one result, and shut the system down."""
     if operation:
         node.set_parameters('calculator_server', {'operation': operation})
     response = node.call('calculate', {'a': a, 'b': b})

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def compute(
     node: Node, goal: Fibonacci.Goal, period: float = 1.0
 ) -> Generator[list[int], None, list[int]]:
-    """Compute the sequence step by step.
+    """Compute the sequence, with each step as feedback.
 
     Args:
         period: Seconds between two steps.
@@ -34,7 +34,7 @@ def compute(
 
 
 def send(node: Node, order: int) -> None:
-    """Send one goal, and say whether it was accepted."""
+    """Send one goal, and log whether it was accepted."""
     try:
         node.send_goal('fibonacci', {'order': order}, timeout=None)
     except GoalRejectedError:
@@ -45,11 +45,11 @@ def send(node: Node, order: int) -> None:
 
 
 def show_feedback(node: Node, feedback: Fibonacci.Feedback) -> None:
-    """Say how far the sequence is."""
+    """Log the sequence so far."""
     node.logger.info(f'Received feedback: {list(feedback.partial_sequence)}')
 
 
 def show_result(node: Node, result: Fibonacci.Result) -> None:
-    """Say what the sequence is, and end the system."""
+    """Log the sequence, and shut the system down."""
     node.logger.info(f'Result: {list(result.sequence)}')
     node.shutdown()

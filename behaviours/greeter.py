@@ -1,4 +1,4 @@
-"""One node says a name, the other greets it."""
+"""One node publishes a name, the other greets it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def say_name(node: Node) -> str:
-    """Return the node's parameter `name`."""
+    """Return the parameter `name` of the node."""
     return str(node.parameters.name)
 
 
 def reply(node: Node, message: String) -> None:
-    """Greet whoever was named."""
+    """Greet the name that was received."""
     node.logger.info(f'Hello {message.data}! This is the greeter bot.')

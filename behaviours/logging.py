@@ -1,4 +1,4 @@
-"""One line at each level of ROS's loggers."""
+"""Log one line at each level."""
 
 from __future__ import annotations
 

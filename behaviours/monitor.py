@@ -1,4 +1,4 @@
-"""Watches how often a topic is heard: `count` on a subscription, `watch` or `diagnose` on a timer.
+"""Monitor rate and age of a topic: `count` on a subscription, `watch` or `diagnose` on a timer.
 
 ```yaml
 nodes:
@@ -35,24 +35,24 @@ _OK, _WARN = b'\x00', b'\x01'
 
 
 @dataclass(slots=True)
-class _Heard:
-    """What has been heard of a topic: how many messages, and when the last one came."""
+class _Counter:
+    """The number of messages on a topic, and when the last one came."""
 
     messages: int
     last_ns: int
 
 
 @dataclass(frozen=True, slots=True)
-class _Verdict:
-    """How a topic fared between two ticks; `fault` is empty if it fared well."""
+class _TopicHealth:
+    """The health of a topic between two ticks; `problem` is empty if it is healthy."""
 
     rate: float
     age_sec: float
-    fault: str
+    problem: str
 
 
 def count(node: Node, _message: Any, topic: str) -> None:
-    """Note that a message has been heard; `topic` is what the watch calls it.
+    """Count a message of `topic`, for `watch` or `diagnose` with the same `topic`.
 
     ```yaml
     subscriptions:
@@ -62,15 +62,15 @@ def count(node: Node, _message: Any, topic: str) -> None:
         with: {topic: scan}
     ```
     """
-    heard = _heard(node, topic)
-    heard.messages += 1
-    heard.last_ns = node.now().nanoseconds
+    counter = _counter(node, topic)
+    counter.messages += 1
+    counter.last_ns = node.now().nanoseconds
 
 
 def watch(
     node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
 ) -> Iterator[bool | None]:
-    """Say at each tick whether a topic is well, and log when that changes.
+    """Yield at each tick whether a topic is healthy, and log when that changes.
 
     ```yaml
     timers:
@@ -82,17 +82,17 @@ def watch(
     ```
 
     Args:
-        minimum_rate: The fewest messages a second, between two ticks.
-        maximum_age: The most seconds since the last message.
+        minimum_rate: The lowest healthy rate between two ticks, in Hz.
+        maximum_age: The highest healthy age of the last message, in seconds.
     """
-    for verdict in _judge(node, topic, minimum_rate, maximum_age):
-        yield None if verdict is None else not verdict.fault
+    for health in _monitor(node, topic, minimum_rate, maximum_age):
+        yield None if health is None else not health.problem
 
 
 def diagnose(
     node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
 ) -> Iterator[dict[str, Any] | None]:
-    """Do what `watch` does, and say it as diagnostics.
+    """Yield the health of a topic as diagnostics; otherwise as `watch`.
 
     ```yaml
     publishers:
@@ -105,52 +105,54 @@ def diagnose(
         publish: diagnostics
     ```
     """
-    for verdict in _judge(node, topic, minimum_rate, maximum_age):
-        yield None if verdict is None else _as_diagnostics(node, topic, verdict)
+    for health in _monitor(node, topic, minimum_rate, maximum_age):
+        yield None if health is None else _as_diagnostics(node, topic, health)
 
 
-def _as_diagnostics(node: Node, topic: str, verdict: _Verdict) -> dict[str, Any]:
-    values = {'rate (Hz)': verdict.rate, 'age (s)': verdict.age_sec}
+def _as_diagnostics(node: Node, topic: str, health: _TopicHealth) -> dict[str, Any]:
+    values = {'rate (Hz)': health.rate, 'age (s)': health.age_sec}
     status = {
-        'level': _WARN if verdict.fault else _OK,
+        'level': _WARN if health.problem else _OK,
         'name': f'{node.ros.get_fully_qualified_name()}: {topic}',
-        'message': verdict.fault or 'OK',
+        'message': health.problem or 'OK',
         'values': [{'key': key, 'value': f'{value:.3g}'} for key, value in values.items()],
     }
     return {'header': {'stamp': node.now()}, 'status': [status]}
 
 
-def _judge(
+def _monitor(
     node: Node, topic: str, minimum_rate: float, maximum_age: float
-) -> Iterator[_Verdict | None]:
-    """Yield how a topic fared since the tick before; the first tick begins the watch."""
-    heard = _heard(node, topic)
-    verdict: _Verdict | None = None
+) -> Iterator[_TopicHealth | None]:
+    """Yield the health of a topic since the last tick; `None` at the first tick."""
+    counter = _counter(node, topic)
+    health: _TopicHealth | None = None
     while True:
-        begun_ns, begun_with = node.now().nanoseconds, heard.messages
-        yield verdict
+        start_ns, start_count = node.now().nanoseconds, counter.messages
+        yield health
         now_ns = node.now().nanoseconds
-        # Simulated time may stand still, or begin again.
-        passed_sec = max(now_ns - begun_ns, 1) / 1e9
-        rate = (heard.messages - begun_with) / passed_sec
-        age_sec = max(now_ns - heard.last_ns, 0) / 1e9
-        before = verdict.fault if verdict else ''
-        verdict = _Verdict(rate, age_sec, _find_fault(rate, age_sec, minimum_rate, maximum_age))
-        if verdict.fault and not before:
-            node.logger.warning(f'{topic}: {verdict.fault}')
-        elif before and not verdict.fault:
-            node.logger.info(f'{topic}: well again, {rate:.3g} messages a second')
+        # Simulated time may stand still or jump back.
+        passed_sec = max(now_ns - start_ns, 1) / 1e9
+        rate = (counter.messages - start_count) / passed_sec
+        age_sec = max(now_ns - counter.last_ns, 0) / 1e9
+        before = health.problem if health else ''
+        health = _TopicHealth(
+            rate, age_sec, _find_problem(rate, age_sec, minimum_rate, maximum_age)
+        )
+        if health.problem and not before:
+            node.logger.warning(f'{topic}: {health.problem}')
+        elif before and not health.problem:
+            node.logger.info(f'{topic}: healthy again, {rate:.3g} messages/s')
 
 
-def _find_fault(rate: float, age_sec: float, minimum_rate: float, maximum_age: float) -> str:
+def _find_problem(rate: float, age_sec: float, minimum_rate: float, maximum_age: float) -> str:
     if age_sec > maximum_age:
-        return f'nothing heard for {age_sec:.3g} s, {maximum_age:g} s are allowed'
+        return f'no message for {age_sec:.3g} s, at most {maximum_age:g} s expected'
     if rate < minimum_rate:
-        return f'{rate:.3g} messages a second, {minimum_rate:g} are expected'
+        return f'{rate:.3g} messages/s, at least {minimum_rate:g} expected'
     return ''
 
 
-def _heard(node: Node, topic: str) -> _Heard:
-    """Return what the behaviours of a node share about a topic; ages count from its first use."""
-    heard: dict[str, _Heard] = vars(node.state).setdefault('heard_by_monitor', {})
-    return heard.setdefault(topic, _Heard(0, node.now().nanoseconds))
+def _counter(node: Node, topic: str) -> _Counter:
+    """Return the counter of a topic, shared by the behaviours of a node."""
+    counters: dict[str, _Counter] = vars(node.state).setdefault('monitor_counters', {})
+    return counters.setdefault(topic, _Counter(0, node.now().nanoseconds))

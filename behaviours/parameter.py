@@ -9,5 +9,5 @@ if TYPE_CHECKING:
 
 
 def greet(node: Node) -> None:
-    """Greet whom the parameter names now."""
+    """Greet the current value of the parameter."""
     node.logger.info(f'Hello {node.parameters.my_parameter}!')

@@ -1,4 +1,4 @@
-"""A client that takes the answer of a service for the goal of an action."""
+"""A client that uses the response of a service as the goal of an action."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def ask(node: Node) -> Generator[None, None, None]:
-    """Ask for 2 + 3, compute that many steps of the Fibonacci sequence, and end the system."""
+    """Request 2 + 3, compute that many steps of the Fibonacci sequence, and shut down."""
     total = node.call('add_two_ints', {'a': 2, 'b': 3}).sum
     node.logger.info(f'2 + 3 = {total}')
     yield

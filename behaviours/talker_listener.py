@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def talk(node: Node) -> str:
-    """Return the next greeting to the world; they are counted from 0."""
+    """Return the next greeting, numbered from 0."""
     text = f'Hello World: {node.state.count}'
     node.state.count += 1
     node.logger.info(f'Publishing: "{text}"')
@@ -19,5 +19,5 @@ def talk(node: Node) -> str:
 
 
 def listen(node: Node, message: String) -> None:
-    """Log what was heard."""
+    """Log the message."""
     node.logger.info(f'I heard: "{message.data}"')

@@ -1,7 +1,7 @@
-"""What stands between two topics: relay, throttle, drop, mux and transform, for any message type.
+"""Relay, throttle, drop, mux and transform messages of any type from topic to topic.
 
-Bind them to subscriptions that `publish:`. They do what ROS's `topic_tools` do, in the process of
-the nodes around them.
+Bind them to subscriptions with `publish:`. They do what `topic_tools` of ROS do, but within the
+process of the other nodes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 class TransformError(ComposerError):
-    """An expression of `transform` has no value for a message."""
+    """An expression of `transform` cannot be evaluated for a message."""
 
 
 def relay(_node: Node, message: Any) -> Any:
-    """Pass every message on, as a subscription with `publish:` and no behaviour does by itself.
+    """Pass every message on, as a subscription with `publish:` and no behaviour does.
 
     ```yaml
     subscriptions:
@@ -37,7 +37,7 @@ def relay(_node: Node, message: Any) -> Any:
 
 
 def throttle(node: Node, message: Any, rate: float) -> Any | None:
-    """Pass on at most `rate` messages a second of the node's clock.
+    """Pass on at most `rate` messages a second, by the clock of the node.
 
     ```yaml
     subscriptions:
@@ -51,10 +51,10 @@ def throttle(node: Node, message: Any, rate: float) -> Any | None:
     period_ns = 1e9 / rate
     now_ns = node.now().nanoseconds
     due_ns = node.own_state.get('due_ns', now_ns)
-    # Simulated time may begin again.
+    # Simulated time may jump back.
     if now_ns < due_ns <= now_ns + period_ns:
         return None
-    # Counted from when it was due, or 10 messages a second would make 2.5 of `rate: 3`.
+    # Count from when it was due: otherwise 10 messages a second become 2.5 with `rate: 3`.
     is_late = not due_ns <= now_ns < due_ns + period_ns
     node.own_state['due_ns'] = (now_ns if is_late else due_ns) + period_ns
     return message
@@ -79,9 +79,9 @@ def drop(node: Node, message: Any, count: int, of: int) -> Any | None:
 
 
 def mux(node: Node, message: Any, source: str) -> Any | None:
-    """Pass messages on while the node's parameter `selected` names their source.
+    """Pass messages on while the parameter `selected` of the node is their source.
 
-    `ros2 param set` selects another one while they run.
+    `ros2 param set` selects another source while the system runs.
 
     ```yaml
     parameters:
@@ -105,11 +105,11 @@ def mux(node: Node, message: Any, source: str) -> Any | None:
 
 
 def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, Any]:
-    """Make a message of another type, each field of it from an expression.
+    """Make a message of another type, with an expression for each field.
 
-    The expressions are those of the language, without its braces: in scope are the fields of the
-    message that is heard, and the message itself as `message`. Fields that are not named keep
-    their defaults. `composer check` reads them, too.
+    Expressions are written without braces. They can use the fields of the received message, and
+    the message itself as `message`. Fields without an expression keep their defaults.
+    `composer check` checks the expressions, too.
 
     ```yaml
     subscriptions:
@@ -124,10 +124,10 @@ def transform(node: Node, message: Any, fields: Mapping[str, str]) -> dict[str, 
     ```
 
     Raises:
-        TransformError: An expression is none, or has no value.
+        TransformError: An expression cannot be evaluated.
     """
     sandbox = node.own_state.setdefault('sandbox', Sandbox())
-    # What may be done is bounded for each message.
+    # The limits on time and memory apply to each message.
     sandbox.budget = Budget()
     scope = {name: getattr(message, name) for name in message.get_fields_and_field_types()}
     payload: dict[str, Any] = {}
@@ -144,9 +144,9 @@ def _evaluate(sandbox: Sandbox, expression: str, scope: Mapping[str, Any], path:
     try:
         value = evaluate_expression(sandbox, str(expression), scope)
         if isinstance(value, StrictUndefined):
-            # Any use of it says which name there is not.
+            # Using it raises an error with the unknown name.
             str(value)
     except Exception as error:
-        message = f"'{path}' has no value by '{expression}': {error}"
-        raise TransformError(message, help=f'in scope are {", ".join(scope)}') from error
+        message = f"cannot evaluate '{expression}' for '{path}': {error}"
+        raise TransformError(message, help=f'expressions can use {", ".join(scope)}') from error
     return value

@@ -1,4 +1,4 @@
-"""Generate `docs/reference.md` from the schema and `docs/rules.md` from the table of rules.
+"""Generate `docs/reference.md` from the schema and `docs/rules.md` from the rules.
 
 Run by `make docs`; a test checks that both files are current.
 """

@@ -134,14 +134,14 @@ NAMES = ['scan', '/scan', '/fleet/scan', '~/scan', 'a/scan', '~', '{node}/scan']
 @pytest.mark.ros
 @pytest.mark.parametrize('namespace', ['/', '/fleet'])
 @pytest.mark.parametrize('rules', RULES, ids=str)
-def test_names_are_remapped_as_rclpy_has_it(rules, namespace, ros_context):
+def test_names_are_remapped_as_rclpy_has_it(rules, namespace, context):
     import rclpy
 
     arguments = [part for old, new in rules for part in ('-r', f'{old}:={new}')]
     node = rclpy.create_node(
         NODE,
         namespace=namespace,
-        context=ros_context,
+        context=context,
         cli_args=['--ros-args', *arguments],
         use_global_arguments=False,
         start_parameter_services=False,
@@ -156,17 +156,6 @@ def test_names_are_remapped_as_rclpy_has_it(rules, namespace, ros_context):
                 assert remap_name(full, rules, NODE, namespace, scheme) == resolve(name)
     finally:
         node.destroy_node()
-
-
-@pytest.fixture
-def ros_context(domain_id):
-    import rclpy
-
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain_id)
-    yield context
-    context.try_shutdown()
-    context.destroy()
 
 
 @pytest.mark.parametrize(

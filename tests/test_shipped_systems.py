@@ -276,9 +276,9 @@ def test_the_monitor_warns_of_silence_and_tells_when_it_is_over(up, peer, wait_f
             if status.name == '/monitor: odometry'
         }
 
-    child.wait_for_line('[WARN] [monitor]: scan: 0 messages a second, 5 are expected')
-    child.wait_for_line('[WARN] [monitor]: odometry: nothing heard for ')
-    wait_for(lambda: (b'\x01', 'nothing heard') in told(), 'a warning among the diagnostics')
+    child.wait_for_line('[WARN] [monitor]: scan: 0 messages/s, at least 5 expected')
+    child.wait_for_line('[WARN] [monitor]: odometry: no message for ')
+    wait_for(lambda: (b'\x01', 'no message') in told(), 'a warning among the diagnostics')
     wait_for(lambda: verdicts, 'a verdict')
     assert {verdict.data for verdict in verdicts} == {False}
 
@@ -290,5 +290,5 @@ def test_the_monitor_warns_of_silence_and_tells_when_it_is_over(up, peer, wait_f
         return verdicts[-1].data and (b'\x00', 'OK') in told()
 
     publish_until(odometry, Odometry(), is_well, 'both topics to be well')
-    child.wait_for_line('[INFO] [monitor]: scan: well again, ')
+    child.wait_for_line('[INFO] [monitor]: scan: healthy again, ')
     assert child.stop() == 0

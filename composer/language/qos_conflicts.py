@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 PolicyValue: TypeAlias = str | float
 
 # The pairs of an offered and a requested value that never match, by policy.
-_CONFLICTS = {
+CONFLICTS = {
     'reliability': {('best_effort', 'reliable')},
     'durability': {('volatile', 'transient_local')},
     'liveliness': {('automatic', 'manual_by_topic'), ('system_default', 'manual_by_topic')},
 }
 # The offered duration must not be longer than the requested one.
-_DURATIONS = ('deadline', 'liveliness_lease_duration')
+MATCHED_DURATIONS = ('deadline', 'liveliness_lease_duration')
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +74,10 @@ def find_qos_conflicts(
         offered: The policies of the publisher, as `resolve_qos` returns them.
         requested: Those of the subscription.
     """
-    for policy, pairs in _CONFLICTS.items():
+    for policy, pairs in CONFLICTS.items():
         if (offered[policy], requested[policy]) in pairs:
             yield QosConflict(policy, offered[policy], requested[policy])
-    for policy in _DURATIONS:
+    for policy in MATCHED_DURATIONS:
         pair = offered.get(policy, INFINITE), requested.get(policy, INFINITE)
         if 'best_available' not in pair and _nanoseconds(pair[0]) > _nanoseconds(pair[1]):
             yield QosConflict(policy, *map(_without_zero, pair))

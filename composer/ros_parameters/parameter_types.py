@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from composer.names import with_article
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -73,7 +75,7 @@ def _find_item_fault(item: Any, item_type: str) -> str | None:
 
 def _find_scalar_fault(value: Any, type_name: str) -> str | None:
     if _SCALARS.get(type(convert_parameter_value(value, type_name))) != type_name:
-        return f'expected {_with_article(type_name)}, got {value!r}'
+        return f'expected {with_article(type_name)}, got {value!r}'
     return _find_width_fault(value, type_name)
 
 
@@ -81,7 +83,3 @@ def _find_width_fault(value: Any, type_name: str) -> str | None:
     if type_name == 'integer' and not INT64_MIN <= value <= INT64_MAX:
         return f'{value} does not fit 64 bits'
     return None
-
-
-def _with_article(type_name: str) -> str:
-    return f'an {type_name}' if type_name[0] in 'aeiou' else f'a {type_name}'

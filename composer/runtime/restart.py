@@ -114,7 +114,7 @@ class NodeRestarter:
             return False
         if not has_ended:
             executor.wake()
-            hanging = ', '.join(call.owner for call in node.running.calls())
+            hanging = ', '.join(str(call.owner) for call in node.running.calls())
             system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
             return False
         executor.remove_node(node.ros)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.errors import StartError
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
@@ -59,7 +60,7 @@ class NodeStarter:
             return
         failures: list[BaseException] = []
         function = node.bind(hook, own_state=False)
-        call = node.reported_call('on_start', hook.path, function, failures.append)
+        call = node.reported_call(Owner('on_start'), hook.path, function, failures.append)
         _, ended = node.begin(call)
         while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
             pass

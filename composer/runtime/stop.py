@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
 
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -137,7 +138,9 @@ def _end(node: LiveNode, timeout_sec: float) -> None:
     if hook is None or not node.has_begun:
         return
     function = node.bind(hook, own_state=False)
-    node.run_to_end(node.reported_call('on_stop', hook.path, function), timeout_sec=timeout_sec)
+    node.run_to_end(
+        node.reported_call(Owner('on_stop'), hook.path, function), timeout_sec=timeout_sec
+    )
 
 
 def _wait_until_idle(node: LiveNode, deadline: float) -> bool:

@@ -1,7 +1,7 @@
-"""A driver as others write it, in plain rclpy: it publishes a range, nearer and farther in turn.
+"""A driver in plain rclpy that publishes a range, which grows and shrinks in turn.
 
 Parameters:
-    rate: How many measurements a second it makes.
+    rate: Measurements a second.
 """
 
 import math
@@ -18,7 +18,7 @@ class RangeSensor(Node):
     """Publishes `range`."""
 
     def __init__(self) -> None:
-        """Begin to measure."""
+        """Start measuring."""
         super().__init__('range_sensor')
         rate = self.declare_parameter('rate', 10.0).value
         self._publisher = self.create_publisher(Range, 'range', qos_profile_sensor_data)

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CALCULATOR_ARGUMENTS = """the file declares
     a (integer, required): The first number.
     b (integer, required): The second number.
-    operation (string, one of '', add, subtract, default ''): What the server shall do; nothing leaves it as it is.
+    operation (string, one of '', add, subtract, default ''): What the server does; empty for no change.
 """
 
 

@@ -76,16 +76,8 @@ def test_dot(draw):
     assert 'class="topic warning"' in lines[5]
 
 
-def test_clients_and_servers_elsewhere_stand_on_their_side(draw):
-    text = """
-        version: 1
-        nodes:
-          a:
-            publishers: {x: {type: std_msgs/msg/String, external: true}}
-            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
-            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
-    """
-    lines = render_picture(draw(text), 'mermaid').splitlines()
+def test_clients_and_servers_elsewhere_stand_on_their_side(external_ends):
+    lines = render_picture(external_ends, 'mermaid').splitlines()
     assert [line.strip() for line in lines if '-.->' in line] == [
         'c0 -.-> xc0u',
         'xc1p -.-> c1',

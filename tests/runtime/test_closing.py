@@ -59,42 +59,61 @@ def hold_interpreter(node):
 """
 
 
-def system(behaviour, *, fails=False, timeout=30.0):
+def system(*behaviours, fails=False, timeout=30.0):
+    """Return a system with a node for each behaviour of a timer, with its name."""
     failing = "fail: {period: 0.3, behaviour: 'parts:fail', on_error: restart}" if fails else ''
-    return f"""
-        version: 1
-        executor: {{shutdown_timeout: {timeout}}}
-        nodes:
-          walker:
+    nodes = '\n'.join(
+        f"""
+          {behaviour}:
             on_stop: parts:stop
             timers:
               walk: {{period: 0.02, behaviour: 'parts:{behaviour}'}}
               {failing}
+"""
+        for behaviour in behaviours
+    )
+    return f"""
+        version: 1
+        executor: {{shutdown_timeout: {timeout}}}
+        nodes:
+{nodes}
     """
 
 
-@pytest.mark.parametrize('behaviour', ['walk', 'walk_async'])
-def test_generators_of_timers_are_closed_before_on_stop(compose, behaviour):
-    child = compose(system(behaviour), CODE)
-    child.wait_for_line('walking', times=2)
-    assert child.stop() == 0
-
-    assert child.lines[-2:] == ['[INFO] [walker]: closed', '[INFO] [walker]: stop']
-    assert len(child.matching('closed')) == 1
+WALKERS = ('walk', 'walk_async')
 
 
-@pytest.mark.parametrize('behaviour', ['walk', 'walk_async'])
-def test_generators_of_timers_are_closed_before_a_restart(compose, behaviour):
-    child = compose(system(behaviour, fails=True), CODE)
-    child.wait_for_line("node 'walker' was restarted", times=2)
-    closed = [
+def told_by(child, node):
+    return [
         line.rpartition(': ')[2]
-        for line in child.matching('[walker]: ')
+        for line in child.matching(f'[{node}]: ')
         if 'walking' not in line and 'timer' not in line
     ]
+
+
+def test_generators_of_timers_are_closed_before_on_stop(compose):
+    child = compose(system(*WALKERS), CODE)
+    for node in WALKERS:
+        child.wait_for_line(f'[{node}]: walking', times=2)
+    assert child.stop() == 0
+
+    for node in WALKERS:
+        assert told_by(child, node) == ['closed', 'stop']
+        assert child.matching(f'[{node}]: ')[-2:] == [
+            f'[INFO] [{node}]: closed',
+            f'[INFO] [{node}]: stop',
+        ]
+
+
+def test_generators_of_timers_are_closed_before_a_restart(compose):
+    child = compose(system(*WALKERS, fails=True), CODE)
+    for node in WALKERS:
+        child.wait_for_line(f"node '{node}' was restarted", times=2)
+    closed = {node: told_by(child, node) for node in WALKERS}
     child.stop()
 
-    assert closed[:4] == ['closed', 'stop', 'closed', 'stop']
+    for node in WALKERS:
+        assert closed[node][:4] == ['closed', 'stop', 'closed', 'stop']
 
 
 def test_a_generator_that_does_not_let_itself_be_closed_is_an_error(compose):
@@ -102,27 +121,25 @@ def test_a_generator_that_does_not_let_itself_be_closed_is_an_error(compose):
     child.wait_for_line('walking')
     assert child.stop() == 0
 
-    assert child.matching("timer 'walk' (system.yaml:8) raised RuntimeError: generator ignored")
-    assert child.lines[-1] == '[INFO] [walker]: stop'
+    assert child.matching("timer 'walk' (system.yaml:9) raised RuntimeError: generator ignored")
+    assert child.lines[-1] == '[INFO] [stubborn]: stop'
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'said', 'statement'),
-    [('slow_end', 'walking', 'time.sleep(1000)'), ('spin', 'spinning', 'in spin')],
-)
-def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose, behaviour, said, statement):
-    child = compose(system(behaviour, timeout=2.0), CODE)
-    child.wait_for_line(said)
+def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose):
+    child = compose(system('slow_end', 'spin', timeout=2.0), CODE)
+    child.wait_for_line('walking')
+    child.wait_for_line('spinning')
 
     assert child.stop() == 1
-    child.wait_for_line("node 'walker': timer 'walk' did not end in time; it is at")
-    assert child.matching(statement)
+    for node, statement in (('slow_end', 'time.sleep(1000)'), ('spin', 'in spin')):
+        child.wait_for_line(f"node '{node}': timer 'walk' did not end in time; it is at")
+        assert child.matching(statement)
 
 
 def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_alive(compose):
     text = """
         version: 1
-        executor: {shutdown_timeout: 2.0}
+        executor: {shutdown_timeout: 0.1}
         nodes: {stuck: {on_stop: 'parts:hold_interpreter'}}
     """
     child = compose(text, CODE)

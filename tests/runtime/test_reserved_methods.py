@@ -68,89 +68,89 @@ def hear(node, message):
     pass
 """
 
-SYSTEM = """
-version: 1
-nodes:
-  bad:
+GOOD = """
+  good:
+    timers: {live: {period: 0.02, behaviour: 'parts:live'}}
+    on_stop: parts:live
+"""
+
+
+def bad(name, behaviour):
+    return f"""
+  {name}:
     publishers: {{words: std_msgs/msg/String}}
     subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: 'parts:hear'}}}}
     service_clients: {{ask: std_srvs/srv/Trigger}}
     timers: {{fail: {{period: 0.05, behaviour: 'parts:{behaviour}'}}}}
     on_stop: parts:live
-  good:
-    timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}
-    on_stop: parts:live
 """
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'error'),
-    [
-        (
-            'destroy_node',
-            'the node belongs to the system, so a behaviour cannot call destroy_node()',
-        ),
-        (
-            'destroy_node_async',
-            'the node belongs to the system, so a behaviour cannot call destroy_node()',
-        ),
-        (
-            'shutdown_context',
-            'the context belongs to the system, so a behaviour cannot call shutdown()',
-        ),
-        (
-            'shutdown_by_name',
-            'the context belongs to the system, so a behaviour cannot call shutdown()',
-        ),
-        (
-            'try_shutdown_context',
-            'the context belongs to the system, so a behaviour cannot call try_shutdown()',
-        ),
-        (
-            'shutdown_executor',
-            'the executor belongs to the system, so a behaviour cannot call shutdown()',
-        ),
-    ],
-)
-def test_a_behaviour_cannot_end_what_belongs_to_the_system(compose, behaviour, error):
-    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
-    child.wait_for_line(
-        f"[ERROR] [bad]: timer 'fail' (system.yaml:8) raised ReservedMethodError: {error}"
-    )
-    child.wait_for_line('help: to end the system call node.shutdown()')
+def system(*behaviours):
+    """Return a system with a node for each behaviour, with its name, and a good one."""
+    nodes = ''.join(bad(behaviour, behaviour) for behaviour in behaviours)
+    return f'version: 1\nnodes:\n{nodes}{GOOD}'
+
+
+RESERVED = {
+    'destroy_node': ('node', 'destroy_node()'),
+    'destroy_node_async': ('node', 'destroy_node()'),
+    'shutdown_context': ('context', 'shutdown()'),
+    'shutdown_by_name': ('context', 'shutdown()'),
+    'try_shutdown_context': ('context', 'try_shutdown()'),
+    'shutdown_executor': ('executor', 'shutdown()'),
+}
+
+
+def test_a_behaviour_cannot_end_what_belongs_to_the_system(compose):
+    text = system(*RESERVED)
+    child = compose(text, CODE)
+    for name, (owned, method) in RESERVED.items():
+        place = text[: text.index(f"'parts:{name}'")].count('\n') + 1
+        child.wait_for_line(
+            f"[ERROR] [{name}]: timer 'fail' (system.yaml:{place}) raised ReservedMethodError: "
+            f'the {owned} belongs to the system, so a behaviour cannot call {method}'
+        )
+        child.wait_for_line(
+            f"[ERROR] [{name}]: timer 'fail' (system.yaml:{place}) raised ", times=2
+        )
+    child.wait_for_line('help: to end the system call node.shutdown()', times=len(RESERVED))
     alive = len(child.matching('[good]: alive'))
     child.wait_for_line('[good]: alive', times=alive + 10)
     child.wait_for_line(' more times, last: ReservedMethodError')
     assert child.stop() == 0
 
-    assert len(child.matching('Traceback')) == 1
+    assert len(child.matching('Traceback')) == len(RESERVED)
 
 
-@pytest.mark.parametrize('behaviour', ['shutdown_default', 'spin'])
-def test_the_default_context_is_not_that_of_the_system(compose, behaviour):
-    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
-    child.wait_for_line("[ERROR] [bad]: timer 'fail' (system.yaml:8) raised ")
+def test_the_default_context_is_not_that_of_the_system(compose):
+    names = ('shutdown_default', 'spin')
+    child = compose(system(*names), CODE)
+    for name in names:
+        child.wait_for_line(f"[ERROR] [{name}]: timer 'fail' (system.yaml:")
     alive = len(child.matching('[good]: alive'))
     child.wait_for_line('[good]: alive', times=alive + 10)
 
     assert child.stop() == 0
 
 
-@pytest.mark.parametrize('behaviour', ['destroy_own_timer', 'destroy_all', 'destroy_for_sure'])
-def test_others_live_on_when_a_behaviour_destroys_what_its_node_has(compose, behaviour):
-    child = compose(SYSTEM.format(behaviour=behaviour), CODE)
-    child.wait_for_line('destroying')
+def test_others_live_on_when_a_behaviour_destroys_what_its_node_has(compose):
+    names = ('destroy_own_timer', 'destroy_all', 'destroy_for_sure')
+    child = compose(system(*names), CODE)
+    for name in names:
+        child.wait_for_line(f'[{name}]: destroying')
     alive = len(child.matching('[good]: alive'))
     child.wait_for_line('[good]: alive', times=alive + 20)
     assert child.stop() == 0
 
-    assert len(child.matching('[bad]: alive')) == 1
+    for name in names:
+        assert len(child.matching(f'[{name}]: alive')) == 1
     assert not child.matching('Traceback')
     assert not child.matching('[ERROR]')
 
 
 def test_a_system_whose_ros_was_shut_down_says_so_and_ends(compose):
-    child = compose(SYSTEM.format(behaviour='shutdown_for_sure'), CODE)
+    child = compose(system('shutdown_for_sure'), CODE)
 
     assert child.wait() == 1
     assert child.matching('[ERROR] [composer]: the ROS context was shut down, so the system ends')

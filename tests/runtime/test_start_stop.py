@@ -65,8 +65,7 @@ def hears_hang_ups():
     signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.usefixtures('hears_hang_ups')
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_stops_all_nodes_after_their_on_stop_with_exit_code_0(compose, number):
     text = """
         version: 1
@@ -182,7 +181,7 @@ def test_an_entity_that_cannot_be_created_tears_all_down_with_exit_code_1(compos
     assert not child.matching('Traceback')
 
 
-@pytest.mark.parametrize('code', [0, 1, 7])
+@pytest.mark.parametrize('code', [0, 7])
 def test_a_behaviour_may_end_the_system_with_an_exit_code(compose, code):
     text = f"""
         version: 1
@@ -210,50 +209,40 @@ def test_on_start_may_end_the_system(compose):
     assert child.lines == []
 
 
-HANGING = """
-version: 1
-executor: {{shutdown_timeout: 3.0}}
-nodes:
-  stuck:
-    timers: {{hang: {{period: 0.02, behaviour: 'parts:{behaviour}'}}}}
-    on_stop: {{behaviour: 'parts:tell', with: {{text: stopping}}}}
-  other:
-    on_stop: {{behaviour: 'parts:tell', with: {{text: stopping}}}}
-"""
-
-
-@pytest.mark.parametrize(
-    ('behaviour', 'statement'),
-    [('hang', 'threading.Event().wait()'), ('hang_async', 'await Future()')],
-)
-def test_a_behaviour_that_hangs_at_the_stop_is_shown_with_its_stack_and_exit_code_1(
-    compose, behaviour, statement
-):
-    child = compose(HANGING.format(behaviour=behaviour), CODE)
-    child.wait_for_line('hanging')
-
-    assert child.stop() == 1
-    child.wait_for_line(
-        "[ERROR] [composer]: node 'stuck': timer 'hang' did not end in time; it is at"
-    )
-    assert child.matching(f'parts.py", line {CODE[: CODE.index(statement)].count(chr(10)) + 1}')
-    assert child.matching(f'    {statement}')
-    assert '[INFO] [stuck]: stopping' in child.lines
-    assert '[INFO] [other]: stopping' in child.lines
-
-
-def test_on_stop_that_hangs_is_shown_with_its_stack_and_exit_code_1(compose):
+def test_what_hangs_at_the_stop_is_shown_with_its_stack_and_exit_code_1(compose):
     text = """
         version: 1
         executor: {shutdown_timeout: 3.0}
-        nodes: {stuck: {on_stop: 'parts:hang'}}
+        nodes:
+          stuck:
+            timers: {hang: {period: 0.02, behaviour: 'parts:hang'}}
+            on_stop: {behaviour: 'parts:tell', with: {text: stopping}}
+          stuck_async:
+            timers: {hang: {period: 0.02, behaviour: 'parts:hang_async'}}
+            on_stop: {behaviour: 'parts:tell', with: {text: stopping}}
+          stuck_at_the_end: {on_stop: 'parts:hang'}
+          other:
+            on_stop: {behaviour: 'parts:tell', with: {text: stopping}}
     """
     child = compose(text, CODE)
+    child.wait_for_line('hanging', times=2)
     child.wait_until_ready()
 
     assert child.stop() == 1
-    child.wait_for_line("node 'stuck': on_stop did not end in time; it is at")
-    assert child.matching('threading.Event().wait()')
+    expected = [
+        ("node 'stuck': timer 'hang'", 'threading.Event().wait()'),
+        ("node 'stuck_async': timer 'hang'", 'await Future()'),
+        ("node 'stuck_at_the_end': on_stop", 'threading.Event().wait()'),
+    ]
+    for entity, statement in expected:
+        report = f'[ERROR] [composer]: {entity} did not end in time; it is at'
+        begin = child.lines.index(report)
+        stack = [line for line in child.lines[begin + 1 : begin + 5] if line.startswith('  ')]
+        line = CODE[: CODE.index(statement)].count('\n') + 1
+        assert any(f'parts.py", line {line}' in each for each in stack)
+        assert f'    {statement}' in stack
+    for node in ('stuck', 'stuck_async', 'other'):
+        assert f'[INFO] [{node}]: stopping' in child.lines
 
 
 def test_on_stop_that_raises_does_not_keep_the_others_from_stopping(compose):
@@ -333,7 +322,6 @@ def test_a_signal_while_on_start_runs_ends_the_start(compose):
 @pytest.mark.parametrize(
     ('code', 'message'),
     [
-        ('import no_such_module\n', "ModuleNotFoundError: No module named 'no_such_module'"),
         ("\n\nraise RuntimeError('no licence')\n", 'RuntimeError: no licence'),
         ('import sys\nsys.exit(3)\n', 'SystemExit: 3'),
     ],
@@ -390,8 +378,6 @@ def test_a_broken_file_starts_nothing(compose):
     ('arguments', 'message'),
     [
         (('-p', 'nonsense'), "failed to initialize rcl: Couldn't parse parameter override rule"),
-        (('-r', 'a:b'), "failed to initialize rcl: Couldn't parse remap rule: '-r a:b'"),
-        (('--log-level', 'loud'), "failed to initialize rcl: Couldn't parse log level"),
         (('-x', '3'), "it does not know the arguments ['-x', '3']"),
     ],
 )

@@ -1,6 +1,5 @@
 """`wait_for`: nodes and processes start in the order that they ask for, without any sleep."""
 
-import signal
 import sys
 from textwrap import dedent
 
@@ -290,8 +289,7 @@ def test_a_process_that_has_ended_badly_is_not_waited_for(compose):
     )
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_stop_ends_the_waiting(compose, number):
+def test_a_stop_ends_the_waiting(compose):
     text = f"""
         version: 1
         nodes:
@@ -306,7 +304,7 @@ def test_a_stop_ends_the_waiting(compose, number):
     child = compose(text, CODE)
     child.wait_for_line('tick')
 
-    assert child.stop(number) == 0
+    assert child.stop() == 0
     assert child.lines[-1] == '[INFO] [free]: free stops'
     assert not child.matching('late')
     assert not child.matching(' ready in ')

@@ -45,17 +45,36 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class Owner:
+    """What a behaviour belongs to: an entity, or the node itself.
+
+    Attributes:
+        kind: The noun of the entity's kind, as in `timer`, or a key of the node, as in `on_start`.
+        name: The entity's name.
+        key: The key of the entity that names the behaviour, if it may have several.
+    """
+
+    kind: str
+    name: str = ''
+    key: str = ''
+
+    def __str__(self) -> str:
+        """Return `timer 'tick'`, `action client 'arm' (feedback)` or `on_start`."""
+        name = f" '{self.name}'" if self.name else ''
+        return f'{self.kind}{name}{f" ({self.key})" if self.key else ""}'
+
+
+@dataclass(frozen=True, slots=True)
 class RunningCall:
     """A call that has begun and not ended.
 
     Attributes:
-        owner: The entity in words, as in `timer 'tick'`.
         begun_ns: When it began, by `time.monotonic_ns`.
         thread: The identifier of its thread, `None` for a coroutine.
         progress: Of a behaviour that yields intermediate results.
     """
 
-    owner: str
+    owner: Owner
     begun_ns: int
     thread: int | None
     coroutine: CoroutineType[Any, Any, Any] | None = None
@@ -77,7 +96,7 @@ class RunningCall:
 
 # The arguments of a `RunningCall`: to make one takes longer than everything else in a call.
 _CallEntry: TypeAlias = (
-    'tuple[str, int, int | None, CoroutineType[Any, Any, Any] | None, Progress | None]'
+    'tuple[Owner, int, int | None, CoroutineType[Any, Any, Any] | None, Progress | None]'
 )
 
 
@@ -185,12 +204,12 @@ class BehaviourCall:
 
     def __init__(  # noqa: PLR0913 - all but three have a default or go by their names
         self,
-        owner: str,
+        owner: Owner,
         function: Callable[..., Any],
         running: RunningCalls,
         *,
         deliver: Callable[[Any], Any],
-        failed: Callable[[str, BaseException], None],
+        failed: Callable[[Owner, BaseException], None],
         add_time: Callable[[int], None] | None = None,
         may_begin: Callable[[], bool] | None = None,
         progress: Progress | None = None,

@@ -12,6 +12,8 @@ from composer.runtime.behaviours.tracebacks import format_behaviour_error, place
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from composer.runtime.behaviours.calls import Owner
+
 # At most one line about the same entity in this time.
 _QUIET_SEC = 1.0
 
@@ -33,14 +35,13 @@ class ErrorReporter:
 
     def __init__(self, log: Callable[[str], Any]) -> None:
         self._log = log
-        self._counts: dict[tuple[str, str], _ErrorCount] = {}
+        self._counts: dict[tuple[Owner, str], _ErrorCount] = {}
         self._lock = threading.Lock()
 
-    def report(self, owner: str, place: str, error: BaseException) -> None:
+    def report(self, owner: Owner, place: str, error: BaseException) -> None:
         """Log what a behaviour raised, or count it.
 
         Args:
-            owner: The entity in words, as in `timer 'tick'`.
             place: Where the file declares it, as `file:line`.
         """
         kind = (type(error).__name__, *place_of(error))
@@ -85,7 +86,7 @@ class ErrorReporter:
             self._log(text)
 
 
-def _format_count(owner: str, place: str, count: _ErrorCount) -> str:
+def _format_count(owner: Owner, place: str, count: _ErrorCount) -> str:
     """Return the line about the errors that were counted, and reset the count."""
     times = 'once more' if count.unreported == 1 else f'{count.unreported} more times'
     count.unreported = 0

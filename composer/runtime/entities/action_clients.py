@@ -18,6 +18,7 @@ from composer.errors import (
     GoalTimeoutError,
 )
 from composer.interfaces.classes import import_interface
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.behaviours.requests import Requests
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
@@ -39,7 +40,7 @@ class ActionClient:
 
     def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
         action_class: Any = import_interface(spec.type)
-        owner = f"action client '{spec.name}'"
+        kind, name = 'action client', spec.name
         self._node = node
         self._name = spec.action
         self._convert = converter_for(action_class.Goal).convert
@@ -47,8 +48,8 @@ class ActionClient:
         self._requests = Requests(
             node.waits, self._client.server_is_ready, self._unavailable, self._unanswered
         )
-        self._feedback = _Behaviour(node, f'{owner} (feedback)', spec.feedback)
-        self._result = _Behaviour(node, f'{owner} (result)', spec.result)
+        self._feedback = _Behaviour(node, Owner(kind, name, 'feedback'), spec.feedback)
+        self._result = _Behaviour(node, Owner(kind, name, 'result'), spec.result)
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -159,7 +160,7 @@ class _Behaviour:
     the node's callback group, so that the behaviour never runs beside the node's others.
     """
 
-    def __init__(self, node: LiveNode, owner: str, behaviour: BehaviourSpec | None) -> None:
+    def __init__(self, node: LiveNode, owner: Owner, behaviour: BehaviourSpec | None) -> None:
         self._items: deque[Any] = deque()
         self._guard: Any = None
         if behaviour is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from contextlib import aclosing, closing, suppress
+from dataclasses import replace
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from rclpy.qos import QoSProfile
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
-from composer.runtime.behaviours.calls import FAILED, Progress, return_result
+from composer.runtime.behaviours.calls import FAILED, Owner, Progress, return_result
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.messages.payloads import converter_for
 
@@ -47,11 +48,11 @@ class _Server(ActionServer):
         self._queue = GoalQueue(spec.concurrency, _start)
         self._execution = _Execution(node, spec, self._queue)
         self._live_node = node
-        self._owner = f"action '{spec.name}'"
+        self._owner = Owner('action', spec.name)
         self._accept = None
         if spec.accept is not None:
             self._accept = node.call(
-                f'{self._owner} (accept)',
+                replace(self._owner, key='accept'),
                 spec.accept.path,
                 node.bind(spec.accept, own_state=False),
                 options=spec,
@@ -165,7 +166,7 @@ class _Execution:
             FunctionKind.PLAIN: self._run_function,
         }[kind_of(self._begin)]
         self._call = node.call(
-            f"action '{spec.name}'", spec.path, run, options=spec, deliver=return_result
+            Owner('action', spec.name), spec.path, run, options=spec, deliver=return_result
         )
         self.is_async = self._call.is_async
 

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from composer.errors import StartError
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
-from composer.runtime.behaviours.calls import FAILED, return_result
+from composer.runtime.behaviours.calls import FAILED, Owner, return_result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -126,7 +126,7 @@ def _create_callback(
 ) -> Callable[[list[Parameter]], SetParametersResult]:
     """Return what asks `on_parameters` whether changes are accepted."""
     function = node.bind(spec, own_state=False)
-    call = node.call('on_parameters', spec.path, function, deliver=return_result)
+    call = node.call(Owner('on_parameters'), spec.path, function, deliver=return_result)
 
     def ask(changes: list[Parameter]) -> SetParametersResult:
         # rclpy wants the answer when this returns, so a coroutine is waited for.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
-from composer.runtime.behaviours.calls import FAILED
+from composer.runtime.behaviours.calls import FAILED, Owner
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError
@@ -30,7 +30,7 @@ def create_service(node: LiveNode, spec: ServiceSpec) -> Any:
 
 def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     service_class: Any = import_interface(spec.type)
-    owner = f"service '{spec.name}'"
+    owner = Owner('service', spec.name)
     call = node.call(
         owner,
         spec.path,

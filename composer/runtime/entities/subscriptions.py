@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
-from composer.runtime.behaviours.calls import return_result
+from composer.runtime.behaviours.calls import Owner, return_result
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def create_subscription(node: LiveNode, spec: SubscriptionSpec) -> Any:
     """Create a subscription."""
-    owner = f"subscription '{spec.name}'"
+    owner = Owner('subscription', spec.name)
     call = node.call(
         owner,
         spec.path,

@@ -11,6 +11,7 @@ from rclpy.clock import Clock, ClockType
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.behaviours.calls import Owner
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ _CLOCKS = {'steady': ClockType.STEADY_TIME, 'system': ClockType.SYSTEM_TIME}
 def create_timer(node: LiveNode, spec: TimerSpec) -> Timer:
     """Create a timer; it ticks once the node has started."""
     ticker = _Ticker(node, spec)
-    owner = f"timer '{spec.name}'"
+    owner = Owner('timer', spec.name)
     call = node.call(
         owner,
         spec.path,
@@ -92,7 +93,7 @@ class _Ticker:
             return
         is_async = self._kind is FunctionKind.ASYNC_GENERATOR
         close = partial(_close_async, generator) if is_async else generator.close
-        call = self._node.reported_call(f"timer '{self._spec.name}'", self._spec.path, close)
+        call = self._node.reported_call(Owner('timer', self._spec.name), self._spec.path, close)
         self._node.run_to_end(call, timeout_sec=timeout_sec)
 
     def _resume(self) -> Any:

@@ -1,1 +1,1 @@
-"""How the system is doing: diagnostics, hangs, unmatched ends."""
+"""The health of a running system: diagnostics, hanging behaviours, unmatched endpoints."""

@@ -1,4 +1,4 @@
-"""How entities fared → `diagnostic_msgs/msg/DiagnosticStatus`, as ROS's diagnostic tools read it.
+"""Health of entities → `diagnostic_msgs/msg/DiagnosticStatus`, for ROS's diagnostic tools.
 
 The name is `node: task`, as `diagnostic_updater` writes it, with the node's full name:
 `/robot/talker: timer tick`. Viewers group by the slashes in it. The hardware is the system.
@@ -11,31 +11,31 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 if TYPE_CHECKING:
+    from composer.runtime.behaviours.calls import Owner
     from composer.runtime.health.statistics import EntityReport
 
 _P99 = 0.99
 
 
 class StatusWriter:
-    """Writes the status of one entity over and over; what does not change is kept.
+    """Writes the status of one entity again and again, always into the same message.
 
     Args:
         node: The full name of its node.
-        owner: The entity in words, as in `timer 'tick'`.
+        owner: The entity.
         system: The system's name.
     """
 
-    def __init__(self, node: str, owner: str, system: str) -> None:
-        self._is_timer = owner.startswith('timer ')
-        self._is_subscription = owner.startswith('subscription ')
+    def __init__(self, node: str, owner: Owner, system: str) -> None:
+        self._kind = owner.kind
         self._values: dict[str, KeyValue] = {}
-        task = owner.replace("'", '')
+        task = str(owner).replace("'", '')
         self._status = DiagnosticStatus(name=f'{node}: {task}', hardware_id=system)
 
     def write(self, report: EntityReport) -> DiagnosticStatus:
-        """Return the status, the same message each time."""
+        """Return the status; the message is the same one each time."""
         status = self._status
-        status.level, status.message = self._judge(report)
+        status.level, status.message = self._summarize(report)
         times, calls = report.times, report.times.calls()
         self._set('calls', str(report.all_calls))
         self._set('errors', str(report.all_errors))
@@ -44,23 +44,23 @@ class StatusWriter:
             self._set('callback time mean (ms)', f'{times.mean_ns() / 1e6:.4f}')
             self._set('callback time p99 (ms)', f'{times.percentile_ns(_P99) / 1e6:.4f}')
             self._set('callback time max (ms)', f'{times.most_ns / 1e6:.4f}')
-        if self._is_subscription:
+        if self._kind == 'subscription':
             self._set('queue overruns', str(report.all_missed.overruns))
-        if self._is_timer:
+        if self._kind == 'timer':
             self._set('late ticks', str(report.all_missed.late_ticks))
             self._set('skipped ticks', str(report.all_missed.skipped_ticks))
         return status
 
-    def _judge(self, report: EntityReport) -> tuple[bytes, str]:
+    def _summarize(self, report: EntityReport) -> tuple[bytes, str]:
         missed, overdue_sec = report.missed, report.overdue_sec
-        concerns = [
+        problems = [
             _count(report.errors, 'error', f', last: {report.last_error}'),
             f'a call has been running for {overdue_sec:.1f} s' if overdue_sec else '',
             _count(missed.overruns, 'message', ' dropped from the full queue'),
             _count(missed.late_ticks, 'late tick'),
             _count(missed.skipped_ticks, 'skipped tick'),
         ]
-        text = '; '.join(filter(None, concerns))
+        text = '; '.join(filter(None, problems))
         if report.errors:
             return DiagnosticStatus.ERROR, text
         if text:

@@ -1,8 +1,8 @@
-"""`/diagnostics`: how every entity fares, for the diagnostic tools of ROS.
+"""`/diagnostics`: the health of all entities, for the diagnostic tools of ROS.
 
-It comes from a thread and a node of its own, which need no executor: it goes on beside behaviours
-that hang. The node's name begins with an underscore, which hides it from `ros2 node list`, as it
-is none that the file declares; `ros2 node list --all` shows it.
+It has a thread and a node of its own and needs no executor, so hanging behaviours do not stop it.
+The file does not declare this node, so its name begins with an underscore, which hides it from
+`ros2 node list`; `ros2 node list --all` shows it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.runtime.behaviours.calls import RunningCall
-    from composer.runtime.health.statistics import HealthRegistry
+    from composer.runtime.health.statistics import EntityKey, HealthRegistry
 
-# To write a message holds the interpreter: for a large system, one goes out for so many entities.
+# Writing a message holds the interpreter's lock: large systems send several smaller ones.
 _MOST_STATUSES = 50
 _DEPTH = 10
 # ROS allows 255 (rmw/validate_node_name.h).
@@ -36,30 +36,30 @@ def node_name(system: str) -> str:
 
 
 class DiagnosticsPublisher:
-    """Publishes a system's health while it is started.
+    """Publishes a system's health from `start` to `stop`.
 
     Args:
         system: The system's name.
         period_sec: Seconds between two messages.
-        overdue: Returns the calls that run longer than they may, with their nodes' full names.
+        overdue: Returns the calls that exceed their `warn_after`, with their nodes' full names.
     """
 
     def __init__(
         self,
         system: str,
         period_sec: float,
-        board: HealthRegistry,
+        registry: HealthRegistry,
         overdue: Callable[[], Iterable[tuple[str, RunningCall]]],
     ) -> None:
         self._system = system
         self._period_sec = period_sec
-        self._board = board
+        self._registry = registry
         self._overdue = overdue
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._publish_on, name='diagnostics', daemon=True)
+        self._thread = threading.Thread(target=self._run, name='diagnostics', daemon=True)
 
     def start(self, context: Context, ros_arguments: Sequence[str]) -> None:
-        """Create the node and begin to publish.
+        """Create the node and start to publish.
 
         Args:
             ros_arguments: The arguments after `--ros-args` of the command line.
@@ -75,7 +75,7 @@ class DiagnosticsPublisher:
             start_parameter_services=False,
             parameter_overrides=[
                 Parameter('start_type_description_service', value=False),
-                # Nobody spins the node, so it would never hear what time a simulation has.
+                # Nothing spins the node, so it would never receive `/clock`.
                 Parameter('use_sim_time', value=False),
             ],
         )
@@ -83,23 +83,23 @@ class DiagnosticsPublisher:
         self._thread.start()
 
     def stop(self) -> None:
-        """Publish no more, and remove the node; also if it was never started."""
+        """Stop to publish and destroy the node, if it was started."""
         self._ended.set()
         if self._thread.ident is not None:
             self._thread.join()
             self._node.destroy_node()
 
-    def _publish_on(self) -> None:
+    def _run(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
 
         from composer.runtime.health.diagnostic_status import StatusWriter
 
-        writers: dict[tuple[str, str], StatusWriter] = {}
+        writers: dict[EntityKey, StatusWriter] = {}
         begun = monotonic()
         due = begun + self._period_sec
         while not self._ended.wait(max(0.0, due - monotonic())):
             now = monotonic()
-            reports = self._board.reports(now - begun, self._overdue(), monotonic_ns())
+            reports = self._registry.reports(now - begun, self._overdue(), monotonic_ns())
             begun = now
             due = max(due, now) + self._period_sec
             if not self._publisher.get_subscription_count():

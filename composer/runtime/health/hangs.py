@@ -1,7 +1,7 @@
-"""Behaviours that run for long are reported with their stacks; nobody else is affected.
+"""Reports behaviours that run longer than `warn_after`, with their stacks.
 
-One thread looks at what runs a few times in the shortest `warn_after` of the system; the calls
-themselves only note when they began.
+One thread checks the running calls a few times in the shortest `warn_after` of the system; the
+calls themselves only note when they began.
 """
 
 from __future__ import annotations
@@ -16,29 +16,28 @@ from composer.runtime.health.watcher import Watcher
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from composer.runtime.behaviours.calls import RunningCalls
+    from composer.runtime.behaviours.calls import Owner, RunningCalls
     from composer.runtime.behaviours.error_reports import ErrorReporter
 
-_LOOKS_PER_LIMIT = 4
+_CHECKS_PER_LIMIT = 4
 _SHORTEST_PAUSE_SEC = 0.01
 _LONGEST_PAUSE_SEC = 1.0
-# An entity that is slow again and again is told of after this time, and then after twice that.
+# An entity that is slow again is not reported for this time, then for twice that, and so on.
 _QUIET_SEC = 60.0
 _LONGEST_QUIET_SEC = 3600.0
 
 
 class HangLimit:
-    """How long the behaviour of one entity may run, and what is said when it runs longer.
+    """How long the behaviour of one entity may run; reports the calls that run longer.
 
     Args:
-        owner: The entity in words, as in `timer 'tick'`.
         place: Where the file declares it, as `file:line`.
         after_sec: `None` for no limit.
         warn: Takes the text, as the node's logger does.
     """
 
     def __init__(
-        self, owner: str, place: str, after_sec: float | None, warn: Callable[[str], Any]
+        self, owner: Owner, place: str, after_sec: float | None, warn: Callable[[str], Any]
     ) -> None:
         self._owner = owner
         self.after_sec = after_sec
@@ -46,7 +45,7 @@ class HangLimit:
         self._warn = warn
         self._quiet = Backoff(_QUIET_SEC, _LONGEST_QUIET_SEC, recovered_sec=float('inf'))
         self._quiet_until = float('-inf')
-        self._unsaid: set[int] = set()
+        self._skipped: set[int] = set()
         self._reported: dict[int, int] = {}
 
     def is_exceeded_by(self, call: RunningCall) -> bool:
@@ -54,32 +53,32 @@ class HangLimit:
         ran_sec = (monotonic_ns() - call.since_ns) * 1e-9
         return self.after_sec is not None and ran_sec >= self.after_sec
 
-    def look_at(self, running: RunningCalls, token: int, call: RunningCall) -> None:
+    def check(self, running: RunningCalls, token: int, call: RunningCall) -> None:
         """Report a call that has been running for too long; each is reported once."""
         reported_ns = self._reported.get(token)
         if reported_ns is not None:
             if call.since_ns > reported_ns:
-                self._tell_end(token, 'went on', call.since_ns)
+                self._report_end(token, 'went on', call.since_ns)
             return
         now_ns = monotonic_ns()
         ran_sec = (now_ns - call.since_ns) * 1e-9
         if self.after_sec is None or ran_sec < self.after_sec:
             return
         if now_ns * 1e-9 < self._quiet_until:
-            self._unsaid.add(token)
+            self._skipped.add(token)
             return
-        self._unsaid.discard(token)
-        others = f' ({len(self._unsaid)} others before it did so too)' if self._unsaid else ''
-        self._unsaid.clear()
+        self._skipped.discard(token)
+        others = f' ({len(self._skipped)} others before it did so too)' if self._skipped else ''
+        self._skipped.clear()
         self._quiet_until = now_ns * 1e-9 + self._quiet.next_delay_sec()
         self._reported[token] = call.since_ns
         self._warn(
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
             f'it is at\n{call.format_stack()}'
         )
-        running.on_end(token, lambda: self._tell_end(token, 'returned', monotonic_ns()))
+        running.on_end(token, lambda: self._report_end(token, 'returned', monotonic_ns()))
 
-    def _tell_end(self, token: int, what: str, now_ns: int) -> None:
+    def _report_end(self, token: int, what: str, now_ns: int) -> None:
         reported_ns = self._reported.pop(token, None)
         if reported_ns is not None:
             ran_sec = (now_ns - reported_ns) * 1e-9
@@ -97,17 +96,17 @@ class WatchedNode(Protocol):
     def running(self) -> RunningCalls: ...  # noqa: D102
 
     @property
-    def limits(self) -> Mapping[str, HangLimit]: ...  # noqa: D102
+    def limits(self) -> Mapping[Owner, HangLimit]: ...  # noqa: D102
 
     @property
     def errors(self) -> ErrorReporter: ...  # noqa: D102
 
 
 class HangWatcher(Watcher):
-    """The thread that looks at what runs.
+    """The thread that checks the running calls.
 
     Args:
-        nodes: Returns the nodes that there are now.
+        nodes: Returns the present nodes.
         limits_sec: The limits of all entities.
     """
 
@@ -115,13 +114,13 @@ class HangWatcher(Watcher):
         self, nodes: Callable[[], Iterable[WatchedNode]], limits_sec: Iterable[float | None]
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
-        pause_sec = max(shortest / _LOOKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
-        super().__init__('composer-watch', self._look_at_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
+        pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
+        super().__init__('composer-watch', self._check_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
         self._nodes = nodes
 
-    def _look_at_calls(self) -> None:
+    def _check_calls(self) -> None:
         for node in self._nodes():
             for token, entry in list(node.running.entries.items()):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
-                    limit.look_at(node.running, token, RunningCall(*entry))
+                    limit.check(node.running, token, RunningCall(*entry))
             node.errors.flush_old()

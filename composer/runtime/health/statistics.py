@@ -1,14 +1,14 @@
-"""How the behaviours of a system fare: calls, errors, times and what they missed, by entity.
+"""The health of a system by entity: calls, errors, durations, and what the entity missed.
 
 Noting a call takes half a microsecond, two clock reads included. There is no lock: nothing is
-called while numbers change, and CPython hands its interpreter lock on only at calls and backward
-jumps. Should that ever fail, one call is not counted.
+called while numbers change, and CPython switches threads only at calls and backward jumps. Should
+that ever fail, one call is not counted.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.executor import MissedCounts
 from composer.runtime.behaviours.tracebacks import summarize
@@ -16,13 +16,16 @@ from composer.runtime.behaviours.tracebacks import summarize
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.behaviours.calls import Owner, RunningCall
 
 # Durations are sorted into 8 buckets for each power of two; none is narrower than 256 ns.
 _UNIT_BITS = 8
 _SUB_BITS = 3
 
-_NOTHING = MissedCounts()
+# The full name of a node, and an entity in it.
+EntityKey: TypeAlias = 'tuple[str, Owner]'
+
+_NONE_MISSED = MissedCounts()
 
 
 class CallTimes:
@@ -40,7 +43,7 @@ class CallTimes:
         self.most_ns = 0
 
     def add(self, duration_ns: int) -> None:
-        """Note a call that has ended."""
+        """Count a call that has ended."""
         units = duration_ns >> _UNIT_BITS
         shift = units.bit_length() - _SUB_BITS - 1
         bucket = (shift << _SUB_BITS) + (units >> shift) if shift > 0 else units
@@ -55,7 +58,7 @@ class CallTimes:
             self.most_ns = duration_ns
 
     def take(self) -> CallTimes:
-        """Return what was noted, and forget it."""
+        """Return all counts so far, and start again with none."""
         taken = CallTimes()
         # Nothing is called from here on.
         taken.counts, self.counts = self.counts, taken.counts
@@ -64,15 +67,15 @@ class CallTimes:
         return taken
 
     def calls(self) -> int:
-        """Return how many there were."""
+        """Return the number of calls."""
         return sum(self.counts.values())
 
     def mean_ns(self) -> float:
-        """Return the mean; 0 if there were none."""
+        """Return the mean duration; 0 if there were no calls."""
         return self.total_ns / (self.calls() or 1)
 
     def percentile_ns(self, share: float) -> int:
-        """Return what this share of the calls did not exceed, up to an eighth too high.
+        """Return the duration that this share of the calls kept to, up to an eighth too high.
 
         Args:
             share: More than 0, as in 0.99.
@@ -93,15 +96,15 @@ def _last_ns(bucket: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class EntityReport:
-    """How an entity fared in a period, and in all.
+    """The health of an entity in one period, and since the start.
 
     Attributes:
         period_sec: How long the period was.
         times: Those of the calls that ended in the period.
         errors: How many calls raised in the period.
         last_error: The last of these errors, empty if there was none.
-        missed: In the period.
-        overdue_sec: How long a call has been running that runs longer than it may; 0 if none does.
+        missed: What it missed in the period.
+        overdue_sec: How long a call has been running that exceeds `warn_after`; 0 if none does.
         all_calls: Since the start, as the next two.
     """
 
@@ -117,21 +120,21 @@ class EntityReport:
 
 
 class EntityHealth:
-    """What is known of one entity; it outlives restarts of the entity's node.
+    """The health of one entity; it outlives restarts of the entity's node.
 
     Attributes:
-        times: Of the present period.
+        times: The durations of the present period.
     """
 
     __slots__ = (
         '_all_missed',
         '_calls',
+        '_count_missed',
         '_errors',
         '_last_error',
-        '_look',
         '_missed',
         '_past',
-        '_said',
+        '_reported',
         'times',
     )
 
@@ -140,80 +143,79 @@ class EntityHealth:
         self._calls = 0
         self._errors = 0
         self._last_error = ''
-        self._look: Callable[[], MissedCounts] = MissedCounts
-        self._past = self._missed = self._all_missed = _NOTHING
-        self._said = 0, _NOTHING
+        self._count_missed: Callable[[], MissedCounts] = MissedCounts
+        self._past = self._missed = self._all_missed = _NONE_MISSED
+        self._reported = 0, _NONE_MISSED
 
     def note_error(self, error: BaseException) -> None:
-        """Note that a call raised."""
+        """Count a call that raised."""
         self._errors += 1
         self._last_error = summarize(error)
 
-    def follow(self, look: Callable[[], MissedCounts]) -> None:
-        """From now on, ask here for what it has missed: its node was built, or built anew."""
-        self._look_anew()
-        self._past, self._missed = self._all_missed, _NOTHING
-        self._look = look
+    def follow(self, count_missed: Callable[[], MissedCounts]) -> None:
+        """Ask here from now on what it has missed, because its node was created or restarted."""
+        self._update_missed()
+        self._past, self._missed = self._all_missed, _NONE_MISSED
+        self._count_missed = count_missed
 
     def report(self, period_sec: float, overdue_sec: float) -> EntityReport:
-        """Return how it fared, and begin a new period.
+        """Return the health of the period that ends, and begin a new one.
 
         Args:
-            period_sec: How long the one that ends was.
-            overdue_sec: How long a call has been running that runs longer than it may.
+            period_sec: How long the period was.
+            overdue_sec: How long a call has been running that exceeds `warn_after`.
         """
         times = self.times.take()
         self._calls += times.calls()
-        self._look_anew()
+        self._update_missed()
         errors, missed = self._errors, self._all_missed
-        said_errors, said_missed = self._said
-        self._said = errors, missed
+        reported_errors, reported_missed = self._reported
+        self._reported = errors, missed
         return EntityReport(
             period_sec=period_sec,
             times=times,
-            errors=errors - said_errors,
-            last_error=self._last_error if errors > said_errors else '',
-            missed=_NOTHING if missed is said_missed else missed - said_missed,
+            errors=errors - reported_errors,
+            last_error=self._last_error if errors > reported_errors else '',
+            missed=_NONE_MISSED if missed is reported_missed else missed - reported_missed,
             overdue_sec=overdue_sec,
             all_calls=self._calls,
             all_errors=errors,
             all_missed=missed,
         )
 
-    def _look_anew(self) -> None:
-        missed = self._look()
-        # What has been destroyed knows nothing any more.
+    def _update_missed(self) -> None:
+        missed = self._count_missed()
+        # After the entity was destroyed, nothing is known of it.
         if missed and missed != self._missed:
             self._missed = missed
             self._all_missed = self._past + missed
 
 
 class HealthRegistry:
-    """The health of all entities of a system that have something to do."""
+    """The health of all entities of a system that have behaviours."""
 
     def __init__(self) -> None:
-        self._entities: dict[tuple[str, str], EntityHealth] = {}
+        self._entities: dict[EntityKey, EntityHealth] = {}
 
-    def entity(self, node: str, owner: str) -> EntityHealth:
+    def entity(self, node: str, owner: Owner) -> EntityHealth:
         """Return the health of an entity, the same one whenever its node is built.
 
         Args:
             node: The node's full name.
-            owner: The entity in words, as in `timer 'tick'`.
         """
         return self._entities.setdefault((node, owner), EntityHealth())
 
     def reports(
         self, period_sec: float, overdue: Iterable[tuple[str, RunningCall]], now_ns: int
-    ) -> dict[tuple[str, str], EntityReport]:
-        """Return how all entities fared, by node and entity in words, and begin a new period.
+    ) -> dict[EntityKey, EntityReport]:
+        """Return the health of all entities in the period that ends, and begin a new one.
 
         Args:
-            period_sec: How long the one that ends was.
-            overdue: The calls that run longer than they may, with the full names of their nodes.
+            period_sec: How long the period was.
+            overdue: The calls that exceed `warn_after`, with the full names of their nodes.
             now_ns: The present time of `time.monotonic_ns`.
         """
-        longest: dict[tuple[str, str], float] = {}
+        longest: dict[EntityKey, float] = {}
         for node, call in overdue:
             key = node, call.owner
             longest[key] = max(longest.get(key, 0.0), (now_ns - call.since_ns) / 1e9)

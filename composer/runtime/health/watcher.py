@@ -1,4 +1,4 @@
-"""A thread that looks at the system from time to time."""
+"""A thread that checks the system periodically."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ if TYPE_CHECKING:
 
 
 class Watcher:
-    """Calls a function at intervals, whatever it raises; the same fault is logged once.
+    """Calls a function periodically, whatever it raises; each error is logged once.
 
     Args:
-        name: That of the thread.
-        look: Called from `start` to `stop`.
-        pause_sec: Between two calls.
+        name: The name of the thread.
+        check: Called from `start` to `stop`.
+        pause_sec: The time between two calls.
     """
 
-    def __init__(self, name: str, look: Callable[[], None], pause_sec: float) -> None:
-        self._look = look
+    def __init__(self, name: str, check: Callable[[], None], pause_sec: float) -> None:
+        self._check = check
         self._pause_sec = pause_sec
         self._ended = threading.Event()
-        self._faults: set[str] = set()
+        self._errors: set[str] = set()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start to check."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more; unless a look takes longer than a pause, none is on its way then."""
+        """Stop to check, and wait for a running check for up to one pause."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(self._pause_sec)
@@ -41,11 +41,11 @@ class Watcher:
     def _run(self) -> None:
         while not self._ended.wait(self._pause_sec):
             try:
-                self._look()
-            except Exception as error:  # noqa: BLE001 - one fault must not leave the system unwatched
+                self._check()
+            except Exception as error:  # noqa: BLE001 - one error must not end the checks
                 self._report(format_internal_error(error))
 
-    def _report(self, fault: str) -> None:
-        if fault not in self._faults:
-            self._faults.add(fault)
-            system_logger.error(fault)
+    def _report(self, error: str) -> None:
+        if error not in self._errors:
+            self._errors.add(error)
+            system_logger.error(error)

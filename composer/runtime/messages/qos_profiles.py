@@ -16,6 +16,7 @@ from rclpy.qos import (
 )
 
 from composer.language.qos import INFINITE, NANOSECONDS, resolve_qos
+from composer.language.qos_conflicts import CONFLICTS, MATCHED_DURATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,6 +33,8 @@ _BEST_AVAILABLE = {
     'deadline': DeadlineBestAvailable,
     'liveliness_lease_duration': LivelinessLeaseDurationeBestAvailable,
 }
+# Longer durations are no limit: `Infinite`, and what is left to the middleware.
+_LONGEST_NS = 2**62
 
 
 def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSProfile:
@@ -45,16 +48,13 @@ def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSPro
 
 
 def read_policies(profile: QoSProfile) -> dict[str, Any]:
-    """Return the policies of a profile that both ends must agree on, as `resolve_qos` does."""
-    policies: dict[str, Any] = {
-        name: getattr(profile, name).name.lower() for name in _POLICIES if name != 'history'
-    }
-    for name, best_available in _BEST_AVAILABLE.items():
-        duration = getattr(profile, name)
-        if duration == best_available:
-            policies[name] = 'best_available'
-        elif 0 < duration.nanoseconds < Infinite.nanoseconds:
-            policies[name] = duration.nanoseconds / NANOSECONDS
+    """Return the policies of rclpy's profile that must match, as `resolve_qos` does."""
+    policies: dict[str, Any] = {name: getattr(profile, name).name.lower() for name in CONFLICTS}
+    for name in MATCHED_DURATIONS:
+        duration_ns = getattr(profile, name).nanoseconds
+        # 0 is no limit either.
+        if 0 < duration_ns < _LONGEST_NS:
+            policies[name] = duration_ns / NANOSECONDS
     return policies
 
 

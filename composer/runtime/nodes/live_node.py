@@ -16,7 +16,13 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
-from composer.runtime.behaviours.calls import FAILED, BehaviourCall, RunningCalls, discard_result
+from composer.runtime.behaviours.calls import (
+    FAILED,
+    BehaviourCall,
+    Owner,
+    RunningCalls,
+    discard_result,
+)
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
@@ -92,7 +98,7 @@ class LiveNode:
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
     suspended: list[Suspended] = field(default_factory=list)
-    limits: dict[str, HangLimit] = field(default_factory=dict)
+    limits: dict[Owner, HangLimit] = field(default_factory=dict)
     running: RunningCalls = field(default_factory=RunningCalls)
     has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
@@ -127,7 +133,7 @@ class LiveNode:
 
     def call(
         self,
-        owner: str,
+        owner: Owner,
         path: DataPath,
         function: Callable[..., Any],
         *,
@@ -138,7 +144,6 @@ class LiveNode:
         """Return the call of a function that an entity is bound to.
 
         Args:
-            owner: The entity in words.
             path: Its place in the file.
             options: Those of the entity, if it has its own.
             deliver: Takes what the function returns.
@@ -149,7 +154,7 @@ class LiveNode:
         self._limit(owner, place, own)
         health = self._health(owner)
 
-        def failed(owner: str, error: BaseException) -> None:
+        def failed(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
             if health is not None:
@@ -169,7 +174,7 @@ class LiveNode:
 
     def reported_call(
         self,
-        owner: str,
+        owner: Owner,
         path: DataPath,
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
@@ -184,7 +189,7 @@ class LiveNode:
         place = self.place(path)
         self._limit(owner, place, self.spec)
 
-        def report(owner: str, error: BaseException) -> None:
+        def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
             self.errors.report(owner, place, error)
@@ -233,8 +238,8 @@ class LiveNode:
 
         return publish_result
 
-    def count_missed(self, owner: str, entity: Any) -> None:
-        """Count in the health of an entity, in words, what its ROS entity has missed."""
+    def count_missed(self, owner: Owner, entity: Any) -> None:
+        """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
             health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
@@ -252,12 +257,12 @@ class LiveNode:
         release(self.ros)
         self.ros.destroy_node()
 
-    def _health(self, owner: str) -> EntityHealth | None:
+    def _health(self, owner: Owner) -> EntityHealth | None:
         """Return the health of an entity in words, `None` if it is not measured."""
         board = self.system.health
         return None if board is None else board.entity(self.full_name, owner)
 
-    def _limit(self, owner: str, place: str, options: BehaviourOptions) -> None:
+    def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
         if owner not in self.limits:
             warn = self.ros.get_logger().warning
             self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)

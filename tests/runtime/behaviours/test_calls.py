@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.runtime.behaviours.calls import FAILED, BehaviourCall, RunningCalls
+from composer.runtime.behaviours.calls import FAILED, BehaviourCall, Owner, RunningCalls
 
 
 def call_of(function, running, deliver=lambda _: None, failed=lambda owner, error: None):
-    return BehaviourCall("timer 'tick'", function, running, deliver=deliver, failed=failed)
+    return BehaviourCall(Owner('timer', 'tick'), function, running, deliver=deliver, failed=failed)
 
 
 def test_a_running_call_tells_its_thread_its_begin_and_its_stack():
@@ -25,7 +25,7 @@ def test_a_running_call_tells_its_thread_its_begin_and_its_stack():
 
     assert call_of(look_around, running).run() is not FAILED
     ((call, stack),) = seen
-    assert (call.owner, call.thread) == ("timer 'tick'", threading.get_ident())
+    assert (call.owner, call.thread) == (Owner('timer', 'tick'), threading.get_ident())
     assert before <= call.begun_ns <= time.monotonic_ns()
     assert 'look_around' in stack
     assert running.calls() == []

@@ -21,15 +21,6 @@ def hear(node, message):
     node.logger.info(f'heard {message.data}')
     return 1 // message.data
 
-async def fail_async(node):
-    raise KeyError('lost')
-
-def fail_later(node):
-    yield
-    raise ValueError('halfway')
-
-def leave(node):
-    raise SystemExit(5)
 """
 
 
@@ -62,48 +53,6 @@ def test_an_error_is_logged_with_node_entity_place_and_traceback_and_others_go_o
         "    raise RuntimeError('out of order')",
         'RuntimeError: out of order',
     ]
-
-
-def test_repeated_errors_are_counted_and_told_at_most_once_a_second(compose):
-    text = """
-        version: 1
-        nodes:
-          bad: {timers: {fail: {period: 0.01, behaviour: 'parts:fail'}}}
-    """
-    child = compose(text, CODE)
-    line = child.wait_for_line('more times')
-    child.wait_for_line('more times', times=2)
-    assert child.stop() == 0
-
-    assert line.startswith("[ERROR] [bad]: timer 'fail' (system.yaml:4) raised ")
-    assert line.endswith(' more times, last: RuntimeError: out of order')
-    assert int(line.split()[6]) > 1
-    assert len(child.matching('Traceback')) == 1
-
-
-@pytest.mark.parametrize(
-    ('behaviour', 'error'),
-    [
-        ('fail_async', "KeyError: 'lost'"),
-        ('fail_later', 'ValueError: halfway'),
-        ('leave', 'SystemExit: 5'),
-    ],
-)
-def test_any_kind_of_behaviour_may_raise_anything(compose, behaviour, error):
-    text = f"""
-        version: 1
-        nodes:
-          bad:
-            timers:
-              fail: {{period: 0.02, behaviour: 'parts:{behaviour}'}}
-              live: {{period: 0.02, behaviour: 'parts:live'}}
-    """
-    child = compose(text, CODE)
-    child.wait_for_line(f"[ERROR] [bad]: timer 'fail' (system.yaml:6) raised {error}")
-    alive = len(child.matching('alive'))
-    child.wait_for_line('alive', times=alive + 3)
-
-    assert child.stop() == 0
 
 
 def test_a_subscription_that_raised_hears_the_next_message(compose, peer):

@@ -94,27 +94,33 @@ def own_frames(child):
     return [line for line in child.lines if re.search(r'File ".*/composer/\w+', line)]
 
 
-@pytest.mark.parametrize('kind', ['plain', 'generator', 'coroutine', 'async_generator'])
-def test_a_timer_may_raise_anything_and_ticks_on(compose, kind):
-    timers = '\n'.join(
-        f"      {name}: {{period: 0.02, behaviour: 'parts:{kind}', with: {{error: {name}}}}}"
-        for name in ERRORS
-    )
-    text = f"version: 1\nnodes:\n  bad:\n    timers:\n{timers}\n  good: {{timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}}}\n"
-    child = compose(text, CODE)
-    for name, error in ERRORS.items():
+def test_a_timer_may_raise_anything_and_ticks_on(compose):
+    kinds = ('plain', 'generator', 'coroutine', 'async_generator')
+    lines = ['version: 1', 'nodes:']
+    places = {}
+    for kind in kinds:
+        lines += [f'  {kind}:', '    timers:']
+        for name in ERRORS:
+            lines.append(
+                f"      {name}: {{period: 0.1, behaviour: 'parts:{kind}', with: {{error: {name}}}}}"
+            )
+            places[kind, name] = len(lines)
+    lines.append("  good: {timers: {live: {period: 0.02, behaviour: 'parts:live'}}}\n")
+    child = compose('\n'.join(lines), CODE)
+    for (kind, name), line in places.items():
         child.wait_for_line(
-            f"[ERROR] [bad]: timer '{name}' (system.yaml:{5 + list(ERRORS).index(name)}) raised {error}"
+            f"[ERROR] [{kind}]: timer '{name}' (system.yaml:{line}) raised {ERRORS[name]}"
         )
-        child.wait_for_line(f"timer '{name}'", times=2)
+        child.wait_for_line(f"[{kind}]: timer '{name}'", times=2)
     alive = len(child.matching('alive'))
     child.wait_for_line('alive', times=alive + 3)
     assert child.stop() == 0
 
     assert not own_frames(child)
     assert child.matching('help: to end the system call node.shutdown()')
+    raised = tuple(f'[ERROR] [{kind}]: timer' for kind in kinds)
     assert {line for line in child.lines if line.startswith('[')} == {
-        line for line in child.lines if line.startswith(('[ERROR] [bad]: timer', '[INFO]'))
+        line for line in child.lines if line.startswith((*raised, '[INFO]'))
     }
 
 
@@ -289,7 +295,9 @@ def test_errors_are_counted_exactly_and_told_at_most_once_a_second(compose):
     counts = [int(line.split()[6]) for line in said if ' more times' in line]
     once = len(child.matching(' raised once more, '))
     assert sum(counts) + once + len(child.matching(' raised ValueError: ')) == 400
+    assert said[-1].startswith("[ERROR] [bad]: timer 'fail' (system.yaml:3) raised ")
     assert said[-1].endswith(', last: ValueError: 400')
+    assert len(child.matching('Traceback')) == 1
 
 
 def test_a_burst_of_errors_is_told_though_none_follows(compose):

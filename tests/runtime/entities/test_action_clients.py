@@ -118,23 +118,38 @@ def wait_for_server(node, *_):
 """
 
 
-def acting(behaviour, *, server=None, client='', more='', accept=''):
+def acting(behaviour, *, server=None, client='', more=''):
     """Return a system whose client does this once; `server` is its action's behaviour."""
-    lines = f"""
+    clients = {'client': {'behaviour': behaviour, 'client': client, 'more': more}}
+    return acting_together(clients, {} if server is None else {'act': server})
+
+
+def acting_together(clients, actions):
+    """Return a system of several clients: the action of each is `act`, if it names no other.
+
+    `actions` are those of its server: their behaviours by their names.
+    """
+    lines = """
         version: 1
         nodes:
-          client:
-            state: {{inside: 0}}
-            action_clients: {{act: {{type: test_msgs/action/Fibonacci{client}}}}}
-            timers:
-              tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}
-              {more}
-    """
-    if server is not None:
+"""
+    for name, keys in clients.items():
         lines += f"""
+          {name}:
+            state: {{inside: 0}}
+            action_clients: {{act: {{type: test_msgs/action/Fibonacci{keys.get('client', '')}}}}}
+            timers:
+              tick: {{period: 0.02, behaviour: 'parts:{keys['behaviour']}'{keys.get('with', '')}}}
+              {keys.get('more', '')}
+    """
+    if actions:
+        lines += """
           server:
             actions:
-              act: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{server}'{accept}}}
+"""
+    for name, behaviour in actions.items():
+        lines += f"""
+              {name}: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{behaviour}'}}
     """
     return lines
 
@@ -206,25 +221,23 @@ def plain_server(domain_id):
     server.close()
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'end'),
-    [('send', 'end: [[0], [1], [2]] [3] succeeded'), ('send_async', 'end: [3] succeeded')],
-)
-def test_a_goal_of_this_process_has_feedback_and_a_result(compose, behaviour, end):
-    child = compose(acting(behaviour, server='count'), CODE)
+SENDERS = {'sync': {'behaviour': 'send'}, 'coroutine': {'behaviour': 'send_async'}}
+ENDS = {'sync': 'end: [[0], [1], [2]] [3] succeeded', 'coroutine': 'end: [3] succeeded'}
 
-    assert child.wait_for_line('end: ') == f'[INFO] [client]: {end}'
+
+def test_a_goal_of_this_process_has_feedback_and_a_result(compose):
+    child = compose(acting_together(SENDERS, {'act': 'count'}), CODE)
+
+    for name, end in ENDS.items():
+        assert child.wait_for_line(f'[{name}]: end: ') == f'[INFO] [{name}]: {end}'
     assert child.stop() == 0
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'end'),
-    [('send', 'end: [[0], [1], [2]] [3] succeeded'), ('send_async', 'end: [3] succeeded')],
-)
-def test_a_goal_of_a_plain_server_has_feedback_and_a_result(compose, plain_server, behaviour, end):
-    child = compose(acting(behaviour), CODE)
+def test_a_goal_of_a_plain_server_has_feedback_and_a_result(compose, plain_server):
+    child = compose(acting_together(SENDERS, {}), CODE)
 
-    assert child.wait_for_line('end: ') == f'[INFO] [client]: {end}'
+    for name, end in ENDS.items():
+        assert child.wait_for_line(f'[{name}]: end: ') == f'[INFO] [{name}]: {end}'
     assert child.stop() == 0
 
 
@@ -237,54 +250,61 @@ def test_a_goal_can_be_cancelled(compose):
 
 
 ERRORS = {
-    'refused': (
-        {'server': 'count', 'accept': ", accept: 'parts:refuse'"},
-        '',
-        ("GoalRejectedError: the server of 'act' refused the goal"),
-    ),
-    'no server': (
-        {},
+    'refused': ('', "GoalRejectedError: the server of 'refused' refused the goal"),
+    'missing': (
         ', with: {timeout: 0.2}',
-        ("ActionNotAvailableError: no server of the action 'act' appeared within 0.2 s"),
+        "ActionNotAvailableError: no server of the action 'missing' appeared within 0.2 s",
     ),
-    'too slow': (
-        {'server': 'forever'},
+    'slow': (
         ', with: {patience: 0.2}',
-        ("GoalTimeoutError: the goal of 'act' did not end within 0.2 s"),
+        "GoalTimeoutError: the goal of 'slow' did not end within 0.2 s",
     ),
-    'aborted': ({'server': 'fail'}, '', 'end: aborted'),
+    'failing': ('', 'end: aborted'),
+}
+SERVERS = {
+    'refused': "count', accept: 'parts:refuse",
+    'slow': 'forever',
+    'failing': 'fail',
 }
 
 
-@pytest.mark.parametrize('kind', ERRORS)
-def test_a_client_is_told_why_a_goal_does_not_succeed(compose, kind):
-    system, arguments, message = ERRORS[kind]
-    text = acting('send_and_tell', **system).replace(
-        "'parts:send_and_tell'", f"'parts:send_and_tell'{arguments}"
-    )
-    child = compose(text, CODE)
+def test_a_client_is_told_why_a_goal_does_not_succeed(compose):
+    clients = {
+        kind: {
+            'behaviour': 'send_and_tell',
+            'client': f', action: {kind}',
+            'with': arguments,
+        }
+        for kind, (arguments, _) in ERRORS.items()
+    }
+    child = compose(acting_together(clients, SERVERS), CODE)
 
-    assert child.wait_for_line(message) == f'[INFO] [client]: {message}'
+    for kind, (_, message) in ERRORS.items():
+        child.wait_for_line(f'[INFO] [{kind}]: {message}')
     assert child.stop() == 0
+    for kind, (_, message) in ERRORS.items():
+        assert f'[INFO] [{kind}]: {message}' in child.lines
 
 
-@pytest.mark.parametrize(('hear', 'take'), [('hear', 'take'), ('hear_async', 'take_async')])
-def test_feedback_and_result_behaviours_hear_all_in_order_and_never_beside_others(
-    compose, hear, take
-):
-    child = compose(
-        acting(
-            'send_only',
-            server='count',
-            client=f", feedback: 'parts:{hear}', result: 'parts:{take}'",
-            more="other: {period: 0.003, behaviour: 'parts:alone'}",
-        ),
-        CODE,
-    )
-    child.wait_for_line('result: ')
+def test_feedback_and_result_behaviours_hear_all_in_order_and_never_beside_others(compose):
+    clients = {
+        name: {
+            'behaviour': 'send_only',
+            'client': f", feedback: 'parts:{hear}', result: 'parts:{take}'",
+            'more': "other: {period: 0.003, behaviour: 'parts:alone'}",
+        }
+        for name, hear, take in (
+            ('plain', 'hear', 'take'),
+            ('coroutine', 'hear_async', 'take_async'),
+        )
+    }
+    child = compose(acting_together(clients, {'act': 'count'}), CODE)
+    for name in clients:
+        child.wait_for_line(f'[{name}]: result: ')
 
-    told = [line.partition('[client]: ')[2] for line in child.matching('[client]: ')]
-    assert told == [*(f'feedback: [{step}]' for step in range(5)), 'result: [5]']
+    for name in clients:
+        told = [line.partition(f'[{name}]: ')[2] for line in child.matching(f'[{name}]: ')]
+        assert told == [*(f'feedback: [{step}]' for step in range(5)), 'result: [5]']
     assert child.stop() == 0
 
 
@@ -294,24 +314,27 @@ def test_the_result_behaviour_hears_of_an_aborted_goal_too(compose):
     child.wait_for_line('[client]: result: []')
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'server'),
-    [
-        ('wait_for_result', 'forever'),
-        ('wait_for_result_async', 'forever'),
-        ('wait_for_feedback', 'forever'),
-        ('wait_for_server', None),
-    ],
-)
-@pytest.mark.parametrize('of', ['timer', 'on_start'])
-def test_a_signal_ends_behaviours_that_wait_for_goals(compose, behaviour, server, of):
-    text = acting(behaviour, server=server)
-    if of == 'on_start':
-        text = text.replace('timers:\n', f'on_start: parts:{behaviour}\n').replace(
-            f"              tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}\n", ''
-        )
-    child = compose(text, CODE)
-    child.wait_for_line('waiting')
+WAITING = ['wait_for_result', 'wait_for_result_async', 'wait_for_feedback', 'wait_for_server']
+
+
+def test_a_signal_ends_timers_that_wait_for_goals(compose):
+    clients = {behaviour: {'behaviour': behaviour} for behaviour in WAITING}
+    clients['wait_for_server']['client'] = ', action: missing'
+    child = compose(acting_together(clients, {'act': 'forever'}), CODE)
+    check_that_a_signal_ends_it(child, waiting=len(WAITING))
+
+
+@pytest.mark.parametrize('behaviour', WAITING)
+def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
+    text = acting(behaviour, server=None if behaviour == 'wait_for_server' else 'forever')
+    text = text.replace('timers:\n', f'on_start: parts:{behaviour}\n').replace(
+        f"              tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}\n", ''
+    )
+    check_that_a_signal_ends_it(compose(text, CODE))
+
+
+def check_that_a_signal_ends_it(child, waiting=1):
+    child.wait_for_line('waiting', times=waiting)
 
     assert child.stop(signal.SIGINT) == 0
     assert 'rror' not in child.output

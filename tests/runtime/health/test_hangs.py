@@ -90,86 +90,99 @@ def stack_after(child, line):
     return '\n'.join(child.lines[begin:end])
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'functions'),
-    [
-        ('hang', ['hang', 'wait_for']),
-        ('hang_inside', ['hang_inside', 'wait_for']),
-        ('hang_async', ['hang_async', 'pause']),
-        ('block_async', ['block_async', 'block', 'wait_for']),
-        ('hang_async_generator', ['hang_async_generator', 'pause']),
-    ],
-)
-def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends(
-    compose, behaviour, functions
-):
+HANGING = {
+    'hang': ['hang', 'wait_for'],
+    'hang_inside': ['hang_inside', 'wait_for'],
+    'hang_async': ['hang_async', 'pause'],
+    'block_async': ['block_async', 'block', 'wait_for'],
+    'hang_async_generator': ['hang_async_generator', 'pause'],
+}
+
+
+def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends(compose):
+    timers = '\n'.join(
+        f"              {name}: {{period: 0.02, behaviour: 'parts:{name}', warn_after: 0.2, group: {name}}}"
+        for name in HANGING
+    )
     text = f"""
         version: 1
+        executor: {{threads: 8}}
         nodes:
           bad:
-            timers: {{stuck: {{period: 0.02, behaviour: 'parts:{behaviour}', warn_after: 0.2}}}}
+            timers:
+{timers}
           good:
             timers: {{live: {{period: 0.02, behaviour: 'parts:live'}}}}
     """
     child = compose(text, CODE)
-    line = child.wait_for_line('has been running for')
-    found = REPORT.fullmatch(line)
-    assert found, line
-    assert found.groups()[:2] == ("timer 'stuck'", '5')
-    assert float(found[3]) >= 0.2
+    reports = {}
+    for place, name in enumerate(HANGING, start=7):
+        line = child.wait_for_line(f"timer '{name}' (system.yaml:{place}) has been running for")
+        found = REPORT.fullmatch(line)
+        assert found, line
+        assert float(found[3]) >= 0.2
+        reports[name] = line
     alive = len(child.matching('alive'))
     child.wait_for_line('alive', times=alive + 20)
     (compose.folder / 'over').touch()
-    end = child.wait_for_line(' returned after ')
-    assert re.fullmatch(
-        r"\[WARN\] \[bad\]: timer 'stuck' \(system.yaml:5\) returned after \d+\.\d s", end
-    )
+    for place, name in enumerate(HANGING, start=7):
+        timer = f"timer '{name}' (system.yaml:{place})"
+        end = child.wait_for_line(f'{timer} returned after ')
+        assert re.fullmatch(rf'\[WARN\] \[bad\]: {re.escape(timer)} returned after \d+\.\d s', end)
     child.stop()
 
-    stack = [text for text in stack_after(child, line).splitlines() if text.startswith('  File')]
-    assert [text.rpartition(' in ')[2] for text in stack if 'parts.py' in text] == functions
-    assert 'composer/' not in stack[0]
-    assert len(child.matching('has been running for')) == 1
+    for name, functions in HANGING.items():
+        lines = stack_after(child, reports[name]).splitlines()
+        stack = [text for text in lines if text.startswith('  File')]
+        assert [text.rpartition(' in ')[2] for text in stack if 'parts.py' in text] == functions
+        assert 'composer/' not in stack[0]
+    assert len(child.matching('has been running for')) == len(HANGING)
 
 
 @pytest.mark.parametrize(
-    ('own', 'node', 'defaults', 'is_reported'),
+    ('defaults', 'limits'),
     [
-        ('null', '0.1', '0.1', False),
-        ('0.1', 'null', 'null', True),
-        (None, '0.1', 'null', True),
-        (None, 'null', '0.1', False),
-        (None, None, '0.1', True),
+        ('0.1', {('null', '0.1'): False, (None, 'null'): False, (None, None): True}),
+        ('null', {('0.1', 'null'): True, (None, '0.1'): True}),
     ],
 )
 def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
-    compose, own, node, defaults, is_reported
+    compose, defaults, limits
 ):
     def key(value):
         return '' if value is None else f', warn_after: {value}'
 
-    text = f"""
-        version: 1
-        defaults: {{log_level: info{key(defaults)}}}
-        nodes:
-          bad:
+    nodes = '\n'.join(
+        f"""
+          bad_{number}:
             timers: {{stuck: {{period: 0.02, behaviour: 'parts:hang'{key(own)}}}}}
             description: a node
             {key(node).removeprefix(', ')}
+"""
+        for number, (own, node) in enumerate(limits)
+    )
+    text = f"""
+        version: 1
+        executor: {{threads: 8}}
+        defaults: {{warn_after: {defaults}}}
+        nodes:
+{nodes}
           witness:
             warn_after: 0.3
             timers: {{stuck: {{period: 0.02, behaviour: 'parts:hang'}}}}
     """
     child = compose(text, CODE)
-    report = "[bad]: timer 'stuck' (system.yaml:6) has been"
     child.wait_for_line('[witness]: timer')
-    if is_reported:
-        child.wait_for_line(report)
+    for number, is_reported in enumerate(limits.values()):
+        if is_reported:
+            child.wait_for_line(f"[bad_{number}]: timer 'stuck' (system.yaml:")
     (compose.folder / 'over').touch()
     child.wait_for_line('[witness]: timer', times=2)
     assert child.stop() == 0
 
-    assert bool(child.matching(report)) is is_reported
+    reports = child.matching('has been running for')
+    for number, is_reported in enumerate(limits.values()):
+        assert any(f'[bad_{number}]: ' in line for line in reports) is is_reported
 
 
 def test_what_is_slow_again_and_again_is_not_told_each_time(compose):
@@ -210,45 +223,56 @@ def test_a_wait_for_a_service_counts_like_any_other_time(compose):
     assert 'in call' in stack_after(child, line)
 
 
-@pytest.mark.parametrize('behaviour', ['hang', 'hang_async'])
-def test_a_service_that_hangs_is_reported(compose, peer, behaviour):
+def test_a_service_that_hangs_is_reported(compose, peer):
+    behaviours = ('hang', 'hang_async')
+    services = '\n'.join(
+        f"              {name}: {{type: std_srvs/srv/Trigger, behaviour: 'parts:{name}', warn_after: 0.1, group: {name}}}"
+        for name in behaviours
+    )
     text = f"""
         version: 1
         nodes:
           bad:
             services:
-              ask: {{type: std_srvs/srv/Trigger, behaviour: 'parts:{behaviour}', warn_after: 0.1}}
+{services}
     """
     child = compose(text, CODE)
     child.wait_until_ready()
-    client = peer.node.create_client(Trigger, 'ask')
-    assert client.wait_for_service(30)
-    client.call_async(Trigger.Request())
-    line = child.wait_for_line("[bad]: service 'ask' (system.yaml:6) has been running for")
+    for name in behaviours:
+        client = peer.node.create_client(Trigger, name)
+        assert client.wait_for_service(30)
+        client.call_async(Trigger.Request())
+    reports = {
+        name: child.wait_for_line(
+            f"[bad]: service '{name}' (system.yaml:{place}) has been running for"
+        )
+        for place, name in enumerate(behaviours, start=6)
+    }
     (compose.folder / 'over').touch()
-    child.wait_for_line("[bad]: service 'ask' (system.yaml:6) returned after")
-
-    assert f'in {behaviour}' in stack_after(child, line)
-
-
-HOOKS = """
-version: 1
-nodes:
-  bad:
-    warn_after: 0.1
-    {hook}: parts:hang
-"""
+    for place, name in enumerate(behaviours, start=6):
+        child.wait_for_line(f"[bad]: service '{name}' (system.yaml:{place}) returned after")
+        assert f'in {name}' in stack_after(child, reports[name])
 
 
-@pytest.mark.parametrize('hook', ['on_start', 'on_stop'])
-def test_hooks_of_a_node_that_hang_are_reported(compose, hook):
-    child = compose(HOOKS.format(hook=hook), CODE)
-    if hook == 'on_stop':
-        child.wait_until_ready()
-        child.send(2)
-    child.wait_for_line(f'[bad]: {hook} (system.yaml:6) has been running for')
+def test_hooks_of_a_node_that_hang_are_reported(compose):
+    text = """
+        version: 1
+        nodes:
+          bad:
+            warn_after: 0.1
+            on_start: parts:hang
+            on_stop: parts:hang
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('[bad]: on_start (system.yaml:6) has been running for')
     (compose.folder / 'over').touch()
-    child.wait_for_line(f'[bad]: {hook} (system.yaml:6) returned after')
+    child.wait_for_line('[bad]: on_start (system.yaml:6) returned after')
+    child.wait_until_ready()
+    (compose.folder / 'over').unlink()
+    child.send(2)
+    child.wait_for_line('[bad]: on_stop (system.yaml:7) has been running for')
+    (compose.folder / 'over').touch()
+    child.wait_for_line('[bad]: on_stop (system.yaml:7) returned after')
 
 
 ACTION = """

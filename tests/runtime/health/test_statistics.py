@@ -11,7 +11,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.validate_node_name import validate_node_name
 
 from composer.executor import MissedCounts
-from composer.runtime.behaviours.calls import FAILED, BehaviourCall, RunningCall, RunningCalls
+from composer.runtime.behaviours.calls import (
+    FAILED,
+    BehaviourCall,
+    Owner,
+    RunningCall,
+    RunningCalls,
+)
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.diagnostics_publisher import node_name
 from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry
@@ -124,13 +130,13 @@ def test_a_huge_error_that_ros_cannot_say_is_made_short_and_sayable():
 
 def test_counts_survive_that_the_node_is_built_anew():
     board = HealthRegistry()
-    old = board.entity('/a', "timer 'b'")
+    old = board.entity('/a', Owner('timer', 'b'))
     counts = [MissedCounts(late_ticks=2)]
     old.follow(lambda: counts[-1])
     old.report(1.0, 0.0)
     counts.append(MissedCounts())  # Its timer has been destroyed.
     assert old.report(1.0, 0.0).all_missed == MissedCounts(late_ticks=2)
-    new = board.entity('/a', "timer 'b'")
+    new = board.entity('/a', Owner('timer', 'b'))
     new.follow(lambda: MissedCounts(late_ticks=1, skipped_ticks=4))
     report = new.report(1.0, 0.0)
     assert report.all_missed == MissedCounts(late_ticks=3, skipped_ticks=4)
@@ -139,12 +145,12 @@ def test_counts_survive_that_the_node_is_built_anew():
 
 def test_the_board_knows_the_oldest_call_of_each_entity():
     board = HealthRegistry()
-    for owner in ("timer 'b'", "timer 'c'"):
+    for owner in (Owner('timer', 'b'), Owner('timer', 'c')):
         board.entity('/a', owner)
-    running = [('/a', RunningCall("timer 'b'", begun_ns, 1)) for begun_ns in (9, 4, 6)]
+    running = [('/a', RunningCall(Owner('timer', 'b'), begun_ns, 1)) for begun_ns in (9, 4, 6)]
     reports = board.reports(1.0, [(node, call) for node, call in running], 4 + 2 * 10**9)
-    assert reports['/a', "timer 'b'"].overdue_sec == 2.0
-    assert reports['/a', "timer 'c'"].overdue_sec == 0.0
+    assert reports['/a', Owner('timer', 'b')].overdue_sec == 2.0
+    assert reports['/a', Owner('timer', 'c')].overdue_sec == 0.0
 
 
 def measured_call(function, times, failed=lambda owner, error: None):
@@ -195,7 +201,7 @@ def status_of(owner, durations=(), errors=(), missed=None, overdue_sec=0.0):
 
 
 def test_a_status_is_named_as_diagnostic_tools_expect_it():
-    status = status_of("timer 'tick'", [1_000_000] * 5)
+    status = status_of(Owner('timer', 'tick'), [1_000_000] * 5)
     assert (status.name, status.hardware_id) == ('/ns/talker: timer tick', 'robot')
     assert (status.level, status.message) == (DiagnosticStatus.OK, 'called')
     assert {pair.key: pair.value for pair in status.values} == {
@@ -213,36 +219,36 @@ def test_a_status_is_named_as_diagnostic_tools_expect_it():
 def test_only_subscriptions_have_overruns_and_services_neither():
     keys = {
         owner: {pair.key for pair in status_of(owner).values}
-        for owner in ("subscription 'in'", "service 'ask'")
+        for owner in (Owner('subscription', 'in'), Owner('service', 'ask'))
     }
-    assert keys["subscription 'in'"] - keys["service 'ask'"] == {'queue overruns'}
-    assert not {'late ticks', 'skipped ticks', 'queue overruns'} & keys["service 'ask'"]
+    assert keys[Owner('subscription', 'in')] - keys[Owner('service', 'ask')] == {'queue overruns'}
+    assert not {'late ticks', 'skipped ticks', 'queue overruns'} & keys[Owner('service', 'ask')]
 
 
 @pytest.mark.parametrize(
     ('owner', 'arguments', 'level', 'message'),
     [
-        ("timer 'a'", {}, DiagnosticStatus.OK, 'not called'),
+        (Owner('timer', 'a'), {}, DiagnosticStatus.OK, 'not called'),
         (
-            "timer 'a'",
+            Owner('timer', 'a'),
             {'missed': MissedCounts(late_ticks=1, skipped_ticks=3)},
             DiagnosticStatus.WARN,
             '1 late tick; 3 skipped ticks',
         ),
         (
-            "subscription 'a'",
+            Owner('subscription', 'a'),
             {'missed': MissedCounts(overruns=2)},
             DiagnosticStatus.WARN,
             '2 messages dropped from the full queue',
         ),
         (
-            "service 'a'",
+            Owner('service', 'a'),
             {'overdue_sec': 12.34},
             DiagnosticStatus.WARN,
             'a call has been running for 12.3 s',
         ),
         (
-            "timer 'a'",
+            Owner('timer', 'a'),
             {'errors': [KeyError('x'), ValueError('boom')], 'missed': MissedCounts(late_ticks=2)},
             DiagnosticStatus.ERROR,
             '2 errors, last: ValueError: boom; 2 late ticks',
@@ -256,7 +262,7 @@ def test_the_level_and_the_message_tell_what_is_wrong(owner, arguments, level, m
 
 def test_a_status_is_right_again_when_the_period_was():
     health = EntityHealth()
-    writer = StatusWriter('/a', "timer 'b'", 'robot')
+    writer = StatusWriter('/a', Owner('timer', 'b'), 'robot')
     health.note_error(ValueError('boom'))
     assert writer.write(health.report(1.0, 0.0)).level == DiagnosticStatus.ERROR
     health.times.add(3_000_000)

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def greet(node: Node) -> str:
-    """Return the greeting that is published next."""
+    """Return the greeting to publish."""
     return f'Hello {node.parameters.who}!'
 
 
 def hear(node: Node, message: String) -> None:
-    """Say what was heard."""
+    """Log the greeting."""
     node.logger.info(f'I heard: {message.data}')

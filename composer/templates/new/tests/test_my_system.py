@@ -1,4 +1,4 @@
-"""The system has no faults, and does what it is for. It runs for real, as `composer up` does."""
+"""The system has no errors and works. It runs with real nodes, as with `composer up`."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ COMPOSER = [sys.executable, '-m', 'composer']
 DEADLINE_SEC = 30.0
 
 
-def test_it_has_no_faults():
+def test_it_has_no_errors():
     done = subprocess.run(
         [*COMPOSER, 'check', '--strict', 'configs'], cwd=ROOT, capture_output=True, text=True
     )
@@ -23,7 +23,7 @@ def test_it_has_no_faults():
 
 @pytest.fixture
 def system():
-    """Run the system, in a ROS domain of its own if none is set; it is gone when the test ends."""
+    """Run the system until the test ends, in a ROS domain of its own if none is set."""
     with subprocess.Popen(
         [*COMPOSER, 'up', 'configs/my_system.yaml', 'who:=Alice'],
         cwd=ROOT,
@@ -39,14 +39,14 @@ def system():
         process.kill()
 
 
-def test_the_listener_hears_the_greeting_and_the_system_ends_when_asked(system):
+def test_the_listener_gets_the_greeting_and_the_system_stops_cleanly(system):
     output = []
     for line in system.stdout:
         output.append(line)
         if 'I heard: Hello Alice!' in line:
             break
     else:
-        pytest.fail('nothing was heard:\n' + ''.join(output))
+        pytest.fail('no greeting:\n' + ''.join(output))
     system.send_signal(signal.SIGINT)
     rest = system.stdout.read()
     assert system.wait() == 0, rest
