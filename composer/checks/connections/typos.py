@@ -42,8 +42,8 @@ def check_typos(context: CheckContext) -> Iterator[Diagnostic]:
 def find_typo(word: str, options: Iterable[str]) -> str | None:
     """Return the option that a word is a misspelling of, and not a name in its own right.
 
-    One part of it, between slashes and underscores, has a slip; a long one may have two. Numbers
-    are no typos.
+    One part of it, between slashes and underscores, has a typo; a long one may have two. Other
+    numbers are no typos.
     """
     parts = _SEPARATORS.split(word)
     for option in options:
