@@ -70,7 +70,7 @@ def _explain(
 ) -> Diagnostic:
     inner = (*end.path, channel.kind)
     at = context.at_value if inner in context.system.positions.values else context.at_key
-    help_text = "say 'external: true' if the other end is elsewhere"
+    help_text = "write 'external: true' if the other end is elsewhere"
     return at(
         inner,
         rule,
