@@ -21,10 +21,10 @@ from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.wait_for import WaitingStarter, describe_parts, list_waiters
+from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.runtime.behaviours.calls import RunningCall
@@ -155,7 +155,7 @@ class System:
         if self.stop_requested:
             return
         elapsed = monotonic() - self._begun
-        parts = describe_parts(self._nodes, self._processes.by_name)
+        parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
 
@@ -215,14 +215,14 @@ class System:
             self.request_stop(code)
 
     def _publish_diagnostics(self) -> None:
-        board, period_sec = self._handle.health, self._spec.diagnostics_period_sec
-        if board is None or period_sec is None:
+        health, period_sec = self._handle.health, self._spec.diagnostics_period_sec
+        if health is None or period_sec is None:
             return
-        publisher = DiagnosticsPublisher(self._spec.name, period_sec, board, self._overdue_calls)
+        publisher = DiagnosticsPublisher(self._spec.name, period_sec, health, self._overdue_calls)
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'there will be no /diagnostics: {error}')
+            system_logger.warn(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 
@@ -264,3 +264,10 @@ def _limits(spec: SystemSpec) -> Iterator[float | None]:
         for kind in ENTITY_KINDS:
             for entity in getattr(node, kind.section).values():
                 yield getattr(entity, 'warn_after_sec', None)
+
+
+def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
+    """Return `2 nodes and 1 process`; what there is none of is left out."""
+    counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
+    parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
+    return ' and '.join(parts) or '0 nodes'

@@ -86,10 +86,10 @@ class HangLimit:
 
 
 class WatchedNode(Protocol):
-    """What is looked at of a node.
+    """What `HangWatcher` checks of a node.
 
     Attributes:
-        limits: By the entities in words.
+        limits: By the owners of the behaviours.
     """
 
     @property

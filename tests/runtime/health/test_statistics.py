@@ -1,4 +1,4 @@
-"""How entities fare: the numbers, and what a diagnostic status says of them."""
+"""The health of entities: the numbers, and the diagnostic status made of them."""
 
 import random
 import threading
