@@ -166,7 +166,7 @@ def test_names_are_remapped_as_rclpy_has_it(rules, namespace, context):
         ('a/', 'a topic name does not end with a slash'),
         ('a//b', 'a topic name has no two slashes in a row'),
         ('a/1', 'no part of a topic name begins with a digit'),
-        ('a/~', "'~' stands only at the beginning of a topic name, before a slash"),
+        ('a/~', "'~' is only allowed at the start of a topic name, before a slash"),
         ('{node', 'a topic name has a brace without its partner'),
         ('{x}', "'{x}' is no substitution of ROS: {node}, {ns}, {namespace}"),
         ('a' * 248, 'a topic name has at most 247 characters'),

@@ -68,7 +68,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_wiring,
     check_slips,
 )
-_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
+_MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
 
 
 def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> CheckContext | None:

@@ -46,7 +46,7 @@ def _check_mapping(
         elif isinstance(value, dict) and value:
             yield from _check_mapping(context, value, at, f'{name}.', seen)
         elif name in seen:
-            yield context.at_key(at, _RULE, f"the parameter '{name}' stands here a second time")
+            yield context.at_key(at, _RULE, f"the parameter '{name}' is given twice")
         else:
             seen[name] = at
             for place, message in _find_faults(value):

@@ -144,7 +144,7 @@ class _Expansion:
         name, *others = foreach
         at = (*path, name)
         if not is_variable_name(name):
-            self._report(at, f"'{name}' cannot stand in an expression as a name")
+            self._report(at, f"'{name}' cannot be used as a name in expressions")
             return
         values = evaluator.evaluate(foreach[name], at)
         is_sample = evaluator.is_sampled(at)

@@ -197,4 +197,4 @@ class Sandbox(SandboxedEnvironment):
 
 def too_deep() -> TemplateRuntimeError:
     """Return the error for an expression that Python's stack does not hold."""
-    return TemplateRuntimeError('the expression nests too deep')
+    return TemplateRuntimeError('the expression is nested too deeply')

@@ -175,8 +175,8 @@ class TemplateEvaluator:
             diagnostic_at(
                 self.positions.key(path),
                 'duplicate-key',
-                f"the key '{key}' stands twice in one mapping",
-                related=[Related('it stands here too', self.positions.key(other))],
+                f"the key '{key}' appears twice in one mapping",
+                related=[Related('also used here', self.positions.key(other))],
             )
         )
 
@@ -200,7 +200,7 @@ def _as_data(value: Any) -> Any:
     if isinstance(value, str):
         return str(value)
     if isinstance(value, int) and value.bit_length() > _MAX_BITS:
-        message = f'a number of {value.bit_length()} bits fits no type of ROS'
+        message = f'a number of {value.bit_length()} bits does not fit any ROS type'
         raise TemplateRuntimeError(message)
     if value is None or isinstance(value, bool | int | float):
         return value
@@ -208,7 +208,7 @@ def _as_data(value: Any) -> Any:
         return [_as_data(item) for item in value]
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
         return {str(key): _as_data(item) for key, item in value.items()}
-    message = f'the expression gives a {type(value).__name__}, which YAML has no place for'
+    message = f'the expression gives a {type(value).__name__}, which YAML cannot represent'
     raise TemplateRuntimeError(message)
 
 

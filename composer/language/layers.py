@@ -60,7 +60,7 @@ class _Merging:
             at = (*path, key)
             if value is None and not is_null_a_value(at):
                 if key not in merged:
-                    self._report(at, f"null removes '{key}', which is not there", below)
+                    self._report(at, f"null removes '{key}', which does not exist", below)
                 merged.pop(key, None)
                 self.positions.remove(at)
             elif isinstance(value, dict) and isinstance(merged.get(key), dict):
@@ -82,7 +82,7 @@ class _Merging:
             if each is not None or is_null_a_value(at):
                 kept[key] = self._without_removals(each, at)
             else:
-                self._report(at, f"null removes '{key}', which is not there", {})
+                self._report(at, f"null removes '{key}', which does not exist", {})
         return kept
 
     def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:

@@ -98,7 +98,7 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
         chain.append(following)
     base = BUILTIN_PROFILES.get(chain[-1].profile)
     if base is None:
-        message = f"no QoS profile is called '{chain[-1].profile}'"
+        message = f"there is no QoS profile '{chain[-1].profile}'"
         raise UnknownProfileError(message, chain[-1])
     policies = dict(base)
     for link in reversed(chain):

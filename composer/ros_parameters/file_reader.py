@@ -150,7 +150,7 @@ class _Reader:
             if advice := suggest(key, [PARAMETERS_KEY]):
                 self._fault(
                     key_node.span,
-                    f"'{key}' is no key of parameter files",
+                    f"'{key}' is not a key of parameter files",
                     advice,
                 )
                 continue
@@ -170,7 +170,7 @@ class _Reader:
             message = f"'{key}' is taken as '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
         if place is None:
-            message = f"'{PARAMETERS_KEY}' stands below the name of a node"
+            message = f"'{PARAMETERS_KEY}' belongs below the name of a node"
             self._fault(key_node.span, message, _SHAPE_HELP)
         elif fault := find_pattern_fault(pattern):
             self._fault(place, f"'{pattern}': {fault}")
@@ -249,29 +249,27 @@ class _Reader:
                 'remove it',
             )
         elif key.startswith(PARAMETERS_KEY):
-            message = f"'{PARAMETERS_KEY}' stands inside of '{PARAMETERS_KEY}'"
-            self._fault(key_node.span, message, 'names of nodes stand above it')
+            message = f"'{PARAMETERS_KEY}' is inside another '{PARAMETERS_KEY}'"
+            self._fault(key_node.span, message, 'put it below the name of a node')
 
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
         what = (
-            'nothing stands here'
+            'this one is empty'
             if isinstance(node, ScalarNode)
-            else 'this is a list or a mapping'
+            else 'this one is a list or a mapping'
         )
         self._fault(node.span, f'a key is a text, and {what}')
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:
         if advice := suggest(key, [PARAMETERS_KEY]):
-            message = f"'{key}' is no key of parameter files"
+            message = f"'{key}' is not a key of parameter files"
             self._fault(node.span, message, advice)
             return
         help_text = _help_for(node) or _SHAPE_HELP
-        self._fault(
-            node.span, f"a value stands here, and no '{PARAMETERS_KEY}' above it", help_text
-        )
+        self._fault(node.span, f"this value has no '{PARAMETERS_KEY}' above it", help_text)
 
     def _fault(self, span: Span, message: str, help_text: str | None = None) -> None:
         self.faults.append(diagnostic_at(span, RULE, message, help=help_text))

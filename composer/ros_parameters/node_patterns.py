@@ -51,4 +51,4 @@ def matches_pattern(pattern: str, full_name: str) -> bool:
 
 
 def _add_wildcards(fault: str, part: str) -> str:
-    return f"{fault}; '*' and '**' stand alone between slashes" if '*' in part else fault
+    return f"{fault}; '*' and '**' must be alone between slashes" if '*' in part else fault

@@ -87,7 +87,7 @@ def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
     listed = ' and '.join(f"'{key}'" for key in keys)
     return Violation(
         'conflicting-keys',
-        f'{listed} exclude each other{owner_of(error)}',
+        f'{listed} cannot be used together{owner_of(error)}',
         (*path, last),
         (*path, last),
         at_key=True,

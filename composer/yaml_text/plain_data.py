@@ -115,7 +115,7 @@ class _Constructor:
             self._fault(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
-            self._fault(node, 'bad-key', 'a key is a string, and nothing stands here')
+            self._fault(node, 'bad-key', 'a key is a string, and this one is empty')
             return None
         self._fault(
             node,
@@ -126,12 +126,12 @@ class _Constructor:
         return node.text
 
     def _duplicate(self, key: str, node: TreeNode, span: Span) -> None:
-        first = Related('it stands here first', span)
+        first = Related('first used here', span)
         self.faults.append(
             diagnostic_at(
                 node.span,
                 'duplicate-key',
-                f"the key '{key}' stands twice in one mapping",
+                f"the key '{key}' appears twice in one mapping",
                 help='merge several with <<: [*one, *two]'
                 if key == _MERGE_KEY
                 else f'keep one; the first is in line {first.span.line}',

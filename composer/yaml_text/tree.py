@@ -146,7 +146,7 @@ class _TreeBuilder:
         self._add(node, event.anchor)
         self._open.append(node)
         if len(self._open) > MAX_DEPTH:
-            self._stop(event, 'too-deep', f'the data nest more than {MAX_DEPTH} levels deep')
+            self._stop(event, 'too-deep', f'the data is nested more than {MAX_DEPTH} levels deep')
 
     def _add(self, node: TreeNode, anchor: str | None) -> None:
         self._nodes += 1
@@ -173,9 +173,7 @@ class _TreeBuilder:
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(
-                event, 'unknown-alias', f'no anchor &{event.anchor} stands before this alias'
-            )
+            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} before this alias')
         if node in self._open:
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
         return node

@@ -45,7 +45,7 @@ def findings(parameters):
             'f: {g: {}}',
             "parameter 'f.g': the mapping is empty, and ROS misreads what follows one",
         ),
-        ('f.g: 1, f: {g: 2}', "the parameter 'f.g' stands here a second time"),
+        ('f.g: 1, f: {g: 2}', "the parameter 'f.g' is given twice"),
     ],
 )
 def test_what_ros_refuses_or_misreads_is_a_finding(parameters, finding):

@@ -92,7 +92,7 @@ nodes:
         ('[1, 2]', 'bad-foreach', "foreach is a mapping, as in 'foreach: {i: [1, 2]}'"),
         ('{}', 'bad-foreach', 'foreach has no variable in it'),
         ('{i: 3}', 'bad-foreach', "'i' takes a list of values, not 3"),
-        ('{in: [3]}', 'bad-foreach', "'in' cannot stand in an expression as a name"),
+        ('{in: [3]}', 'bad-foreach', "'in' cannot be used as a name in expressions"),
         ('{i: "{{ nope }}"}', 'undefined-name', "'nope' is not defined"),
     ],
 )

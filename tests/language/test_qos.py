@@ -72,7 +72,7 @@ def test_an_unknown_profile_is_told_with_the_qos_that_names_it():
     profiles = {'slow': qos('nowhere', ('qos', 'slow'))}
     with pytest.raises(UnknownProfileError) as raised:
         resolve_qos(qos('slow', ('here',)), profiles)
-    assert str(raised.value) == "no QoS profile is called 'nowhere'"
+    assert str(raised.value) == "there is no QoS profile 'nowhere'"
     assert raised.value.spec.path == ('qos', 'slow')
 
 

@@ -71,7 +71,7 @@ def test_several_documents_are_read_as_one():
 def test_a_document_that_is_no_mapping_is_refused(document):
     file = parse_parameter_file(f'/**: {{ros__parameters: {{a: 1}}}}\n--- {document}\n', 'p.yaml')
     (fault,) = file.faults
-    assert fault.message == "a value stands here, and no 'ros__parameters' above it"
+    assert fault.message == "this value has no 'ros__parameters' above it"
 
 
 def test_a_value_knows_its_place():
@@ -90,11 +90,11 @@ def test_a_file_may_hold_nothing(text):
 
 
 FAULTS = {
-    'a: 1': ("1:4 a value stands here, and no 'ros__parameters' above it"),
-    '- a': ("1:1 a value stands here, and no 'ros__parameters' above it"),
-    'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is no key of parameter files",
+    'a: 1': ("1:4 this value has no 'ros__parameters' above it"),
+    '- a': ("1:1 this value has no 'ros__parameters' above it"),
+    'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is not a key of parameter files",
     'a:\n  ros__parameterss: {b: 1}': "2:3 'ros__parameterss' is taken as 'ros__parameters'",
-    'ros__parameters: {b: 1}': "1:1 'ros__parameters' stands below the name of a node",
+    'ros__parameters: {b: 1}': "1:1 'ros__parameters' belongs below the name of a node",
     'a: {ros__parameters: 5}': "1:22 'ros__parameters' is a mapping of parameters",
     'a: {ros__parameters: }': "1:22 'ros__parameters' is a mapping of parameters",
     'a: {ros__parameters: {b: }}': "1:26 'b' has no value",
@@ -129,10 +129,10 @@ FAULTS = {
     ),
     '/ar*: {ros__parameters: {c: 1}}': (
         "1:1 '/ar*': a node name has only letters, digits and underscores; "
-        "'*' and '**' stand alone between slashes"
+        "'*' and '**' must be alone between slashes"
     ),
-    'a: {ros__parameters: {"": 1}}': '1:23 a key is a text, and nothing stands here',
-    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key is a text, and this is a list or a mapping',
+    'a: {ros__parameters: {"": 1}}': '1:23 a key is a text, and this one is empty',
+    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key is a text, and this one is a list or a mapping',
 }
 
 

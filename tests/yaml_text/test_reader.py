@@ -150,7 +150,7 @@ def test_an_anchor_may_be_given_anew():
         ('a: &a\n  <<: *a', '2:7: error[cyclic-alias]: the alias *a contains itself'),
         ('a: &a {b: &b {c: *a}}', '1:18: error[cyclic-alias]: the alias *a contains itself'),
         ('? &a [*a]\n: 1', '1:7: error[cyclic-alias]: the alias *a contains itself'),
-        ('a: *b\nb: &b 1', '1:4: error[unknown-alias]: no anchor &b stands before this alias'),
+        ('a: *b\nb: &b 1', '1:4: error[unknown-alias]: no anchor &b before this alias'),
         (
             'a: {<<: 3}',
             '1:9: error[bad-merge]: the merge key << takes a mapping, or a list of them',
@@ -191,10 +191,10 @@ def test_aliases_do_not_nest_deeper_than_text():
 
 def test_a_duplicate_key_shows_both_places():
     assert said('nodes:\n  rover: {}\n  "rover": {}\n') == [
-        "file.yaml:3:3: error[duplicate-key]: the key 'rover' stands twice in one mapping\n"
+        "file.yaml:3:3: error[duplicate-key]: the key 'rover' appears twice in one mapping\n"
         '  3 |   "rover": {}\n'
         '    |   ^^^^^^^\n'
-        '  file.yaml:2:3: it stands here first\n'
+        '  file.yaml:2:3: first used here\n'
         '  help: keep one; the first is in line 2'
     ]
 
@@ -285,7 +285,7 @@ def test_an_open_quote_says_where_it_was_opened():
 
 @pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? '])
 def test_ten_thousand_levels_are_one_finding(opening):
-    assert 'error[too-deep]: the data nest more than 100 levels deep' in first_line(
+    assert 'error[too-deep]: the data is nested more than 100 levels deep' in first_line(
         opening * 10_000
     )
 
@@ -342,7 +342,7 @@ def test_yaml_is_read_by_the_core_schema():
     ('text', 'line'),
     [
         ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not one of YAML's core schema"),
-        ('a: !!int x', "1:4: error[bad-scalar]: 'x' is no !!int"),
+        ('a: !!int x', "1:4: error[bad-scalar]: 'x' is not a !!int"),
         ('a: !!set {b}', '1:4: error[bad-tag]: a !!set is not allowed here'),
         (
             'a: !!python/object/apply:os.system [x]',
@@ -351,7 +351,7 @@ def test_yaml_is_read_by_the_core_schema():
         ('a: !!map [b]', '1:4: error[bad-tag]: a !!map is not allowed here'),
         ('1: a', '1:1: error[bad-key]: a key is a string, and 1 is not one'),
         ('null: a', '1:1: error[bad-key]: a key is a string, and null is not one'),
-        ('?\n: a', '1:2: error[bad-key]: a key is a string, and nothing stands here'),
+        ('?\n: a', '1:2: error[bad-key]: a key is a string, and this one is empty'),
         ('[a]: b', '1:1: error[bad-key]: a key is a string, not a list or a mapping'),
     ],
 )

@@ -192,7 +192,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
     if len(chain) == 1:
         message = (
             f"{first} waits for service '{first.service}', which its own callback group serves: "
-            'neither can go on'
+            'neither can continue'
         )
     else:
         names = [f"'{wait.service}'" for wait in chain]
@@ -201,7 +201,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         way = ' → '.join(names)
         message = (
             f'{first} waits for a chain of services that comes back to its own callback group, '
-            f'so that none can go on: {way}'
+            f'so none can continue: {way}'
         )
     return context.at_value(
         first.path,

@@ -87,7 +87,7 @@ def _explain(context: CheckContext, loop: list[_Relay], rule: str) -> Diagnostic
     return context.at_value(
         (*first.end.path, 'publish'),
         rule,
-        f'each message runs in a circle for ever: {way}',
+        f'messages go in a circle forever: {way}',
         help='publish on another topic, or let a behaviour return None where it ends',
         related=[
             context.related(relay.end.path, f"{relay.end} passes it on to '{relay.published}'")

@@ -122,7 +122,7 @@ def _related(
         while profile in context.spec.qos:
             spec = context.spec.qos[profile]
             if policy in spec.policies:
-                message = f"the profile '{profile}' says so"
+                message = f"the profile '{profile}' sets it"
                 yield context.related_value((*spec.path, policy), message)
                 break
             profile = spec.profile

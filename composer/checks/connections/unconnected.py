@@ -34,7 +34,7 @@ _OF_ACTIONS = '/_action/'
 _MOST_COMPARED = 5_000
 
 _MESSAGES = {
-    'publisher': ('no-subscription', "nothing in this system hears '{}'"),
+    'publisher': ('no-subscription', "nothing in this system subscribes to '{}'"),
     'subscription': ('no-publisher', "nothing in this system publishes '{}'"),
     'service client': ('no-server', "nothing in this system serves '{}'"),
     'action client': ('no-server', "nothing in this system serves '{}'"),
@@ -74,7 +74,7 @@ def _explain(
     rule, message = _MESSAGES[end.noun]
     inner = (*end.path, channel.kind)
     at = context.at_value if inner in context.system.positions.values else context.at_key
-    help_text = "say 'external: true' if the other end is elsewhere"
+    help_text = "write 'external: true' if the other end is elsewhere"
     return at(
         inner,
         rule,

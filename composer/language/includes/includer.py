@@ -137,8 +137,7 @@ class Includer:
                 yield diagnostic_at(
                     part.positions.key(('environment', name)),
                     'ignored-environment',
-                    f"'{name}' is not set: only the environment of the file that is started "
-                    'counts',
+                    f"'{name}' is not set: only the environment of the main file counts",
                     help="set it in that file, or for a process under 'env'",
                 )
 
