@@ -50,7 +50,7 @@ class ChannelBox:
         id: Its kind and full name, as in `topic:/robot/scan`.
         types: The types that its ends declare; more than one is an error.
         namespace: The deepest one that has all its ends.
-        external: The sides on which an end is outside the system.
+        external: The sides on which an end is outside the system, by `external: true`.
         path: The path of the end that is declared first.
         findings: Its findings, as indices into those of the picture.
     """
