@@ -72,7 +72,7 @@ def _find_list_faults(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]
             yield (index,), f'item {index}: {_NO_NULL}'
         elif isinstance(item, list | dict):
             what = 'lists' if isinstance(item, list) else 'mappings'
-            yield (index,), f'item {index}: a list of parameters holds no {what}'
+            yield (index,), f'item {index}: a list of parameters cannot contain {what}'
         elif infer_parameter_type([items[0], item]) is None:
             types = (infer_parameter_type(each) for each in (item, items[0]))
             own, first = (with_article(str(each)) for each in types)

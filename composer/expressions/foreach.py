@@ -83,7 +83,7 @@ class _Expansion:
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
             is_repeated = _FOREACH in entry
             if entry.get(_FOREACH) == {}:
-                self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
+                self._report((*path, _FOREACH), f'{_FOREACH} has no variables')
                 self._document.dropped.add(path)
                 continue
             before = len(self._document.diagnostics)
@@ -136,7 +136,7 @@ class _Expansion:
         """Yield an evaluator for each combination of values, the last variable's fastest."""
         evaluator = evaluator or self._evaluator
         if not isinstance(foreach, dict):
-            self._report(path, f"{_FOREACH} is a mapping, as in 'foreach: {{i: [1, 2]}}'")
+            self._report(path, f"{_FOREACH} must be a mapping, as in 'foreach: {{i: [1, 2]}}'")
             return
         if not foreach:
             yield evaluator
@@ -163,7 +163,7 @@ class _Expansion:
         if path in self._document.dropped:
             return False
         if not isinstance(holds, bool):
-            self._report(path, f'{_WHEN} is true or false, not {holds!r}')
+            self._report(path, f'{_WHEN} must be true or false, not {holds!r}')
             return False
         return holds
 
@@ -190,8 +190,8 @@ class _Expansion:
             diagnostic_at(
                 self._evaluator.positions.key((*path, _FOREACH)),
                 'too-many-entries',
-                f'there are more than {self._limit:,} entries in {self._section}',
-                help="if that is meant, raise 'max_nodes' at the top of the file",
+                f'{self._section} has more than {self._limit:,} entries',
+                help="raise 'max_nodes' at the top of the file if that is intended",
             )
         )
 

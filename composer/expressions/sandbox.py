@@ -103,7 +103,7 @@ class Sandbox(SandboxedEnvironment):
         parser = Parser(self, code, state='variable')
         expression = parser.parse_expression()
         if not parser.stream.eos:
-            message = 'chunk after expression'
+            message = 'unexpected text after the expression'
             raise TemplateSyntaxError(message, parser.stream.current.lineno)
         expression.set_environment(self)
         return expression

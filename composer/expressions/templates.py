@@ -184,7 +184,7 @@ class TemplateEvaluator:
 def _describe(error: Exception) -> str:
     """Return what went wrong in one line."""
     if isinstance(error, SecurityError):
-        return f'the sandbox refuses the expression: {error.message}'
+        return f'the expression is not allowed: {error.message}'
     if isinstance(error, TemplateSyntaxError):
         return str(error.message).replace("'end of template'", 'end of the expression')
     message = str(error) or type(error).__name__
@@ -208,7 +208,7 @@ def _as_data(value: Any) -> Any:
         return [_as_data(item) for item in value]
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
         return {str(key): _as_data(item) for key, item in value.items()}
-    message = f'the expression gives a {type(value).__name__}, which YAML cannot represent'
+    message = f'the expression returns a {type(value).__name__}, which YAML cannot represent'
     raise TemplateRuntimeError(message)
 
 

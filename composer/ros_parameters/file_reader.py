@@ -141,7 +141,7 @@ class _Reader:
             if '/' in key and prefix and not ends:
                 self._fault(
                     key_node.span,
-                    f"after '{key}', ROS takes the names that follow to be in another namespace",
+                    f"ROS puts the names after '{key}' into another namespace",
                     'write names with slashes at the top of the file, or as the last of a mapping',
                 )
             if not isinstance(value_node, MappingNode):
@@ -167,7 +167,7 @@ class _Reader:
         key_node, node = pair
         key = self._key(key_node)
         if key != PARAMETERS_KEY:
-            message = f"'{key}' is taken as '{PARAMETERS_KEY}'"
+            message = f"ROS reads '{key}' as '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
         if place is None:
             message = f"'{PARAMETERS_KEY}' belongs below the name of a node"
@@ -178,7 +178,7 @@ class _Reader:
             message = f"ROS misreads the names that follow '{PARAMETERS_KEY}'"
             self._fault(key_node.span, message, 'write it last, or each node at the top')
         elif not isinstance(node, MappingNode):
-            message = f"'{PARAMETERS_KEY}' is a mapping of parameters"
+            message = f"'{PARAMETERS_KEY}' must be a mapping of parameters"
             help_text = _help_for(node) or 'write {} if there are none'
             self._fault(node.span, message, help_text)
         else:
@@ -205,8 +205,8 @@ class _Reader:
                 if '.' in key and outer and not ends:
                     self._fault(
                         key_node.span,
-                        f"after '{key}', ROS takes what follows to belong to a part of it",
-                        'write it in steps, without the dot',
+                        f"ROS reads what follows '{key}' as a part of it",
+                        'write nested keys instead of the dot',
                     )
                 self._opened += 1
                 self._read_parameters(value_node, pattern, place, keys, is_last=ends)
@@ -238,14 +238,14 @@ class _Reader:
         }
         for entry in self.entries:
             if (entry.pattern, entry.name) in mappings:
-                message = f"'{entry.name}' has a value and, elsewhere, names below it"
+                message = f"'{entry.name}' has both a value and names below it"
                 self._fault(entry.key_span, message, 'ROS loses one of them: rename it')
 
     def _check_names(self, key_node: TreeNode, key: str, node: MappingNode) -> None:
         if not node.pairs:
             self._fault(
                 key_node.span,
-                f"'{key}' is an empty mapping, and ROS misreads what follows one",
+                f"'{key}' is an empty mapping, and ROS misreads what follows it",
                 'remove it',
             )
         elif key.startswith(PARAMETERS_KEY):
@@ -255,12 +255,9 @@ class _Reader:
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
-        what = (
-            'this one is empty'
-            if isinstance(node, ScalarNode)
-            else 'this one is a list or a mapping'
-        )
-        self._fault(node.span, f'a key is a text, and {what}')
+        is_empty = isinstance(node, ScalarNode)
+        what = 'and this one is empty' if is_empty else 'not a list or a mapping'
+        self._fault(node.span, f'a key must be a string, {what}')
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:

@@ -59,7 +59,7 @@ def find_type_faults(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ..
         if fault := _find_scalar_fault(value, type_name):
             yield (), fault
     elif not isinstance(value, list):
-        yield (), f'expected a list, of {item_type} values, got {value!r}'
+        yield (), f'expected a list of {item_type} values, got {value!r}'
     else:
         for index, item in enumerate(value):
             if fault := _find_item_fault(item, item_type):
@@ -81,5 +81,5 @@ def _find_scalar_fault(value: Any, type_name: str) -> str | None:
 
 def _find_width_fault(value: Any, type_name: str) -> str | None:
     if type_name == 'integer' and not INT64_MIN <= value <= INT64_MAX:
-        return f'{value} does not fit 64 bits'
+        return f'{value} does not fit in 64 bits'
     return None

@@ -83,11 +83,11 @@ class ValueReader:
             if node.text or node.quoted:
                 return read_scalar(node)
             where = f"'{key}' has no value" if key else 'there is no value'
-            help_text = "write one; '' is an empty text, and ROS has no null"
+            help_text = "write '' for an empty string; ROS has no null"
             self._fault(node.span, where, help_text)
             return None
         if isinstance(node, MappingNode):
-            self._fault(node.span, 'a list of parameters holds no mappings')
+            self._fault(node.span, 'a list of parameters cannot contain mappings')
             return None
         return self._read_list(node)
 
@@ -96,7 +96,7 @@ class ValueReader:
         for item in node.items:
             if isinstance(item, SequenceNode):
                 self._fault(
-                    item.span, 'a list of parameters holds no lists', 'write one long list'
+                    item.span, 'a list of parameters cannot contain lists', 'write one flat list'
                 )
                 return None
             value = self.read(item)
@@ -106,8 +106,8 @@ class ValueReader:
                 first, other = (infer_parameter_type(each) for each in (values[0], value))
                 self._fault(
                     item.span,
-                    f'a list has one type: this is {with_article(str(other))}, and the first item '
-                    f'{with_article(str(first))}',
+                    f'all items of a list have one type: this is {with_article(str(other))}, '
+                    f'the first is {with_article(str(first))}',
                     _help_for_mixture(values[0], value),
                 )
                 return None
@@ -120,8 +120,8 @@ class ValueReader:
 
 def _help_for_mixture(first: Any, other: Any) -> str | None:
     if {type(first), type(other)} == {int, float}:
-        return 'give each of them a decimal point'
-    return 'put each in quotes if they are texts' if str in (type(first), type(other)) else None
+        return 'write each with a decimal point'
+    return 'put each in quotes if they are strings' if str in (type(first), type(other)) else None
 
 
 def read_scalar(node: ScalarNode) -> ParameterScalar:

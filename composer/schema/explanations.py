@@ -79,7 +79,7 @@ def _explain_const(error: ValidationError) -> Iterator[Violation]:
     if path == ('version',):
         yield Violation(
             'unsupported-version',
-            f'version {show_value(error.instance)} is not known; this Composer reads version 1',
+            f'version {show_value(error.instance)} is not supported, only version 1',
             path,
             path,
         )

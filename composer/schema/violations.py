@@ -81,7 +81,7 @@ def missing_key(error: ValidationError, key: str, message: str) -> Violation:
 
 
 def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
-    """Return the violation for keys that exclude each other."""
+    """Return the violation for keys that cannot be used together."""
     path = path_of(error)
     last = max(keys, key=list(error.instance).index)
     listed = ' and '.join(f"'{key}'" for key in keys)

@@ -111,7 +111,7 @@ class _Constructor:
             # `{{ name }}` without quotes is a mapping whose key is a mapping.
             template = isinstance(node, MappingNode)
             quoting = 'put an expression in quotes: "{{ name }}"' if template else None
-            message = 'a key is a string, not a list or a mapping'
+            message = 'a key must be a string, not a list or a mapping'
             self._fault(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
@@ -120,7 +120,7 @@ class _Constructor:
         self._fault(
             node,
             'bad-key',
-            f'a key is a string, and {node.text} is not one',
+            f'a key must be a string, and {node.text} is not',
             help=f"write '{node.text}'",
         )
         return node.text
@@ -134,7 +134,7 @@ class _Constructor:
                 f"the key '{key}' appears twice in one mapping",
                 help='merge several with <<: [*one, *two]'
                 if key == _MERGE_KEY
-                else f'keep one; the first is in line {first.span.line}',
+                else f'keep one; the first is on line {first.span.line}',
                 related=[first],
             )
         )

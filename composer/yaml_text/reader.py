@@ -76,7 +76,7 @@ def parse_document(content: bytes, name: str) -> Document:
         )
     top = Diagnostic(
         'wrong-type',
-        'a file is a mapping with the keys version and nodes',
+        'a file must be a mapping with the keys version and nodes',
         name,
         tree.span,
         help="begin with 'version: 1'",

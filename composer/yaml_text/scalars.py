@@ -62,7 +62,7 @@ def parse_tagged_scalar(text: str, tag: str) -> Scalar:
         return text
     types = _TAGGED_TYPES.get(tag)
     if types is None:
-        message = f"the tag {short_tag(tag)} is not one of YAML's core schema"
+        message = f"the tag {short_tag(tag)} is not part of YAML's core schema"
         raise ScalarError(message)
     value = parse_plain_scalar(text)
     if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):

@@ -140,7 +140,7 @@ class _TreeBuilder:
         elif isinstance(event, yaml.DocumentStartEvent):
             self._documents += 1
             if self._most_documents is not None and self._documents > self._most_documents:
-                self._stop(event, 'several-documents', 'a file holds one YAML document, not more')
+                self._stop(event, 'several-documents', 'a file holds only one YAML document')
 
     def _enter(self, node: SequenceNode | MappingNode, event: Any) -> None:
         self._add(node, event.anchor)
@@ -169,7 +169,7 @@ class _TreeBuilder:
 
     def _aliased(self, event: Any) -> TreeNode:
         if self._alias_rule is not None:
-            message = f'ROS takes no aliases here: write what *{event.anchor} stands for'
+            message = f'ROS does not support aliases here: write what *{event.anchor} stands for'
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
@@ -199,7 +199,7 @@ def _syntax_fault(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
     if context and begun and mark and begun.line != mark.line:
-        context += f' that begins in line {begun.line + 1}'
+        context += f' that begins on line {begun.line + 1}'
     return diagnostic_at(
         span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
     )
@@ -209,7 +209,7 @@ def _syntax_help(span: Span) -> str | None:
     line = span.source.line(span.line)
     indent = line[: len(line) - len(line.lstrip())]
     if '\t' in indent or span.text == '\t':
-        return 'YAML is indented with spaces, never with tabs'
+        return 'indent YAML with spaces, not tabs'
     if line.count(': ') > 1:
         return "put a value that contains ': ' in quotes"
     return None

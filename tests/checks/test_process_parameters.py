@@ -34,12 +34,12 @@ def findings(parameters):
         ),
         ('f: null', "parameter 'f': there is no value, and ROS has no null"),
         ('f: [1.0, null]', "parameter 'f': item 1: there is no value, and ROS has no null"),
-        ('f: [[1]]', "parameter 'f': item 0: a list of parameters holds no lists"),
-        ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters holds no mappings"),
-        ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit 64 bits"),
+        ('f: [[1]]', "parameter 'f': item 0: a list of parameters cannot contain lists"),
+        ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters cannot contain mappings"),
+        ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit in 64 bits"),
         (
             'f: [0, -9223372036854775809]',
-            "parameter 'f': -9223372036854775809 does not fit 64 bits",
+            "parameter 'f': -9223372036854775809 does not fit in 64 bits",
         ),
         (
             'f: {g: {}}',

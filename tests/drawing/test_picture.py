@@ -275,7 +275,7 @@ def test_two_nodes_of_one_name_are_two(draw):
     assert ids == ['node:/a/n', "node:/a/n'"]
 
 
-def test_ends_elsewhere_of_either_side(external_ends):
+def test_external_ends_of_either_side(external_ends):
     channels = by_id(describe_picture(external_ends), 'channels')
     assert {key: each['external'] for key, each in channels.items()} == {
         'topic:/x': ['users'],

@@ -34,8 +34,8 @@ def test_mermaid(draw):
     assert render_picture(draw(SYSTEM), 'mermaid').splitlines() == [
         'flowchart LR',
         '  n2(["alone"]):::node',
-        '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system hears<br/>\'/lonely\'"]:::warning',
-        '  xc1u(("elsewhere")):::external',
+        '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system subscribes<br/>to \'/lonely\'"]:::warning',
+        '  xc1u(("external")):::external',
         '  subgraph s0["/robot"]',
         '    n1(["mapper"]):::node',
         '    c0["/robot/front/scan<br/>std_msgs/msg/String"]:::topic',

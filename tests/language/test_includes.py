@@ -313,7 +313,7 @@ def test_files_that_include_each_other_over_and_over_are_bounded(write):
     )
     (finding,) = load_system(path).diagnostics
     assert finding.rule == 'too-many-entries'
-    assert finding.message == 'there are more than 50 entries in include of all files'
+    assert finding.message == 'include has more than 50 entries in all files together'
 
 
 def test_what_is_ignored_may_hold_variables_of_foreach(write):

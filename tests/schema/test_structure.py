@@ -65,7 +65,7 @@ def test_a_right_file_has_no_faults():
             'version: 2\nnodes: {}',
             (
                 'unsupported-version',
-                'version 2 is not known; this Composer reads version 1',
+                'version 2 is not supported, only version 1',
                 '1:10',
                 None,
             ),
@@ -74,7 +74,7 @@ def test_a_right_file_has_no_faults():
             'version: "1"\nnodes: {}',
             (
                 'unsupported-version',
-                "version '1' is not known; this Composer reads version 1",
+                "version '1' is not supported, only version 1",
                 '1:10',
                 None,
             ),
@@ -83,7 +83,7 @@ def test_a_right_file_has_no_faults():
             'version: true\nnodes: {}',
             (
                 'unsupported-version',
-                'version true is not known; this Composer reads version 1',
+                'version true is not supported, only version 1',
                 '1:10',
                 None,
             ),

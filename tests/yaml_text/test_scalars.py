@@ -119,8 +119,8 @@ def test_a_tag_says_the_type(text, tag, value):
         ('yes', TAG + 'bool', "'yes' is not a !!bool"),
         ('1', TAG + 'bool', "'1' is not a !!bool"),
         ('0', TAG + 'null', "'0' is not a !!null"),
-        ('a', TAG + 'binary', "the tag !!binary is not one of YAML's core schema"),
-        ('a', '!own', "the tag !own is not one of YAML's core schema"),
+        ('a', TAG + 'binary', "the tag !!binary is not part of YAML's core schema"),
+        ('a', '!own', "the tag !own is not part of YAML's core schema"),
     ],
 )
 def test_text_that_is_not_of_its_tag_is_refused(text, tag, message):

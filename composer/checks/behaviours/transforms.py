@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import composer
 from composer.interfaces.descriptions import MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.python_source.module_finder import MissingModule
@@ -35,7 +34,7 @@ def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
 def _is_ours(context: CheckContext) -> bool:
     """Return whether the module is the one that comes with Composer, not another of its name."""
     module = context.modules.find(_MODULE)
-    own = Path(composer.__file__).parent.parent.joinpath(*_MODULE.split('.')).with_suffix('.py')
+    own = Path(__file__).parents[3].joinpath(*_MODULE.split('.')).with_suffix('.py')
     path = None if isinstance(module, MissingModule) else module.path
     return path is not None and path.resolve() == own.resolve()
 
