@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.errors import StartError
-from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node

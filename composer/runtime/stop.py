@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
-    from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
