@@ -15,7 +15,7 @@ up: .venv/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: .venv/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest $(ARGS)
 
 check: .venv/ready
 	$(BIN)/ruff check .
