@@ -19,7 +19,8 @@ from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
 import composer
-from composer.runtime.behaviours.calls import BehaviourCall, RunningCalls
+from composer.runtime.behaviours.calls import BehaviourCall
+from composer.runtime.behaviours.running_calls import RunningCalls
 from composer.runtime.health.statistics import CallTimes
 from composer.runtime.system import System
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from typing import Unpack
 
 
-# Nobody reads more of one file, and finding all of a hundred thousand would take minutes.
+# Nobody reads more of one file, and to find a hundred thousand would take minutes.
 MAX_FINDINGS = 1000
 _LONGEST = 2000
 
@@ -25,7 +25,7 @@ class SourceFile:
     Attributes:
         name: The path as the user wrote it, for display.
         lines: The lines without their ends.
-        home: Where relative paths in it begin, if that is not the file's folder.
+        home: The folder for relative paths in a text of the command line; `None` for a file.
     """
 
     name: str
@@ -34,7 +34,7 @@ class SourceFile:
 
     @property
     def folder(self) -> Path:
-        """The folder where relative paths in it begin, as the user would write it."""
+        """The folder for relative paths in it, as the user would write it."""
         return Path(self.name).parent if self.home is None else Path(self.home)
 
     def line(self, number: int) -> str:
@@ -44,12 +44,12 @@ class SourceFile:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of one line.
+    """A part of one line.
 
     Attributes:
-        source: The file it lies in.
+        source: Its file.
         line: Counted from 1.
-        column: Of its first character, counted from 1.
+        column: The column of its first character, counted from 1.
         length: In characters; 0 where a value is missing.
     """
 
@@ -66,7 +66,7 @@ class Span:
 
     @property
     def place(self) -> str:
-        """`file:line`, or where else it was written."""
+        """`file:line`, or the option of the command line that it is from."""
         is_file = self.source.home is None
         return f'{self.source.name}:{self.line}' if is_file else self.source.name
 
@@ -85,7 +85,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Related:
-    """A second place that a finding speaks of."""
+    """Another place that a finding mentions."""
 
     message: str
     span: Span
@@ -98,10 +98,10 @@ class Diagnostic:
     Attributes:
         rule: The rule's stable name, as in `unknown-key`.
         message: What is wrong and what was expected, in one line.
-        file: The file's name; also there when the fault has no line (an unreadable file).
-        span: Where it is.
+        file: The name of the file; also for a finding without a line, as in an unreadable file.
+        span: The text that it is about.
         help: What to do about it.
-        related: Other places that take part in it.
+        related: Other places that it mentions.
     """
 
     rule: str
@@ -112,7 +112,7 @@ class Diagnostic:
     related: tuple[Related, ...] = field(default=())
 
     def with_related(self, related: Iterable[Related]) -> Diagnostic:
-        """Return the same finding with more places that take part in it."""
+        """Return the same finding with more related places."""
         return replace(self, related=(*self.related, *related))
 
     @property
@@ -128,7 +128,7 @@ class Diagnostic:
 
 
 class Remarks(TypedDict, total=False):
-    """What a finding says beside its message; see `Diagnostic`."""
+    """The optional parts of a finding; see `Diagnostic`."""
 
     help: str | None
     related: Iterable[Related]
@@ -137,7 +137,8 @@ class Remarks(TypedDict, total=False):
 def diagnostic_at(span: Span, rule: str, message: str, **remarks: Unpack[Remarks]) -> Diagnostic:
     """Return a finding whose file is that of its span.
 
-    What it quotes of the file may be enormous, or no text that a terminal can show.
+    Long texts are cut, and characters that a terminal cannot show become escapes: messages quote
+    the file, which may hold anything.
     """
     advice = remarks.get('help')
     return Diagnostic(

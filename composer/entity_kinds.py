@@ -90,7 +90,7 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         provides=True,
         has_qos=True,
         unused='nothing publishes on it',
-        unmatched=('no-subscription', "nothing in this system hears '{}'"),
+        unmatched=('no-subscription', "nothing in this system subscribes to '{}'"),
         stand_in={'type': 'unknown/msg/Unknown'},
     ),
     EntityKind(

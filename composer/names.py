@@ -67,7 +67,7 @@ def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
     if name.endswith('/'):
         return f'{what} does not end with a slash'
     if '~' in name[1:] or (name[0] == '~' and len(name) > 1 and name[1] != '/'):
-        return f"'~' stands only at the beginning of {what}, before a slash"
+        return f"'~' is only allowed at the start of {what}, before a slash"
     plain = _SUBSTITUTION.sub('x', name)
     if '{' in plain or '}' in plain:
         return f'{what} has a brace without its partner'

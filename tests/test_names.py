@@ -134,14 +134,14 @@ NAMES = ['scan', '/scan', '/fleet/scan', '~/scan', 'a/scan', '~', '{node}/scan']
 @pytest.mark.ros
 @pytest.mark.parametrize('namespace', ['/', '/fleet'])
 @pytest.mark.parametrize('rules', RULES, ids=str)
-def test_names_are_remapped_as_rclpy_has_it(rules, namespace, ros_context):
+def test_names_are_remapped_as_rclpy_has_it(rules, namespace, context):
     import rclpy
 
     arguments = [part for old, new in rules for part in ('-r', f'{old}:={new}')]
     node = rclpy.create_node(
         NODE,
         namespace=namespace,
-        context=ros_context,
+        context=context,
         cli_args=['--ros-args', *arguments],
         use_global_arguments=False,
         start_parameter_services=False,
@@ -158,17 +158,6 @@ def test_names_are_remapped_as_rclpy_has_it(rules, namespace, ros_context):
         node.destroy_node()
 
 
-@pytest.fixture
-def ros_context(domain_id):
-    import rclpy
-
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain_id)
-    yield context
-    context.try_shutdown()
-    context.destroy()
-
-
 @pytest.mark.parametrize(
     ('name', 'fault'),
     [
@@ -177,7 +166,7 @@ def ros_context(domain_id):
         ('a/', 'a topic name does not end with a slash'),
         ('a//b', 'a topic name has no two slashes in a row'),
         ('a/1', 'no part of a topic name begins with a digit'),
-        ('a/~', "'~' stands only at the beginning of a topic name, before a slash"),
+        ('a/~', "'~' is only allowed at the start of a topic name, before a slash"),
         ('{node', 'a topic name has a brace without its partner'),
         ('{x}', "'{x}' is no substitution of ROS: {node}, {ns}, {namespace}"),
         ('a' * 248, 'a topic name has at most 247 characters'),

@@ -10,9 +10,13 @@ from composer.checks.behaviours.behaviour_functions import check_behaviour_sourc
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
-from composer.checks.connections.typos import check_slips
-from composer.checks.connections.waits import check_waits
-from composer.checks.connections.wiring import check_wiring
+from composer.checks.connections.channels import check_channel_types, check_servers
+from composer.checks.connections.deadlocks import check_deadlocks
+from composer.checks.connections.loops import check_loops
+from composer.checks.connections.qos import check_qos_pairs
+from composer.checks.connections.typos import check_typos
+from composer.checks.connections.unconnected import check_other_ends
+from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.ignore_comments import apply_ignore_comments
 from composer.checks.messages import check_messages
@@ -65,10 +69,15 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_executables,
     check_waits,
     check_environment,
-    check_wiring,
-    check_slips,
+    check_channel_types,
+    check_servers,
+    check_qos_pairs,
+    check_other_ends,
+    check_loops,
+    check_deadlocks,
+    check_typos,
 )
-_MORE = f'there are more faults than these {MAX_FINDINGS}; they show when these are mended'
+_MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
 
 
 def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> CheckContext | None:

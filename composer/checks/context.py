@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CheckContext:
     """A system and what there is to hold it against.
 
@@ -34,6 +36,11 @@ class CheckContext:
     interfaces: DeclaredPackages
     modules: ModuleFinder
     uses: UseReader
+
+    @cached_property
+    def topology(self) -> Topology:
+        """What connects the nodes."""
+        return build_topology(self.system, self.spec, self.has_real_type)
 
     @property
     def catalogue(self) -> InterfaceCatalogue:

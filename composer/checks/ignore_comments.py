@@ -75,18 +75,18 @@ def _check(
             comment.span,
             'unused-ignore',
             'the comment names no rule',
-            'write ignore[rule], with the rule that the finding shows',
+            'write ignore[rule], with the name of the rule',
         )
     for named in comment.rules:
         here = [f for f in findings if f.rule == named.text and _is_beside(f, named)]
         if named.text not in list_rule_names():
             advice = "'composer explain' lists them"
             help_text = suggest(named.text, list_rule_names(), otherwise=advice)
-            message = f"no rule is called '{named.text}'"
+            message = f"there is no rule '{named.text}'"
             yield _warn(named, 'unknown-rule', message, help_text or advice)
         elif here and not load_rule(named.text).ignorable:
-            message = f"no comment silences '{named.text}': nothing can run before it is mended"
-            yield _warn(named, 'unused-ignore', message, 'mend it and remove the comment')
+            message = f"no comment silences '{named.text}': nothing can run until it is fixed"
+            yield _warn(named, 'unused-ignore', message, 'fix the error and remove the comment')
         elif not here and unchecked is not None and load_rule(named.text).needs not in unchecked:
             message = f"there is no '{named.text}' in this line to ignore"
             yield _warn(named, 'unused-ignore', message, 'remove it')

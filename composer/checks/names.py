@@ -74,7 +74,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_key(
                 node.path,
                 'duplicate-node',
-                f"there is a node '{node.full_name}' already",
+                f"a node '{node.full_name}' already exists",
                 help="give one of them another name, or a 'namespace'",
                 related=[Related('the other one', context.system.positions.key(other.path))],
             )
@@ -138,13 +138,13 @@ def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator
         path = (*node.path, 'remap', source)
         if source.startswith('__'):
             key = {'__node': 'the key of the node', '__ns': "'namespace:'"}.get(source)
-            help_text = f'{key} says it' if key else None
+            help_text = f'use {key} instead' if key else None
             message = f"'{source}' is not remapped here"
             yield context.at_key(path, 'bad-remap', message, help=help_text)
             continue
         scheme, separator, bare = source.rpartition('://')
         if separator and scheme not in ('rostopic', 'rosservice'):
-            message = f"'{scheme}://' is no scheme of a remapping rule"
+            message = f"'{scheme}://' is not a scheme of remapping rules"
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
@@ -152,7 +152,7 @@ def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator
             if fault is None and isinstance(node, NodeSpec):
                 fault = _find_full_name_fault(node, name)
             if fault:
-                yield at(path, _RULE, f"'{name}' cannot stand in a remapping rule: {fault}")
+                yield at(path, _RULE, f"'{name}' cannot be used in a remapping rule: {fault}")
 
 
 def _find_rule_name_fault(name: str) -> str | None:
@@ -160,5 +160,5 @@ def _find_rule_name_fault(name: str) -> str | None:
     if '{' in name:
         return 'it has no substitutions'
     if name == '~':
-        return "'~' stands before a slash"
+        return "'~' needs a slash after it"
     return find_topic_name_fault(name)

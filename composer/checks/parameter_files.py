@@ -158,7 +158,7 @@ def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic
             yield diagnostic_at(
                 span,
                 'unmatched-node-name',
-                f"'{pattern}' is the name of no node that uses this file, and ROS ignores it",
+                f"'{pattern}' matches no node that uses this file, so ROS ignores it",
                 help=suggest(pattern, names, 'it is used by'),
             )
 
@@ -215,9 +215,9 @@ def _find_overridden(
     return diagnostic_at(
         entry.key_span,
         'overridden-parameter',
-        f"'{entry.name}' never has this value: that of {lost_to.value_span.place} wins",
+        f"'{entry.name}' never has this value: {lost_to.value_span.place} overrides it",
         help=_help_for_overridden(entry, lost_to),
-        related=[Related('this one wins', lost_to.value_span)],
+        related=[Related('overridden here', lost_to.value_span)],
     )
 
 

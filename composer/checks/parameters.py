@@ -45,8 +45,8 @@ def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
             yield context.at_key(
                 (*node.path, 'on_parameters'),
                 'unreachable-parameters',
-                f"node '{node.name}' has no parameter services: 'on_parameters' hears only of "
-                'changes that its own behaviours make',
+                f"node '{node.name}' has no parameter services: 'on_parameters' is only called "
+                'for changes by its own behaviours',
                 help="write 'parameter_services: true' in the node, or remove 'on_parameters'",
             )
 
@@ -62,7 +62,7 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
         yield context.at_value(
             path,
             _RULE,
-            'the type of this list cannot be told',
+            'cannot tell the type of this list',
             help='write {default: [], type: string_array}, with the type that is meant',
         )
         return
@@ -112,7 +112,7 @@ def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[D
         path = (*parameter.path, 'maximum')
         yield context.at_value(path, _RULE, f'the maximum {high} is below the minimum {low}')
     if parameter.step is not None and (low is None or high is None):
-        message = "'step' needs 'minimum' and 'maximum' beside it"
+        message = "'step' requires 'minimum' and 'maximum'"
         yield context.at_key((*parameter.path, 'step'), _RULE, message)
     yield from _check_choices(context, parameter)
 
@@ -141,14 +141,14 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
 
 
 def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:
-    """Return the help for a text that is none of the choices, but near one."""
+    """Return the help for a text that is not one of the choices, but near one."""
     return suggest(value, parameter.choices or ())
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:
     """Return why a value of the right type would be refused, or `None` if it would be taken."""
     if parameter.choices is not None and value not in parameter.choices:
-        return f'{value!r} is none of its choices: {", ".join(map(str, parameter.choices))}'
+        return f'{value!r} is not one of its choices: {", ".join(map(str, parameter.choices))}'
     if parameter.type not in _NUMERIC:
         return None
     low, high, step = parameter.minimum, parameter.maximum, parameter.step

@@ -46,7 +46,7 @@ def _check_mapping(
         elif isinstance(value, dict) and value:
             yield from _check_mapping(context, value, at, f'{name}.', seen)
         elif name in seen:
-            yield context.at_key(at, _RULE, f"the parameter '{name}' stands here a second time")
+            yield context.at_key(at, _RULE, f"the parameter '{name}' is given twice")
         else:
             seen[name] = at
             for place, message in _find_faults(value):
@@ -72,7 +72,7 @@ def _find_list_faults(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]
             yield (index,), f'item {index}: {_NO_NULL}'
         elif isinstance(item, list | dict):
             what = 'lists' if isinstance(item, list) else 'mappings'
-            yield (index,), f'item {index}: a list of parameters holds no {what}'
+            yield (index,), f'item {index}: a list of parameters cannot contain {what}'
         elif infer_parameter_type([items[0], item]) is None:
             types = (infer_parameter_type(each) for each in (item, items[0]))
             own, first = (with_article(str(each)) for each in types)

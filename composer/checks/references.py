@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from composer.language.qos import BUILTIN_PROFILES, QosError, UnknownProfileError, resolve_qos
+from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
 
 
 def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
-    """Every profile exists and leads to a built-in one."""
+    """Every profile leads to a built-in one."""
     profiles = context.spec.qos
     for name, profile in profiles.items():
         if name in BUILTIN_PROFILES:
@@ -86,16 +86,9 @@ def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]:
-    name = error.spec.profile
-    if context.was_dropped(('qos', name)):
-        return
-    inner = (*error.spec.path, 'profile')
-    path = inner if inner in context.system.positions.values else error.spec.path
-    if isinstance(error, UnknownProfileError):
-        options = {*context.spec.qos, *BUILTIN_PROFILES}
-        help_text = suggest(name, options, 'the profiles are')
-        yield context.at_value(path, 'unknown-qos-profile', str(error), help=help_text)
-    else:
+    # Unknown profiles are dropped with the defaults of their file, or with their own entry.
+    if not context.was_dropped(('qos', error.spec.profile)):
+        path = context.inner(error.spec.path, 'profile')
         yield context.at_value(path, 'cyclic-qos-profile', str(error))
 
 

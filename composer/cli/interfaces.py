@@ -13,17 +13,11 @@ from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared, provide_declared
 from composer.interfaces.definitions.installed_definitions import describe_interface
-from composer.interfaces.descriptions import (
-    ActionDescription,
-    InterfaceDescription,
-    MessageDescription,
-    ServiceDescription,
-)
+from composer.interfaces.definitions.rendering import render_definition
 from composer.language.pipeline import load_system
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from composer.interfaces.catalogue import InterfaceKind
@@ -75,7 +69,8 @@ def show(name: str) -> int:
     if description is None:
         message = f"no installed package has an interface '{name}'"
         raise UnknownInterfaceError(message, help=_advise(name))
-    for line in _render(description):
+    click.echo(f'# {description.name}')
+    for line in render_definition(description, comments=True):
         click.echo(line)
     return ExitCode.DONE
 
@@ -96,44 +91,3 @@ def _advise(name: str) -> str | None:
     return did_you_mean(
         last_part and by_last_part[last_part], otherwise=f'{listing} shows its interfaces'
     )
-
-
-def _render(description: InterfaceDescription) -> Iterator[str]:
-    yield f'# {description.name}'
-    for index, part in enumerate(_parts(description)):
-        if index:
-            yield '---'
-        yield from _render_message(part)
-
-
-def _parts(description: InterfaceDescription) -> tuple[MessageDescription, ...]:
-    if isinstance(description, ServiceDescription):
-        return description.request, description.response
-    if isinstance(description, ActionDescription):
-        return description.goal, description.result, description.feedback
-    return (description,)
-
-
-def _render_message(message: MessageDescription) -> Iterator[str]:
-    yield from _render_comment(message.comment)
-    for constant in message.constants:
-        yield from _render_comment(constant.comment)
-        yield f'{constant.type} {constant.name}={_written(constant.value)}'
-    for field in message.fields:
-        yield from _render_comment(field.comment)
-        default = '' if field.default is None else f' {_written(field.default)}'
-        yield f'{field.type} {field.name}{default}'
-
-
-def _render_comment(comment: str) -> Iterator[str]:
-    for line in comment.splitlines():
-        yield f'# {line}'.rstrip()
-
-
-def _written(value: object) -> str:
-    """Return a value as definitions write it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return f'[{", ".join(map(_written, value))}]'
-    return repr(value) if isinstance(value, str) else str(value)

@@ -11,7 +11,7 @@ from composer.rules import Severity, load_rule
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from composer.checks.connections.topology import Channel, Graph
+    from composer.checks.connections.topology import Channel, Topology
     from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.entity_kinds import ChannelKind
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -29,10 +29,12 @@ _NODE, _ENTITY = 2, 4
 class FindingPlaces:
     """The findings of each part of a system, as indices into the list of all."""
 
-    def __init__(self, positions: SourceMap, graph: Graph, findings: Sequence[Diagnostic]) -> None:
+    def __init__(
+        self, positions: SourceMap, topology: Topology, findings: Sequence[Diagnostic]
+    ) -> None:
         self._paths = _PathFinder(positions)
         self._channel_of_end: dict[DataPath, Channel] = {
-            end.path: channel for channel in graph.channels.values() for end in channel.ends
+            end.path: channel for channel in topology.channels.values() for end in channel.ends
         }
         self._nodes: dict[DataPath, list[int]] = defaultdict(list)
         self._edges: dict[DataPath, list[int]] = defaultdict(list)

@@ -49,7 +49,7 @@ function move(across, down) {
   show({...view, x: view.x + view.width * across, y: view.y + view.height * down});
 }
 
-// Brings a part of the drawing to the middle, near enough to be read.
+// Moves a part of the drawing to the middle, large enough to read.
 function bringIn(element) {
   const seen = element.getBoundingClientRect();
   const frame = stage.getBoundingClientRect();
@@ -68,7 +68,7 @@ function isInView(element) {
     && seen.top >= frame.top && seen.bottom <= frame.bottom;
 }
 
-// What stands in the panel.
+// The panel.
 function make(tag, text = '', className = '') {
   const element = document.createElement(tag);
   element.textContent = text;
@@ -128,7 +128,7 @@ function describe(token) {
   }
 }
 
-// Choosing, by the pointer, the keyboard, a list, or the address.
+// Selection, by pointer, keyboard, list or address.
 const drawn = (token) => document.getElementById(token);
 let chosen = null;
 
@@ -168,7 +168,7 @@ for (const [token, part] of parts) {
   });
 }
 
-// The pointer: dragging moves, a click chooses, the wheel zooms.
+// The pointer: drag to move, click to select, turn the wheel to zoom.
 let drag = null;
 stage.addEventListener('pointerdown', (event) => {
   if (event.button !== 0) return;
@@ -219,11 +219,11 @@ document.addEventListener('keydown', (event) => {
     choose(null, false);
   }
 });
-document.getElementById('closer').addEventListener('click', () => zoom(0.8));
-document.getElementById('farther').addEventListener('click', () => zoom(1.25));
+document.getElementById('zoom-in').addEventListener('click', () => zoom(0.8));
+document.getElementById('zoom-out').addEventListener('click', () => zoom(1.25));
 document.getElementById('fit').addEventListener('click', fit);
 
-// The search: all words have to be in the kind, the name or the facts.
+// The search: each word must be in the kind, the name or the facts.
 function find() {
   const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
   const found = [];

@@ -20,6 +20,7 @@ from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
 from composer.drawing.qos_labels import describe_policies
 from composer.drawing.shapes import tokens_of
+from composer.entity_kinds import CHANNEL_KINDS
 from composer.names import join_names
 
 if TYPE_CHECKING:
@@ -138,8 +139,12 @@ def _describe_node(node: NodeBox) -> dict[str, Any]:
 
 
 def _describe_channel(channel: ChannelBox) -> dict[str, Any]:
-    elsewhere = [f'{side} elsewhere, too' for side in channel.external]
-    return {'kind': channel.kind, 'name': channel.name, 'facts': [*channel.types, *elsewhere]}
+    facts = [*channel.types]
+    for side in channel.external:
+        provides = side == 'providers'
+        ends = (kind for kind in CHANNEL_KINDS if kind.channel == channel.kind)
+        facts += [f'external {end.noun}s' for end in ends if end.provides == provides]
+    return {'kind': channel.kind, 'name': channel.name, 'facts': facts}
 
 
 def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:

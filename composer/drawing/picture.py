@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.checks.connections.topology import Endpoint, Graph, build_graph
 from composer.drawing.finding_places import FindingPlaces
 from composer.drawing.qos_labels import differing_policies
-from composer.entity_kinds import KIND_OF_NOUN
 from composer.names import expand_name, expand_namespace, join_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from composer.checks.connections.topology import Endpoint, Topology
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import ChannelKind
@@ -51,7 +50,7 @@ class ChannelBox:
         id: Its kind and full name, as in `topic:/robot/scan`.
         types: The types that its ends declare; more than one is an error.
         namespace: The deepest one that has all its ends.
-        external: The sides on which an end is outside the system.
+        external: The sides on which an end is outside the system, by `external: true`.
         path: The path of the end that is declared first.
         findings: Its findings, as indices into those of the picture.
     """
@@ -130,17 +129,17 @@ class Picture:
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
     """Return the picture of a system, with the findings at the parts that they are about."""
-    graph = build_graph(context)
-    places = FindingPlaces(context.system.positions, graph, findings)
+    topology = context.topology
+    places = FindingPlaces(context.system.positions, topology, findings)
     nodes = tuple(_nodes(context, places))
     ids = {node.path: node.id for node in nodes}
-    channels = tuple(_channels(graph, places))
+    channels = tuple(_channels(topology, places))
     return Picture(
         context.spec.name,
         context.spec.description,
         nodes,
         channels,
-        tuple(_edges(context, graph, places, ids)),
+        tuple(_edges(context, topology, places, ids)),
         tuple(_waits(context, nodes, channels, ids)),
         tuple(findings),
         context.system.positions,
@@ -169,8 +168,8 @@ def _specs(context: CheckContext) -> Iterator[tuple[NodeKind, NodeSpec | Process
         yield 'process', process
 
 
-def _channels(graph: Graph, places: FindingPlaces) -> Iterator[ChannelBox]:
-    for channel in graph.channels.values():
+def _channels(topology: Topology, places: FindingPlaces) -> Iterator[ChannelBox]:
+    for channel in topology.channels.values():
         ends = channel.ends
         sides: list[Side] = []
         if any(getattr(end.entity, 'external', False) for end in channel.users):
@@ -200,15 +199,15 @@ def _common_namespace(namespaces: Sequence[str]) -> str:
 
 
 def _edges(
-    context: CheckContext, graph: Graph, places: FindingPlaces, ids: Mapping[DataPath, str]
+    context: CheckContext, topology: Topology, places: FindingPlaces, ids: Mapping[DataPath, str]
 ) -> Iterator[Edge]:
-    for channel in graph.channels.values():
+    for channel in topology.channels.values():
         for end in channel.ends:
             node = ids[end.node.path]
             yield Edge(
-                f'{end.noun}:{node.partition(":")[2]}:{end.entity.name}',
+                f'{end.kind.noun}:{node.partition(":")[2]}:{end.entity.name}',
                 _role(end),
-                sends(channel.kind, provides=KIND_OF_NOUN[end.noun].provides),
+                sends(channel.kind, provides=end.kind.provides),
                 end.entity.name,
                 node,
                 f'{channel.kind}:{channel.name}',
@@ -225,7 +224,7 @@ def sends(channel: ChannelKind, *, provides: bool) -> bool:
 
 
 def _role(end: Endpoint) -> str:
-    return f'{end.noun} server' if end.noun == KIND_OF_NOUN[end.noun].channel else end.noun
+    return f'{end.kind.noun} server' if end.kind.noun == end.kind.channel else end.kind.noun
 
 
 def _waits(

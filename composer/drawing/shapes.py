@@ -29,7 +29,7 @@ class Shape:
     """A node, process or channel as it is drawn; all of its texts are printable.
 
     Attributes:
-        id: The id of what it shows; of the channel, if it stands for ends outside the system.
+        id: The id of what it shows; of the channel, if it stands for external ends.
         kind: `node`, `process`, `topic`, `service`, `action` or `external`.
         details: Smaller lines below the title.
         remarks: The messages of its findings, in lines.
@@ -50,7 +50,7 @@ class Line:
     """An arrow between two shapes.
 
     Attributes:
-        id: The id of what it shows; empty for waits and ends outside the system.
+        id: The id of what it shows; empty for waits and external ends.
         kind: `topic`, `service`, `action`, `external` or `wait`.
         details: The text beside it.
         remarks: The messages of its findings, in lines.
@@ -109,7 +109,7 @@ def arrange_shapes(picture: Picture) -> Arrangement:
             _channel_shape(tokens[channel.id], channel, remarks)
         )
     lines = [_edge_line(edge, tokens, remarks) for edge in picture.edges]
-    for shape, line in _ends_elsewhere(picture.channels, tokens):
+    for shape, line in _external_ends(picture.channels, tokens):
         root.shapes.append(shape)
         lines.append(line)
     for index, wait in enumerate(picture.waits):
@@ -198,7 +198,7 @@ def _edge_line(edge: Edge, tokens: dict[str, str], remarks: _Remarks) -> Line:
     )
 
 
-def _ends_elsewhere(
+def _external_ends(
     channels: Iterable[ChannelBox], tokens: dict[str, str]
 ) -> Iterator[tuple[Shape, Line]]:
     for channel in channels:
@@ -207,5 +207,5 @@ def _ends_elsewhere(
             ends = (token, tokens[channel.id])
             if not sends(channel.kind, provides=side == 'providers'):
                 ends = ends[::-1]
-            shape = Shape(token, channel.id, 'external', 'elsewhere')
+            shape = Shape(token, channel.id, 'external', 'external')
             yield shape, Line(f'{token}l', '', 'external', *ends)

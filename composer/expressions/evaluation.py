@@ -47,7 +47,7 @@ class _Evaluator:
     def value(self, node: nodes.Node | None) -> Any:
         evaluate = _NODES.get(type(node))
         if evaluate is None:
-            message = f'an expression has no {type(node).__name__} in it'
+            message = f'an expression cannot contain a {type(node).__name__}'
             raise TemplateAssertionError(message, 1)
         value = evaluate(self, node)
         self.sandbox.budget.spend(*() if isinstance(node, _ALREADY_COUNTED) else (value,))

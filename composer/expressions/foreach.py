@@ -1,4 +1,4 @@
-"""`foreach` and `when`: entries repeated for the values of variables, entries that are left out.
+"""`foreach` and `when`: repeats entries for each value of a variable, or leaves them out.
 
 Both stand in the entries of some sections. What an entry is repeated for is in scope in its key
 and in all below it; an entry that is left out is still held against the schema.
@@ -24,7 +24,7 @@ MAX_ENTRIES = 10_000
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
-# What a variable without a list of values stands for.
+# The value of a variable without a list of values.
 _SAMPLE = 1
 
 
@@ -59,7 +59,7 @@ def expand_document(
 
 def _limit_of(data: Mapping[str, Any]) -> int:
     limit = data.get('max_nodes')
-    # The schema says what else is wrong.
+    # The schema reports any other value.
     return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
 
 
@@ -83,7 +83,7 @@ class _Expansion:
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
             is_repeated = _FOREACH in entry
             if entry.get(_FOREACH) == {}:
-                self._report((*path, _FOREACH), f'{_FOREACH} has no variable in it')
+                self._report((*path, _FOREACH), f'{_FOREACH} has no variables')
                 self._document.dropped.add(path)
                 continue
             before = len(self._document.diagnostics)
@@ -95,7 +95,7 @@ class _Expansion:
                 self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
                 before = -1
             if len(self._document.diagnostics) > before >= 0:
-                # It is missing for a fault, not for having no values.
+                # It is missing because of an error, not because there are no values.
                 self._document.dropped.add(path)
         return self._entries
 
@@ -136,7 +136,7 @@ class _Expansion:
         """Yield an evaluator for each combination of values, the last variable's fastest."""
         evaluator = evaluator or self._evaluator
         if not isinstance(foreach, dict):
-            self._report(path, f"{_FOREACH} is a mapping, as in 'foreach: {{i: [1, 2]}}'")
+            self._report(path, f"{_FOREACH} must be a mapping, as in 'foreach: {{i: [1, 2]}}'")
             return
         if not foreach:
             yield evaluator
@@ -144,14 +144,14 @@ class _Expansion:
         name, *others = foreach
         at = (*path, name)
         if not is_variable_name(name):
-            self._report(at, f"'{name}' cannot stand in an expression as a name")
+            self._report(at, f"'{name}' cannot be used as a name in expressions")
             return
         values = evaluator.evaluate(foreach[name], at)
         is_sample = evaluator.is_sampled(at)
         if not isinstance(values, list):
             if at not in self._document.dropped:
                 self._report(at, f"'{name}' takes a list of values, not {values!r}")
-            # So that the rest of the entry is read once, too.
+            # The rest of the entry is still read once.
             values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:
@@ -163,7 +163,7 @@ class _Expansion:
         if path in self._document.dropped:
             return False
         if not isinstance(holds, bool):
-            self._report(path, f'{_WHEN} is true or false, not {holds!r}')
+            self._report(path, f'{_WHEN} must be true or false, not {holds!r}')
             return False
         return holds
 
@@ -190,8 +190,8 @@ class _Expansion:
             diagnostic_at(
                 self._evaluator.positions.key((*path, _FOREACH)),
                 'too-many-entries',
-                f'there are more than {self._limit:,} entries in {self._section}',
-                help="if that is meant, raise 'max_nodes' at the top of the file",
+                f'{self._section} has more than {self._limit:,} entries',
+                help="raise 'max_nodes' at the top of the file if that is intended",
             )
         )
 

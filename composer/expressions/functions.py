@@ -22,7 +22,8 @@ def read_environment(name: str, default: str | None = None) -> str:
     """
     value = os.environ.get(name, default)
     if value is None:
-        message = f"the environment has no '{name}'; give a default, as in env('{name}', 'none')"
+        advice = f"give a default, as in env('{name}', 'none')"
+        message = f"the environment variable '{name}' is not set; {advice}"
         raise TemplateRuntimeError(message)
     return value
 

@@ -154,7 +154,7 @@ def limit_separated(separator: str, items: Any = (), *_: Any, **__: Any) -> None
 def limit_sum(_: Any, __: Any = None, start: Any = 0, **___: Any) -> None:
     """Allow sums of numbers only: a sum of lists copies each of them many times."""
     if not isinstance(start, int | float):
-        message = 'sum is for numbers'
+        message = 'sum takes only numbers'
         raise TemplateRuntimeError(message)
 
 
@@ -162,7 +162,7 @@ def limit_widths(_: Any, *arguments: Any, **named: Any) -> None:
     """Limit arguments that are widths or counts."""
     for value in (*arguments, *named.values()):
         if isinstance(value, int):
-            _limit(abs(value), _MAX_WIDTH, f'{value}, as a width or a count,')
+            _limit(abs(value), _MAX_WIDTH, f'the width or count {value}')
 
 
 def limit_percent_format(template: Any, *values: Any, **named: Any) -> None:
@@ -182,7 +182,7 @@ def _limit_formatted(template: str, values: Any, mark: str) -> None:
         mark: What begins a field in the template: `%` or `{`.
     """
     if '*' in template or _NESTED_FIELD.search(template):
-        message = 'a width is written as a number in the format itself'
+        message = 'a width must be a number in the format itself'
         raise TemplateRuntimeError(message)
     digits = _NUMBERS.findall(template)
     _limit(max(map(len, digits), default=0), len(str(_MAX_WIDTH)), 'a width in the format')
@@ -192,7 +192,7 @@ def _limit_formatted(template: str, values: Any, mark: str) -> None:
     _limit(len(template) + template.count(mark) * (10 * measure(values) + widest))
 
 
-def _limit(size: int, limit: int = MAX_SIZE, what: str = 'what the expression makes') -> None:
+def _limit(size: int, limit: int = MAX_SIZE, what: str = 'the result of the expression') -> None:
     if size > limit:
         message = f'{what} is too large'
         raise TemplateRuntimeError(message)

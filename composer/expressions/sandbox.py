@@ -103,7 +103,7 @@ class Sandbox(SandboxedEnvironment):
         parser = Parser(self, code, state='variable')
         expression = parser.parse_expression()
         if not parser.stream.eos:
-            message = 'chunk after expression'
+            message = 'unexpected text after the expression'
             raise TemplateSyntaxError(message, parser.stream.current.lineno)
         expression.set_environment(self)
         return expression
@@ -197,4 +197,4 @@ class Sandbox(SandboxedEnvironment):
 
 def too_deep() -> TemplateRuntimeError:
     """Return the error for an expression that Python's stack does not hold."""
-    return TemplateRuntimeError('the expression nests too deep')
+    return TemplateRuntimeError('the expression is nested too deeply')

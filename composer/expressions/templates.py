@@ -102,7 +102,7 @@ class TemplateEvaluator:
         return _as_text(self._evaluate(written, path, is_key=True))
 
     def is_sampled(self, path: DataPath) -> bool:
-        """Return whether the value at a path hangs on samples."""
+        """Return whether the value at a path depends on samples."""
         return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
@@ -119,7 +119,7 @@ class TemplateEvaluator:
             return self._compute(text, expressions, span)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
             self.document.dropped.add(path)
-            # With the real value it may succeed.
+            # It may succeed with the real value.
             if not sampled or isinstance(error, UndefinedError):
                 self.document.diagnostics.append(self._explain(error, span))
             return text
@@ -144,7 +144,7 @@ class TemplateEvaluator:
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
         for expression in expressions:
-            # What is wrong with it is said when it is evaluated.
+            # Errors are reported when it is evaluated.
             with suppress(TemplateError):
                 names |= self._sandbox.names_in(code_of(text, expression))
         return frozenset(names)
@@ -170,21 +170,21 @@ class TemplateEvaluator:
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
-        """Say that two keys of one mapping come out the same."""
+        """Report that two keys of one mapping evaluate to the same."""
         self.document.diagnostics.append(
             diagnostic_at(
                 self.positions.key(path),
                 'duplicate-key',
-                f"the key '{key}' stands twice in one mapping",
-                related=[Related('it stands here too', self.positions.key(other))],
+                f"the key '{key}' appears twice in one mapping",
+                related=[Related('also used here', self.positions.key(other))],
             )
         )
 
 
 def _describe(error: Exception) -> str:
-    """Return what went wrong in one line."""
+    """Return an error in one line."""
     if isinstance(error, SecurityError):
-        return f'the sandbox refuses the expression: {error.message}'
+        return f'the expression is not allowed: {error.message}'
     if isinstance(error, TemplateSyntaxError):
         return str(error.message).replace("'end of template'", 'end of the expression')
     message = str(error) or type(error).__name__
@@ -194,13 +194,13 @@ def _describe(error: Exception) -> str:
 
 
 def _as_data(value: Any) -> Any:
-    """Return a value as YAML could hold it; what it cannot hold raises."""
+    """Return a value as YAML can represent it; raise if it cannot."""
     if isinstance(value, StrictUndefined):
         str(value)  # raises what is undefined
     if isinstance(value, str):
         return str(value)
     if isinstance(value, int) and value.bit_length() > _MAX_BITS:
-        message = f'a number of {value.bit_length()} bits fits no type of ROS'
+        message = f'a number of {value.bit_length()} bits does not fit any ROS type'
         raise TemplateRuntimeError(message)
     if value is None or isinstance(value, bool | int | float):
         return value
@@ -208,7 +208,7 @@ def _as_data(value: Any) -> Any:
         return [_as_data(item) for item in value]
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
         return {str(key): _as_data(item) for key, item in value.items()}
-    message = f'the expression gives a {type(value).__name__}, which YAML has no place for'
+    message = f'the expression returns a {type(value).__name__}, which YAML cannot represent'
     raise TemplateRuntimeError(message)
 
 

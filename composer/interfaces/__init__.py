@@ -1,1 +1,1 @@
-"""ROS interface types: find them, describe them, import them."""
+"""ROS interface types: find, describe, build and import them."""

@@ -1,8 +1,7 @@
-"""Which ROS interfaces there are, and what they consist of, without importing any of them.
+"""Find ROS interfaces and describe them, without importing any of them.
 
-The ament resource index lists each package's interfaces, and type descriptions beside the
-definition files say what is in them. Both are plain files, so this works without rclpy, costs a
-few file reads, and cannot run anyone's code.
+The ament resource index lists the interfaces of each package, and type descriptions beside the
+definition files describe them. Both are plain files: to read them takes no rclpy and runs no code.
 """
 
 import json
@@ -21,14 +20,14 @@ _NAME_PARTS: Final = 3
 
 
 class InterfaceCatalogue:
-    """The interfaces that are installed, and those added by hand.
+    """The installed interfaces, and those added by `add`.
 
-    Files are read when they are first asked for, and once. Where a package is in several prefixes
-    the first counts, as for ROS itself; added descriptions count before all.
+    Each file is read once, when it is first needed. If a package is in several prefixes, the first
+    one counts, as for ROS itself; added descriptions count before installed ones.
     """
 
     def __init__(self, prefixes: Sequence[Path] | None = None) -> None:
-        """Look for interfaces in these prefixes, or in the default ones."""
+        """Look for interfaces in these prefixes, by default in those of `ament_prefixes`."""
         self._prefixes = ament_prefixes() if prefixes is None else list(prefixes)
         self._added: dict[str, InterfaceDescription] = {}
         self._descriptions: dict[str, InterfaceDescription | None] = {}
@@ -37,19 +36,19 @@ class InterfaceCatalogue:
 
     @property
     def available(self) -> bool:
-        """Whether there is any interface package, so that a missing type means something."""
+        """Whether any interface package is known: without one, missing types are no errors."""
         return bool(self._added) or bool(self._installed())
 
     def add(self, description: InterfaceDescription) -> None:
-        """Add an interface that is not installed, or put another in an installed one's place."""
+        """Add an interface, or replace an installed one."""
         self._added[description.name] = description
 
     def packages(self) -> list[str]:
-        """List the packages that have interfaces, in order of their names."""
+        """Return the names of the packages with interfaces, sorted."""
         return sorted({*self._installed(), *(name.split('/')[0] for name in self._added)})
 
     def names(self, kind: InterfaceKind, package: str | None = None) -> list[str]:
-        """List the full names of the interfaces of a kind, of one package or of all."""
+        """Return the full names of the interfaces of a kind, of one package or of all, sorted."""
         packages = self._installed() if package is None else [package]
         found = {name for each in packages for name in self._indexed(each, kind)}
         for name in self._added:
@@ -59,7 +58,7 @@ class InterfaceCatalogue:
         return sorted(found)
 
     def has(self, full_name: str) -> bool:
-        """Whether there is an interface of this name, `std_msgs/msg/String` say."""
+        """Return whether an interface exists, by its full name: `std_msgs/msg/String`."""
         package, kind, _ = full_name.split('/')
         return full_name in self._added or full_name in self._indexed(
             package, cast('InterfaceKind', kind)
@@ -69,10 +68,9 @@ class InterfaceCatalogue:
         """Describe an interface, such as `std_msgs/msg/String`.
 
         Returns:
-            None where there is no such interface, or no readable description of it: packages
-            built before ROS 2 Iron, or without `rosidl_generator_type_description`, carry none,
-            and types that only IDL can express have no place in a description. `names` tells
-            these cases apart.
+            None if there is no such interface, or no description that can be read: packages built
+            before ROS 2 Iron, or without `rosidl_generator_type_description`, have none, and types
+            that only IDL can express have no description. `has` tells the two cases apart.
         """
         if full_name in self._added:
             return self._added[full_name]

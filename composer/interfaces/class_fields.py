@@ -1,7 +1,6 @@
-"""What a generated message class consists of, from what it says of itself.
+"""Describe the fields of a generated message class from its `SLOT_TYPES`.
 
-The classes of `rosidl_generator_py` carry their field types as `SLOT_TYPES`. This serves
-interfaces that are imported already, whether or not a type description is installed for them.
+This needs no type description, but the class has to be imported.
 """
 
 from typing import Any, Final

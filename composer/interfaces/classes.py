@@ -1,8 +1,8 @@
 """Import the generated Python class of a ROS interface by its full name.
 
-Each way in which that can fail has its own message: no such package, no interfaces of that kind in
-it, no such name, or compiled type support that does not load. The last one rclpy finds out when
-the first entity of the type is created, and does not say why; here it is found at once.
+Each failure has its own message: the package, its interfaces of that kind, or the name is missing,
+or the compiled type support does not load. rclpy loads type support with the first entity of the
+type, and does not report why it fails; here it is loaded at once.
 """
 
 import re
@@ -23,7 +23,7 @@ _KIND_WORDS: Final[dict[InterfaceKind, str]] = {
 
 
 class InterfaceNotFoundError(ComposerError):
-    """There is no such interface, or it cannot be loaded."""
+    """An interface does not exist, or cannot be loaded."""
 
 
 def import_interface(full_name: str) -> type:
@@ -34,7 +34,7 @@ def import_interface(full_name: str) -> type:
             `example_interfaces/action/Fibonacci`.
 
     Raises:
-        InterfaceNotFoundError: there is no such interface, or it cannot be loaded.
+        InterfaceNotFoundError: it does not exist, or cannot be loaded.
     """
     match = _FULL_NAME.fullmatch(full_name)
     if match is None:
@@ -80,7 +80,7 @@ def _import_kind(package: str, kind: InterfaceKind, full_name: str) -> ModuleTyp
 def _load_type_support(interface: type, full_name: str) -> None:
     metaclass: Any = type(interface)
     if not hasattr(metaclass, '__import_type_support__'):
-        message = f'{full_name} is a class, but no ROS interface'
+        message = f'{full_name} is a class, but not a ROS interface'
         raise InterfaceNotFoundError(message)
     if metaclass._TYPE_SUPPORT is not None:  # noqa: SLF001
         return
@@ -92,7 +92,7 @@ def _load_type_support(interface: type, full_name: str) -> None:
 
 
 def _malformed(full_name: str) -> InterfaceNotFoundError:
-    message = f'{full_name!r} is no interface name'
+    message = f'{full_name!r} is not the name of an interface'
     words = re.split(r'[/.:]+', full_name)
     package = words[0] if len(words) > 1 else ''
     catalogue = InterfaceCatalogue()
@@ -126,12 +126,12 @@ def _kind_missing(package: str, kind: InterfaceKind, full_name: str) -> Interfac
 
 def _name_missing(package: str, kind: InterfaceKind, full_name: str) -> InterfaceNotFoundError:
     name = full_name.rpartition('/')[-1]
-    message = f'{full_name}: {name!r} is none of the {_KIND_WORDS[kind]} of {package!r}'
+    message = f'{full_name}: {name!r} is not one of the {_KIND_WORDS[kind]} of {package!r}'
     return InterfaceNotFoundError(message, help=_find_meant(package, full_name))
 
 
 def _find_meant(package: str, full_name: str) -> str | None:
-    """Find an interface of the same name but another kind, or of the nearest name."""
+    """Return help with the interface of the nearest name, of any kind, in a package."""
     catalogue = InterfaceCatalogue()
     by_name = {
         interface.rpartition('/')[-1]: interface

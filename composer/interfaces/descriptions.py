@@ -1,8 +1,7 @@
-"""What a ROS interface type consists of, as plain records.
+"""Records that describe ROS interfaces: messages, services and actions with their fields.
 
-The records say what the definition files (`.msg`, `.srv`, `.action`) say, in their notation and
-order. They know nothing of where a description comes from, and need neither ROS nor any message
-package.
+They have the content of the definition files (`.msg`, `.srv`, `.action`), in the same order,
+wherever a description comes from, and need neither ROS nor any message package.
 
 See https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html for the notation.
 """
@@ -89,9 +88,9 @@ class MessageDescription:
 
     Attributes:
         name: full name, such as `std_msgs/msg/String` or `std_srvs/srv/SetBool_Request`.
-        fields: in the order of the definition; none for an empty message, whose placeholder
-            `structure_needs_at_least_one_member` is the generators' own affair.
-        constants: in the order of the definition, where the source of the description has them.
+        fields: in the order of the definition; none for an empty message: the placeholder
+            `structure_needs_at_least_one_member` of the generators is left out.
+        constants: in the order of the definition; none if the description comes without them.
         comment: the definition's comment on the whole.
     """
 
@@ -100,8 +99,13 @@ class MessageDescription:
     constants: tuple[ConstantDescription, ...] = ()
     comment: str = ''
 
+    @property
+    def parts(self) -> 'tuple[MessageDescription, ...]':
+        """The messages that a definition file defines, in its order: just this one."""
+        return (self,)
+
     def field(self, name: str) -> FieldDescription | None:
-        """Look up a field, or None where there is none of that name."""
+        """Return the field of a name, or None."""
         return next((field for field in self.fields if field.name == name), None)
 
 
@@ -114,6 +118,11 @@ class ServiceDescription:
     response: MessageDescription
     comment: str = ''
 
+    @property
+    def parts(self) -> tuple[MessageDescription, ...]:
+        """Request and response."""
+        return (self.request, self.response)
+
 
 @dataclass(frozen=True, slots=True)
 class ActionDescription:
@@ -124,6 +133,11 @@ class ActionDescription:
     result: MessageDescription
     feedback: MessageDescription
     comment: str = ''
+
+    @property
+    def parts(self) -> tuple[MessageDescription, ...]:
+        """Goal, result and feedback."""
+        return (self.goal, self.result, self.feedback)
 
 
 InterfaceDescription: TypeAlias = MessageDescription | ServiceDescription | ActionDescription

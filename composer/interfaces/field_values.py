@@ -1,19 +1,19 @@
-"""What values a field can hold: the one set of rules that checks and conversions share.
+"""The values that a field can hold: one set of rules for checks and for conversions.
 
 A rule reads a value and returns it in the form that rclpy's generated classes keep, or raises
-`FieldError`. The decisions:
+`FieldError`. The rules:
 
-- An integer becomes a double where a double is wanted. A float is no integer, even if integral,
-  and a bool is no number: both are slips more often than they are meant.
-- Integers must fit their width, finite floats theirs; infinities and NaN are values.
-- A `byte` is an integer from 0 to 255 or one byte, and rclpy keeps it as one byte.
+- A field of floats takes integers. A field of integers takes no floats, not even integral ones,
+  and no field of numbers takes a bool: these are mistakes more often than not.
+- Integers and finite floats have to fit their width; infinities and NaN are values.
+- A `byte` is an integer from 0 to 255 or one byte; rclpy keeps it as one byte.
 - A string's bound counts bytes of UTF-8, as the middleware does (UTF-16 units for a `wstring`).
-  A `string` with a NUL in it is refused, since rclpy would cut it off there, and so is text with
-  lone surrogates, which cannot be encoded.
+  A `string` must not contain NUL, where rclpy would cut it off, nor lone surrogates, which have no
+  encoding.
 - NumPy's scalars count as the Python values that they hold.
 
-rclpy does not check fields by default, and its C code trusts what it gets: an `int` in a `float64`
-field is published as garbage. So a value that comes back from a rule is safe to publish.
+rclpy does not check fields by default: an `int` in a `float64` field is published as garbage. A
+value that a rule returns is safe to publish.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,7 +44,7 @@ OCTET_KINDS: Final = frozenset({'byte', 'char', 'uint8'})
 
 
 def scalar_reader(field_type: FieldType) -> Reader:
-    """Get the rule for single values of a type, or for the items of an array of it.
+    """Return the rule for single values of a type, or for the items of an array of it.
 
     Args:
         field_type: any but a message.
@@ -65,10 +65,10 @@ def scalar_reader(field_type: FieldType) -> Reader:
 
 
 def read_items(field_type: FieldType, value: object) -> Sequence[object]:
-    """Read a value as the items of an array, which may still be wrong one by one.
+    """Return the items of an array; they are not checked yet.
 
     Raises:
-        FieldError: the value is no sequence, or a string or bytes where these are no arrays.
+        FieldError: the value is not a sequence, or is a string, or bytes for other items.
     """
     if isinstance(value, list | tuple):
         return value
@@ -96,7 +96,7 @@ def check_length(field_type: FieldType, length: int) -> None:
 
 
 def _plain(value: object) -> object:
-    """Get the Python value that a NumPy scalar holds, without importing NumPy."""
+    """Return the Python value that a NumPy scalar holds, without importing NumPy."""
     if type(value).__module__ == 'numpy' and getattr(value, 'shape', None) == ():
         return value.item()  # type: ignore[attr-defined]
     return value

@@ -51,20 +51,20 @@ _MALFORMED: Final = (AttributeError, LookupError, SyntaxError, TypeError, ValueE
 
 
 class TypeDescriptionError(ComposerError):
-    """A document is no type description, or one of types that `.msg` files do not have."""
+    """A document is not a type description, or has types that `.msg` files do not have."""
 
 
 def parse_type_description(document: dict[str, Any]) -> InterfaceDescription:
-    """Make the description of the interface that a JSON document is about.
+    """Return the interface that a JSON document describes.
 
     Raises:
-        TypeDescriptionError: the document is no type description, or a field has a type that
+        TypeDescriptionError: the document is not a type description, or a field has a type that
             only IDL can express.
     """
     try:
         return _parse_interface(document)
     except _MALFORMED as error:
-        message = f'no type description: {error!r}'
+        message = f'not a type description: {error!r}'
         raise TypeDescriptionError(message) from error
 
 

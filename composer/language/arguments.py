@@ -144,7 +144,7 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
     A name that no expression can use, and a default or a choice that does not fit.
     """
     if not is_variable_name(argument.name):
-        yield (), f"'{argument.name}' cannot stand in an expression as a name"
+        yield (), f"'{argument.name}' cannot be used as a name in expressions"
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
@@ -152,7 +152,7 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
         if value is not None and (fault := _find_value_fault(value, argument.type)):
             yield keys, fault
     if default is not None and choices and default not in choices:
-        yield ('default',), f'the default {default!r} is none of the choices'
+        yield ('default',), f'the default {default!r} is not one of the choices'
 
 
 def _find_value_fault(value: Any, type_name: str) -> str | None:
@@ -215,7 +215,7 @@ def _assign_words(
         elif (position := next(positions, None)) is not None:
             yield position, word
         else:
-            faults.append(f"'{word}' is one value too many")
+            faults.append(f"'{word}' is one argument too many")
 
 
 def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
@@ -224,7 +224,7 @@ def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
     if fault:
         faults.append(f"'{argument.name}': {fault}")
     elif argument.choices and value not in argument.choices:
-        faults.append(f"'{argument.name}': {text!r} is none of {_listed(argument.choices)}")
+        faults.append(f"'{argument.name}': {text!r} is not one of {_listed(argument.choices)}")
     return value
 
 

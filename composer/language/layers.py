@@ -6,9 +6,12 @@ where it is a value. What a layer means to change and is not there is a finding.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
+from composer.entity_kinds import ENTITY_KINDS, NODE_BEHAVIOURS
+from composer.language.specs import NodeSpec
 from composer.spelling import suggest
 from composer.yaml_text.document import Document
 
@@ -60,7 +63,7 @@ class _Merging:
             at = (*path, key)
             if value is None and not is_null_a_value(at):
                 if key not in merged:
-                    self._report(at, f"null removes '{key}', which is not there", below)
+                    self._report(at, f"null removes '{key}', which does not exist", below)
                 merged.pop(key, None)
                 self.positions.remove(at)
             elif isinstance(value, dict) and isinstance(merged.get(key), dict):
@@ -82,7 +85,7 @@ class _Merging:
             if each is not None or is_null_a_value(at):
                 kept[key] = self._without_removals(each, at)
             else:
-                self._report(at, f"null removes '{key}', which is not there", {})
+                self._report(at, f"null removes '{key}', which does not exist", {})
         return kept
 
     def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
@@ -114,14 +117,11 @@ _NODE = 2
 _IN_NODE = 3
 _IN_ENTITY = 5
 _OF_THE_USER = ('parameters', 'remap', 'state')
-# What says how a node runs; all else gives it something to do.
-_CHANGES = frozenset(
-    (
-        *('namespace', 'description', 'log_level', 'use_sim_time', 'parameter_services', 'rosout'),
-        *('type_description_service', 'logger_services', 'on_error', 'warn_after', 'parameters'),
-        *('parameter_files', 'state', 'remap', 'wait_for', 'when', 'foreach'),
-    )
-)
+# The keys that give a node something to do, and those that say how it runs.
+_WORK = {kind.section for kind in ENTITY_KINDS if kind.section != 'parameters'} | {
+    each.key for each in NODE_BEHAVIOURS
+}
+_CHANGES = {each.name for each in fields(NodeSpec)} - _WORK | {'warn_after', 'when', 'foreach'}
 
 
 def _is_in_entity(path: DataPath) -> bool:

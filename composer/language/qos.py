@@ -72,10 +72,6 @@ class QosError(ComposerError):
         self.spec = spec
 
 
-class UnknownProfileError(QosError):
-    """Neither the file nor ROS has a profile of this name."""
-
-
 def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
     """Return the policies of a QoS, including those of the profiles that it is based on.
 
@@ -83,8 +79,7 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
         profiles: The named profiles of the file.
 
     Raises:
-        UnknownProfileError: A profile does not exist.
-        QosError: A profile is based on itself.
+        QosError: A profile does not exist, or is based on itself.
     """
     chain = [spec]
     while chain[-1].profile in profiles:
@@ -98,8 +93,8 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
         chain.append(following)
     base = BUILTIN_PROFILES.get(chain[-1].profile)
     if base is None:
-        message = f"no QoS profile is called '{chain[-1].profile}'"
-        raise UnknownProfileError(message, chain[-1])
+        message = f"there is no QoS profile '{chain[-1].profile}'"
+        raise QosError(message, chain[-1])
     policies = dict(base)
     for link in reversed(chain):
         policies |= link.policies

@@ -296,9 +296,11 @@ class ProcessSpec:
         return self.package is not None or any((*given, self.remap, self.log_level))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NodeSpec:
     """A node and all that it has.
+
+    A field with a default is a key of the language, read as it is.
 
     Attributes:
         namespace: In full, as in `/robot`.
@@ -314,13 +316,13 @@ class NodeSpec:
 
     name: str
     namespace: str
-    description: str
-    log_level: LogLevel | None
-    use_sim_time: bool
+    description: str = ''
+    log_level: LogLevel | None = None
+    use_sim_time: bool = False
     parameter_services: bool
-    rosout: bool
-    type_description_service: bool
-    logger_services: bool
+    rosout: bool = True
+    type_description_service: bool = False
+    logger_services: bool = False
     on_error: OnError
     warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]

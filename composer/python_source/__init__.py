@@ -1,1 +1,1 @@
-"""What a behaviour's source says, without importing it."""
+"""Read the source of behaviours without importing it."""

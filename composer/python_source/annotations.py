@@ -1,4 +1,4 @@
-"""What an annotation says, told by the imports of its module and without running it."""
+"""Read annotations of functions, by the imports of their module."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _LENGTH = 3
 
 @dataclass(frozen=True, slots=True)
 class Annotation:
-    """What could be told of an annotation; nothing, for one that may mean anything.
+    """What is known of an annotation; nothing if it can mean anything.
 
     Attributes:
         interface: The full name of an interface type, as in `std_msgs/msg/String` or
             `std_srvs/srv/SetBool_Request`.
         builtin: The name of a built-in type, as in `str`.
-        items: What a generator yields, and what it returns last.
+        items: The arguments of a generator type, as in `Generator[yielded, sent, returned]`.
     """
 
     interface: str | None = None
@@ -41,10 +41,10 @@ class Annotation:
 
 
 def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> Annotation:
-    """Return what an annotation of a module says.
+    """Return what is known of an annotation in a module.
 
     Args:
-        imports: What the module's names stand for, in full with dots.
+        imports: The full dotted names of what the module imports, by name.
     """
     if isinstance(expression, ast.Constant) and isinstance(expression.value, str):
         try:
@@ -72,7 +72,7 @@ def _read_subscript(expression: ast.Subscript) -> Annotation:
 
 
 def _dotted(expression: ast.expr | None) -> str:
-    """Return `a.b.c`, or nothing if it is no such thing."""
+    """Return a dotted name such as `a.b.c`, or an empty text."""
     if isinstance(expression, ast.Name):
         return expression.id
     if isinstance(expression, ast.Attribute):
@@ -82,8 +82,8 @@ def _dotted(expression: ast.expr | None) -> str:
 
 
 def _interface(name: str) -> str | None:
-    """Return the interface type that a dotted name is, as generated packages name them."""
-    # The classes lie in modules with an underscore first, such as `std_msgs.msg._string`.
+    """Return the interface of a dotted name, as generated packages name it, or `None`."""
+    # The classes are in modules with a leading underscore, such as `std_msgs.msg._string`.
     parts = [part for part in name.split('.') if not part.startswith('_')]
     if len(parts) < _LENGTH or parts[1] not in _KINDS or not parts[2][:1].isupper():
         return None

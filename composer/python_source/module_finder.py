@@ -1,4 +1,4 @@
-"""Where the modules of behaviours lie: the project first, then the installed packages."""
+"""Find the modules of behaviours: in the project first, then in installed packages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PROJECT_MARKS = ('pyproject.toml', '.git')
 
 @dataclass(frozen=True, slots=True)
 class MissingModule:
-    """A module that is not there.
+    """A module that does not exist.
 
     Attributes:
         missing: The part of its name that was not found, as in `behaviours.greter`.
@@ -32,10 +32,10 @@ class MissingModule:
 
 
 def project_search_path(configs: Iterable[Path]) -> list[Path]:
-    """Return where the behaviours of files are sought before the installed packages.
+    """Return the folders to search for behaviours before the installed packages.
 
-    That is the folder the command runs in, then each file's folder and its parents up to the one
-    with a `pyproject.toml` or `.git`; without such a one, the file's folder alone.
+    These are the current folder, then the folder of each file and its parents up to the one with a
+    `pyproject.toml` or `.git`; if there is none, only the folder of the file.
     """
     folders = dict.fromkeys(config.resolve().parent for config in configs)
     chains = (each for folder in folders for each in _lineage(folder))
@@ -43,7 +43,7 @@ def project_search_path(configs: Iterable[Path]) -> list[Path]:
 
 
 def _lineage(folder: Path) -> list[Path]:
-    """Return a folder and its parents up to the project's."""
+    """Return a folder and its parents up to the root of the project."""
     lineage = [folder, *folder.parents]
     roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in _PROJECT_MARKS)]
     return lineage[: roots[0] + 1] if roots else [folder]
@@ -59,7 +59,7 @@ class ModuleFinder:
         self._listed: dict[Path, list[str]] = {}
 
     def find(self, name: str) -> ModuleSource | MissingModule:
-        """Return the module `package.module`, or what of its name is missing."""
+        """Return the module `package.module`, or the part of its name that is missing."""
         if name not in self._found:
             self._found[name] = self._find(name)
         return self._found[name]
@@ -86,10 +86,10 @@ class ModuleFinder:
 
 
 def _locate(part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
-    """Return the file of a module or package, and the folders of what lies inside it.
+    """Return the file of a module or package, and the folders of its modules.
 
-    As Python's path finder does: the first regular package or module wins, and folders without
-    an `__init__.py` make one namespace package together.
+    As in Python's path finder, the first regular package or module wins, and folders without an
+    `__init__.py` form one namespace package.
     """
     portions: list[Path] = []
     for folder in folders:
@@ -108,12 +108,12 @@ def _is_there(path: Path, *, is_folder: bool = False) -> bool:
     try:
         return path.is_dir() if is_folder else path.is_file()
     except OSError:
-        # The name is too long, or the folder may not be searched.
+        # The name is too long, or the folder cannot be searched.
         return False
 
 
 def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
-    """Ask Python's other importers, those of editable installs say, for a top-level name."""
+    """Ask the other importers, such as those of editable installs, for a top-level name."""
     try:
         spec = importlib.util.find_spec(part)
     except (ImportError, ValueError, AttributeError):

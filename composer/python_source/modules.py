@@ -1,4 +1,4 @@
-"""Python modules as they lie on disk, read without importing them."""
+"""Read Python modules without importing them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 
 
 class FunctionKind(Enum):
-    """How a function runs when it is called."""
+    """What a call of a function returns: a value, a generator or a coroutine."""
 
     PLAIN = 'function'
     GENERATOR = 'generator function'
@@ -38,9 +38,8 @@ class FunctionSource:
     """A function of a module.
 
     Attributes:
-        kind: `None` if it cannot be told without running the module.
-        signature: `None` if it cannot be told without running the module.
-        definition: Its syntax tree; `None` if it cannot be told without running the module.
+        kind: `None` if only running the module could tell it; `signature` likewise.
+        definition: Its syntax tree, or `None` likewise.
     """
 
     kind: FunctionKind | None = None
@@ -50,18 +49,18 @@ class FunctionSource:
 
 @dataclass(frozen=True, slots=True)
 class ModuleSource:
-    """What a module's text says of its names.
+    """The names that a module defines.
 
     Attributes:
-        functions: What can be called, or may be: its kind and signature where they can be told.
+        functions: The names that can be called, or perhaps can.
         constants: The names that cannot be called, and what they are.
-        imports: What the names that are only ever imported stand for, in full with dots; imports
-            for type checkers included.
-        texts: The names that are one text for good, and that text.
-        lines: Its text.
+        imports: The full dotted names of what is imported, by name; without names that have
+            several meanings, and with imports for type checkers.
+        texts: The constants that are texts, with these.
+        lines: The lines of its source.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
-        syntax_error: Why its text is not Python, or `None`.
-        error_line: Where, counted from 1, if that can be told.
+        syntax_error: The syntax error in its source, or `None`.
+        error_line: The line of this error, counted from 1, if it is known.
     """
 
     path: Path | None
@@ -75,7 +74,7 @@ class ModuleSource:
     error_line: int | None = None
 
     def place_of(self, line: int) -> Span:
-        """Return the span of a line, with the path as a user in the current folder writes it."""
+        """Return the span of a line; its path is relative to the current folder if possible."""
         path, here = self.path or Path(), Path.cwd()
         name = str(path.relative_to(here) if path.is_relative_to(here) else path)
         source = SourceFile(name, self.lines)
@@ -84,7 +83,7 @@ class ModuleSource:
 
 
 def read_module(path: Path) -> ModuleSource:
-    """Return what the text of a module says; nothing of it is run."""
+    """Read a module; none of its code runs."""
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
     lines: tuple[str, ...] = ()
@@ -92,7 +91,7 @@ def read_module(path: Path) -> ModuleSource:
         text = path.read_bytes()
         lines = tuple(text.decode(errors='replace').splitlines())
         tree = ast.parse(text, str(path))
-        # The compiler finds what the parser lets pass: `return` outside a function, say.
+        # The compiler finds more errors than the parser, such as `return` outside a function.
         compile(tree, str(path), 'exec', dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = getattr(error, 'lineno', None)
@@ -115,7 +114,7 @@ def read_module(path: Path) -> ModuleSource:
 
 
 def find_texts(body: list[ast.stmt]) -> dict[str, str]:
-    """Return the names that statements give one text, and never another value, with that text."""
+    """Return the names that statements assign only one text, with that text."""
     texts = {name: text for statement in body for name, text in _read_text(statement)}
     if not texts:
         return {}
@@ -143,7 +142,7 @@ def _read_text(statement: ast.stmt) -> Iterator[tuple[str, str]]:
 class _ModuleReader:
     """Collects the names that the statements of a module bind.
 
-    Later ones win; what a conditional statement binds again may be either.
+    Later ones win; of a name that a conditional statement binds again, nothing is known.
     """
 
     def __init__(self) -> None:
@@ -215,7 +214,7 @@ class _ModuleReader:
         self.constants[name] = what
 
     def _note_import(self, name: str, full_name: str) -> None:
-        """Note what a name stands for now; what stands for several things is not known."""
+        """Store the meaning of a name; a name with several meanings has none."""
         if self.imports.setdefault(name, full_name) != full_name:
             self.imports[name] = ''
 

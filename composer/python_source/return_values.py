@@ -1,4 +1,4 @@
-"""Whether a function returns something at its end, told by its text."""
+"""Find out whether a function always returns a value."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _CONVERSIONS = {'abs', 'bool', 'dict', 'float', 'int', 'len', 'list', 'round', '
 
 
 def always_answers(function: FunctionNode) -> bool:
-    """Return whether every path through a function ends with a value that is surely not `None`.
+    """Return whether every path through a function returns a value that cannot be `None`.
 
     The second parameter, a message, is such a value, and so are its fields.
     """
@@ -57,7 +57,7 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
         return answer.value is not None
     if isinstance(answer, ast.Call):
         name = answer.func.id if isinstance(answer.func, ast.Name) else ''
-        # What is called like a class makes an object.
+        # A name that looks like a class makes an object.
         return name in _CONVERSIONS or name[:1].isupper()
     while isinstance(answer, ast.Attribute):
         answer = answer.value
@@ -65,7 +65,7 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
 
 
 def _ends(body: list[ast.stmt]) -> bool:
-    """Return whether a block ends with `return`, whatever way is taken through it."""
+    """Return whether every path through a block ends with `return`."""
     last = body[-1]
     if isinstance(last, ast.If):
         return bool(last.orelse) and _ends(last.body) and _ends(last.orelse)

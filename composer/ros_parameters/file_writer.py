@@ -23,7 +23,7 @@ def render_parameter_file(nodes: Mapping[str, Mapping[str, tuple[str, Any]]]) ->
 
 def render_parameters_for_all(parameters: Mapping[str, Any]) -> str:
     """Return a parameter file for all nodes of a process; integers among doubles are doubles."""
-    return render_yaml({'/**': {'ros__parameters': _converted(parameters)}}, RCL)
+    return render_yaml({'/**': {'ros__parameters': _converted(dict(parameters))}}, RCL)
 
 
 def _render_node(name: str, values: Mapping[str, tuple[str, Any]]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The types of ROS parameters, and which one a value of YAML has.
+"""The types of ROS parameters, and the type of a YAML value.
 
 Source: `rcl_interfaces/msg/ParameterType`; the names are those of `rclpy.parameter.Parameter.Type`
 in lower case.
@@ -7,6 +7,8 @@ in lower case.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+
+from composer.names import with_article
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,9 +36,9 @@ def infer_parameter_type(value: Any) -> str | None:
 
 
 def convert_parameter_value(value: Any, type_name: str | None) -> Any:
-    """Return the value with integers made doubles where the type wants doubles.
+    """Return the value with integers converted to doubles where the type has doubles.
 
-    A value that does not fit its type comes back as it is.
+    A value that does not fit its type is returned unchanged.
     """
     if type_name == 'double' and type(value) is int:
         return float(value)
@@ -51,13 +53,13 @@ def find_type_fault(value: Any, type_name: str) -> str | None:
 
 
 def find_type_faults(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Yield why a value is not of a parameter type; faults of items with their index."""
+    """Yield why a value is not of a parameter type; for an item, with its index."""
     item_type = type_name.removesuffix('_array')
     if item_type == type_name:
         if fault := _find_scalar_fault(value, type_name):
             yield (), fault
     elif not isinstance(value, list):
-        yield (), f'expected a list, of {item_type} values, got {value!r}'
+        yield (), f'expected a list of {item_type} values, got {value!r}'
     else:
         for index, item in enumerate(value):
             if fault := _find_item_fault(item, item_type):
@@ -73,15 +75,11 @@ def _find_item_fault(item: Any, item_type: str) -> str | None:
 
 def _find_scalar_fault(value: Any, type_name: str) -> str | None:
     if _SCALARS.get(type(convert_parameter_value(value, type_name))) != type_name:
-        return f'expected {_with_article(type_name)}, got {value!r}'
+        return f'expected {with_article(type_name)}, got {value!r}'
     return _find_width_fault(value, type_name)
 
 
 def _find_width_fault(value: Any, type_name: str) -> str | None:
     if type_name == 'integer' and not INT64_MIN <= value <= INT64_MAX:
-        return f'{value} does not fit 64 bits'
+        return f'{value} does not fit in 64 bits'
     return None
-
-
-def _with_article(type_name: str) -> str:
-    return f'an {type_name}' if type_name[0] in 'aeiou' else f'a {type_name}'

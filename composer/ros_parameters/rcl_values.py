@@ -35,9 +35,9 @@ _FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off'
 _DOTTED = re.compile(r'(\.nan|\.NaN|\.NAN|[-+]?\.(?:inf|Inf|INF))')
 
 _SPACE = r'[ \t\n\v\f\r]*'
-# What `strtol` takes whole in base 0: a zero in front makes it octal.
+# What `strtol` reads to its end in base 0: a leading zero makes it octal.
 _INTEGER = re.compile(rf'{_SPACE}([-+]?)(?:0[xX]([0-9a-fA-F]+)|(0[0-7]*)|([1-9][0-9]*))')
-# What `strtod` takes whole.
+# What `strtod` reads to its end.
 _DECIMAL = re.compile(rf'{_SPACE}[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?')
 _HEXADECIMAL = re.compile(
     rf'{_SPACE}[-+]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][-+]?[0-9]+)?'
@@ -51,7 +51,7 @@ _MAX_LENGTH = 1000
 
 
 def parse_override(text: str) -> tuple[Any, str | None] | None:
-    """Return value and type of what follows `:=` on a command line; `None` if rcl refuses it."""
+    """Return the value after `:=` on a command line, and its type; `None` if rcl refuses it."""
     faults: list[Diagnostic] = []
     try:
         trees = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
@@ -67,7 +67,7 @@ class ValueReader:
     """Reads values.
 
     Args:
-        faults: What is wrong with them is added to it.
+        faults: Findings are added to it.
     """
 
     def __init__(self, faults: list[Diagnostic]) -> None:
@@ -77,17 +77,17 @@ class ValueReader:
         """Return a value, `None` if rcl refuses it.
 
         Args:
-            key: What the file calls it.
+            key: The name of the parameter in the file.
         """
         if isinstance(node, ScalarNode):
             if node.text or node.quoted:
                 return read_scalar(node)
             where = f"'{key}' has no value" if key else 'there is no value'
-            help_text = "write one; '' is an empty text, and ROS has no null"
+            help_text = "write '' for an empty string; ROS has no null"
             self._fault(node.span, where, help_text)
             return None
         if isinstance(node, MappingNode):
-            self._fault(node.span, 'a list of parameters holds no mappings')
+            self._fault(node.span, 'a list of parameters cannot contain mappings')
             return None
         return self._read_list(node)
 
@@ -96,7 +96,7 @@ class ValueReader:
         for item in node.items:
             if isinstance(item, SequenceNode):
                 self._fault(
-                    item.span, 'a list of parameters holds no lists', 'write one long list'
+                    item.span, 'a list of parameters cannot contain lists', 'write one flat list'
                 )
                 return None
             value = self.read(item)
@@ -106,8 +106,8 @@ class ValueReader:
                 first, other = (infer_parameter_type(each) for each in (values[0], value))
                 self._fault(
                     item.span,
-                    f'a list has one type: this is {with_article(str(other))}, and the first item '
-                    f'{with_article(str(first))}',
+                    f'all items of a list have one type: this is {with_article(str(other))}, '
+                    f'the first is {with_article(str(first))}',
                     _help_for_mixture(values[0], value),
                 )
                 return None
@@ -120,8 +120,8 @@ class ValueReader:
 
 def _help_for_mixture(first: Any, other: Any) -> str | None:
     if {type(first), type(other)} == {int, float}:
-        return 'give each of them a decimal point'
-    return 'put each in quotes if they are texts' if str in (type(first), type(other)) else None
+        return 'write each with a decimal point'
+    return 'put each in quotes if they are strings' if str in (type(first), type(other)) else None
 
 
 def read_scalar(node: ScalarNode) -> ParameterScalar:
@@ -151,7 +151,7 @@ def _read_integer(text: str) -> int | None:
     sign, *digits = match.groups()
     value = next(int(text, base) for text, base in zip(digits, (16, 8, 10), strict=True) if text)
     value = -value if sign == '-' else value
-    # What does not fit is tried as a double.
+    # If it does not fit, rcl tries a double.
     return value if INT64_MIN <= value <= INT64_MAX else None
 
 

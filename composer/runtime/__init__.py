@@ -4,7 +4,7 @@ Imports go one way through its rooms:
 
 - `messages`: payloads ⇄ messages.
 - `behaviours`: the functions of a file: imported, called, waited for, their errors logged.
-- `health`: what is measured of behaviours, and told.
+- `health`: what is measured of behaviours, and reported.
 - `nodes`: a node without its entities, and what behaviours see of it.
 - `entities`: a file for each kind of entity.
 

@@ -1,4 +1,4 @@
-"""What `on_error` says is done when a behaviour raises; above all, nodes are restarted."""
+"""What happens when a behaviour raises, as `on_error` says; above all, restarts of nodes."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class NodeRestarter:
         timeout_sec: How long the behaviours of a node get to end.
 
     Attributes:
-        lock: Held while a node is rebuilt, so that nobody stops half of one.
+        lock: Held while a node is rebuilt, for nothing to stop an incomplete node.
     """
 
     def __init__(
@@ -91,8 +91,8 @@ class NodeRestarter:
     def restart(self, full_name: str) -> None:
         """Rebuild a node: its entities, parameters and state are as at the start again.
 
-        One that hangs goes on as it is. If the new one cannot start, that is an error of the
-        node, after which it is restarted again.
+        A node that hangs is left as it is. If the new one cannot start, that counts as an error of
+        the node, after which it is restarted again.
         """
         with self.lock:
             old = self._nodes[full_name]
@@ -115,13 +115,13 @@ class NodeRestarter:
         if not has_ended:
             executor.wake()
             hanging = ', '.join(str(call.owner) for call in node.running.calls())
-            system_logger.error(f"node '{name}' is not restarted, for it hangs: {hanging}")
+            system_logger.error(f"node '{name}' cannot be restarted, because it hangs: {hanging}")
             return False
         executor.remove_node(node.ros)
         node.destroy()
         if not node.ros.wait_until_gone(_GONE_SEC):
             system_logger.warn(
-                f"node '{name}': something still holds an entity of the node before its "
+                f"node '{name}': something still holds an entity of the node from before its "
                 'restart, so its log may be missing on /rosout'
             )
         return True

@@ -37,10 +37,10 @@ _COMMON_SERVICES = (
     '/set_parameters_atomically',
 )
 _INTRODUCTIONS = {
-    'topic': 'published are',
-    'service': 'served are',
-    'action': 'served are',
-    'node': 'there are',
+    'topic': 'published topics',
+    'service': 'services',
+    'action': 'actions',
+    'node': 'nodes',
 }
 
 
@@ -155,5 +155,5 @@ def describe_graph(kind: ConditionKind, name: str, graph: RosGraph) -> str:
         for each in graph.names(kind)
         if not (each in _COMMON_TOPICS or '/_' in each or each.endswith(_COMMON_SERVICES))
     ]
-    every = ' but those that every node has' if kind in ('topic', 'service') else ' at all'
-    return suggest(name, names, _INTRODUCTIONS[kind]) or f'there is no {kind}{every}'
+    common = ' except those of every node' if kind in ('topic', 'service') else ''
+    return suggest(name, names, _INTRODUCTIONS[kind]) or f'there are no {kind}s{common}'

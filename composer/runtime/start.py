@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rclpy.exceptions import InvalidHandle
 
 from composer.errors import StartError
-from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
@@ -21,7 +21,7 @@ _POLL_SEC = 0.05
 
 
 class NodeStarter:
-    """Creates and starts the nodes of a system, at its start and anew.
+    """Creates and starts the nodes of a system, at its start and at their restarts.
 
     Args:
         nodes: Takes each node that is created, by its full name.
@@ -65,7 +65,7 @@ class NodeStarter:
         while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
             pass
         if failures:
-            # What has not begun has nothing to stop.
+            # `on_stop` is not called for it.
             node.has_begun = False
             message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.runtime.behaviours.calls import Owner
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -21,51 +21,51 @@ _POLL_SEC = 0.05
 
 
 def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
-    """Let all behaviours end, at the same time in all nodes.
+    """Stop all nodes at the same time.
 
-    A node's `on_stop` is called when its behaviours have ended, and after half the time if they
-    have not: what must be switched off is switched off even beside a callback that hangs.
-    Services of nodes without an `on_stop` answer until all of them have ended.
+    A node's `on_stop` is called when its behaviours have ended, or after half the time if they
+    have not: it switches off what it must even beside a callback that hangs. Services of nodes
+    without an `on_stop` answer until all nodes have stopped.
 
     Returns:
-        Whether all of them ended in time; the stacks of those that did not have been logged.
+        Whether all behaviours ended in time; the stacks of those that did not are logged.
     """
     deadline = monotonic() + timeout_sec
     for node in nodes:
         node.gate.is_open = False
         _cancel_timers(node)
-    ends = [_End(node, timeout_sec) for node in reversed(nodes) if _has_an_end(node)]
-    for end in ends:
-        end.wait(deadline)
+    stops = [_NodeStop(node, timeout_sec) for node in reversed(nodes) if _has_work_left(node)]
+    for stop in stops:
+        stop.wait(deadline)
     for node in nodes:
         node.gate.close()
     ended = [_wait_until_idle(node, deadline) for node in nodes]
-    return all(ended) and all(end.is_over for end in ends)
+    return all(ended) and all(stop.is_over for stop in stops)
 
 
 def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) -> bool:
-    """Let one node end so that it can be built anew.
+    """Stop one node, before it is restarted.
 
     Args:
-        gives_up: Whether that is not wanted any more.
+        gives_up: Whether to stop waiting for it.
 
     Returns:
-        Whether it has ended. If only `on_stop` has not, the node stays closed; if one of its
-        behaviours hangs, nothing has been done to it.
+        Whether it has stopped. If only `on_stop` has not ended, the gate of the node stays closed;
+        if one of its behaviours hangs, nothing has been done to the node.
     """
     node.gate.close()
     if not _wait_for(node.running.wait_until_idle, timeout_sec, gives_up):
         node.gate.open()
         return False
     _cancel_timers(node)
-    if _has_an_end(node):
+    if _has_work_left(node):
         ended = threading.Event()
 
-        def end() -> None:
-            _end(node, timeout_sec)
+        def finish() -> None:
+            _finish(node, timeout_sec)
             ended.set()
 
-        threading.Thread(target=end, daemon=True).start()
+        threading.Thread(target=finish, daemon=True).start()
         _wait_for(ended.wait, timeout_sec, gives_up)
     # It is not stopped twice.
     node.has_begun = False
@@ -83,14 +83,14 @@ def _wait_for(
     return True
 
 
-class _End:
-    """The end of one node, in a thread of its own if there can be one.
+class _NodeStop:
+    """The stop of one node, in a thread of its own if possible.
 
-    There is none where the process has all threads that it may have, and one that begins may
-    break off at once, at a tracing function that a behaviour has set for all of them.
+    It is not where the process has reached its limit of threads; and a new thread may end at once
+    if a behaviour has set a tracing function that raises.
 
     Attributes:
-        is_over: Whether it has come to its end.
+        is_over: Whether the node has stopped.
     """
 
     def __init__(self, node: LiveNode, timeout_sec: float) -> None:
@@ -113,11 +113,11 @@ class _End:
 
     def _run(self) -> None:
         self._has_begun = True
-        _end(self._node, self._timeout_sec)
+        _finish(self._node, self._timeout_sec)
         self.is_over = True
 
 
-def _has_an_end(node: LiveNode) -> bool:
+def _has_work_left(node: LiveNode) -> bool:
     return bool(node.suspended) or (node.spec.on_stop is not None and node.has_begun)
 
 
@@ -128,7 +128,7 @@ def _cancel_timers(node: LiveNode) -> None:
             timer.cancel()
 
 
-def _end(node: LiveNode, timeout_sec: float) -> None:
+def _finish(node: LiveNode, timeout_sec: float) -> None:
     node.running.wait_until_idle(timeout_sec / 2)
     for behaviour in node.suspended:
         behaviour.close(timeout_sec)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
 from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
@@ -20,13 +21,13 @@ from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.wait_for import WaitingStarter, describe_parts, list_waiters
+from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
-    from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
@@ -69,10 +70,10 @@ class System:
         self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
         self._graph_watcher = GraphWatcher(self._endpoints)
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
-        self._services = self._share(positions, functions, ros_arguments)
-        self._starter = NodeStarter(self._nodes, self._services)
+        self._handle = self._create_handle(positions, functions, ros_arguments)
+        self._starter = NodeStarter(self._nodes, self._handle)
         self._restarter = NodeRestarter(
-            self._nodes, self._starter, self._services, spec.shutdown_timeout_sec
+            self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
         )
         self._diagnostics_publisher: DiagnosticsPublisher | None = None
         self._processes = ProcessSupervisor(
@@ -84,7 +85,7 @@ class System:
             log_levels,
         )
 
-    def _share(
+    def _create_handle(
         self,
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
@@ -154,7 +155,7 @@ class System:
         if self.stop_requested:
             return
         elapsed = monotonic() - self._begun
-        parts = describe_parts(self._nodes, self._processes.by_name)
+        parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
 
@@ -195,7 +196,7 @@ class System:
             return prompt
         self._starter.open(prompt)
         starter = WaitingStarter(
-            self._context, self._nodes, self._processes.by_name, self._services.positions
+            self._context, self._nodes, self._processes.by_name, self._handle.positions
         )
         starter.start_all(waiters, self._stop_request)
         return []
@@ -214,14 +215,14 @@ class System:
             self.request_stop(code)
 
     def _publish_diagnostics(self) -> None:
-        board, period_sec = self._services.health, self._spec.diagnostics_period_sec
-        if board is None or period_sec is None:
+        health, period_sec = self._handle.health, self._spec.diagnostics_period_sec
+        if health is None or period_sec is None:
             return
-        publisher = DiagnosticsPublisher(self._spec.name, period_sec, board, self._overdue_calls)
+        publisher = DiagnosticsPublisher(self._spec.name, period_sec, health, self._overdue_calls)
         try:
-            publisher.start(self._context, self._services.ros_arguments)
+            publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'there will be no /diagnostics: {error}')
+            system_logger.warn(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 
@@ -260,5 +261,13 @@ class System:
 def _limits(spec: SystemSpec) -> Iterator[float | None]:
     for node in spec.nodes.values():
         yield node.warn_after_sec
-        for entities in (node.subscriptions, node.timers, node.services, node.actions):
-            yield from (entity.warn_after_sec for entity in entities.values())
+        for kind in ENTITY_KINDS:
+            for entity in getattr(node, kind.section).values():
+                yield getattr(entity, 'warn_after_sec', None)
+
+
+def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
+    """Return `2 nodes and 1 process`; what there is none of is left out."""
+    counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
+    parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
+    return ' and '.join(parts) or '0 nodes'

@@ -16,7 +16,7 @@ from composer.names import expand_name, remap_name
 from composer.runtime.ros_graph import RosGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from rclpy.context import Context
     from rclpy.node import Node as RosNode
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 _POLL_SEC = 0.05
 _REASONS = {
-    'topic': 'nobody publishes it',
-    'service': 'nobody serves it',
-    'action': 'nobody serves it',
-    'node': 'it is not there',
+    'topic': 'nothing publishes it',
+    'service': 'nothing serves it',
+    'action': 'nothing serves it',
+    'node': 'there is no such node',
 }
 
 
@@ -177,13 +177,6 @@ def list_waiters(
             for node in waiting_nodes
         ),
     ]
-
-
-def describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
-    """Return `2 nodes and 1 process`; what there is none of is left out."""
-    counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
-    parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
-    return ' and '.join(parts) or '0 nodes'
 
 
 def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:

@@ -1,4 +1,4 @@
-"""An error of the JSON Schema validator → faults in the words of the language."""
+"""An error of the JSON Schema validator → violations in the words of the language."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from composer.schema.violations import (
-    StructureFault,
+    Violation,
     conflicting_keys,
     describe_types,
     droppable,
@@ -28,20 +28,20 @@ _KINDS = ('msg', 'srv', 'action')
 _SEPARATORS = re.compile(r'[/.:]+')
 
 
-def explain(error: ValidationError) -> Iterator[StructureFault]:
-    """Yield the faults behind an error; several for several unknown keys of one mapping."""
+def explain(error: ValidationError) -> Iterator[Violation]:
+    """Yield the violations behind an error: one for each unknown key of a mapping."""
     explanation = _EXPLANATIONS.get(str(error.validator), _explain_otherwise)
     return explanation(error)
 
 
-def _explain_unknown_keys(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_unknown_keys(error: ValidationError) -> Iterator[Violation]:
     schema = error.schema
     known = schema.get('properties', {})
     path = path_of(error)
     for key in error.instance:
         if key in known or any(re.search(p, key) for p in schema.get('patternProperties', {})):
             continue
-        yield StructureFault(
+        yield Violation(
             'unknown-key',
             f"unknown key '{key}'{owner_of(error)}",
             (*path, key),
@@ -52,20 +52,20 @@ def _explain_unknown_keys(error: ValidationError) -> Iterator[StructureFault]:
         )
 
 
-def _explain_missing_keys(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_missing_keys(error: ValidationError) -> Iterator[Violation]:
     missing = [key for key in error.validator_value if key not in error.instance]
     # The validator reports each missing key on its own; its message begins with the key.
     key = next((key for key in missing if error.message.startswith(repr(key))), missing[0])
     yield missing_key(error, key, f"the key '{key}' is missing{owner_of(error)}")
 
 
-def _explain_type(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_type(error: ValidationError) -> Iterator[Violation]:
     yield wrong_type(error, describe_types(error.validator_value))
 
 
-def _explain_enum(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_enum(error: ValidationError) -> Iterator[Violation]:
     options = [str(option) for option in error.validator_value]
-    yield StructureFault(
+    yield Violation(
         'bad-value',
         f'expected one of {", ".join(options)}; got {show_value(error.instance)}',
         path_of(error),
@@ -74,17 +74,17 @@ def _explain_enum(error: ValidationError) -> Iterator[StructureFault]:
     )
 
 
-def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_const(error: ValidationError) -> Iterator[Violation]:
     path = path_of(error)
     if path == ('version',):
-        yield StructureFault(
+        yield Violation(
             'unsupported-version',
-            f'version {show_value(error.instance)} is not known; this Composer reads version 1',
+            f'version {show_value(error.instance)} is not supported, only version 1',
             path,
             path,
         )
         return
-    yield StructureFault(
+    yield Violation(
         'bad-value',
         f'expected {error.validator_value!r}, got {show_value(error.instance)}',
         path,
@@ -92,11 +92,11 @@ def _explain_const(error: ValidationError) -> Iterator[StructureFault]:
     )
 
 
-def _explain_pattern(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_pattern(error: ValidationError) -> Iterator[Violation]:
     expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
     path = path_of(error)
     meant = _find_meant_form(error.instance, error.validator_value)
-    yield StructureFault(
+    yield Violation(
         'bad-value',
         f'expected {expected}; got {show_value(error.instance)}',
         path,
@@ -115,11 +115,11 @@ _BOUNDS = {
 _BOUND_UNITS = {'minItems': ' item', 'minLength': ' character'}
 
 
-def _explain_bound(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_bound(error: ValidationError) -> Iterator[Violation]:
     keyword = str(error.validator)
     path = path_of(error)
     limit = f'{error.validator_value:.9f}'.rstrip('0').rstrip('.')
-    yield StructureFault(
+    yield Violation(
         'out-of-range',
         f'expected {_BOUNDS[keyword]} {limit}{_BOUND_UNITS.get(keyword, "")}, '
         f'got {show_value(error.instance)}',
@@ -128,30 +128,30 @@ def _explain_bound(error: ValidationError) -> Iterator[StructureFault]:
     )
 
 
-def _explain_dependency(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_dependency(error: ValidationError) -> Iterator[Violation]:
     path = path_of(error)
     for key, needed in error.validator_value.items():
         for other in needed:
             if key in error.instance and other not in error.instance:
-                yield StructureFault(
+                yield Violation(
                     'missing-key',
-                    f"'{key}' needs '{other}' beside it",
+                    f"'{key}' requires '{other}'",
                     (*path, key),
                     (*path, key),
                     at_key=True,
                 )
 
 
-def _explain_exclusion(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_exclusion(error: ValidationError) -> Iterator[Violation]:
     if isinstance(error.instance, dict):
         yield conflicting_keys(error, error.validator_value['required'])
 
 
-def _explain_alternatives(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_alternatives(error: ValidationError) -> Iterator[Violation]:
     branches = error.validator_value
     if all(set(branch) == {'required'} for branch in branches):
         if not isinstance(error.instance, dict):
-            return  # what is no mapping has its finding for that
+            return  # its type has a finding of its own
         yield _explain_key_alternatives(error, [branch['required'] for branch in branches])
         return
     by_branch: dict[int, list[ValidationError]] = {}
@@ -169,7 +169,7 @@ def _explain_alternatives(error: ValidationError) -> Iterator[StructureFault]:
 
 
 def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
-    """Return whether an alternative is out of the question for what stands there."""
+    """Return whether a value cannot have been meant as an alternative."""
     if inner.absolute_path != outer.absolute_path:
         return False
     if inner.validator == 'const':
@@ -188,9 +188,7 @@ def _describe_mismatch(error: ValidationError) -> str:
     return describe_types(error.validator_value)
 
 
-def _explain_key_alternatives(
-    error: ValidationError, alternatives: list[list[str]]
-) -> StructureFault:
+def _explain_key_alternatives(error: ValidationError, alternatives: list[list[str]]) -> Violation:
     present = [keys for keys in alternatives if all(key in error.instance for key in keys)]
     if len(present) > 1:
         return conflicting_keys(error, [keys[0] for keys in present])
@@ -201,13 +199,13 @@ def _explain_key_alternatives(
     return missing_key(error, first, f'{wanted} {verb} missing{owner_of(error)}')
 
 
-def _explain_otherwise(error: ValidationError) -> Iterator[StructureFault]:
+def _explain_otherwise(error: ValidationError) -> Iterator[Violation]:
     path = path_of(error)
-    yield StructureFault('bad-value', error.message, path, droppable(path))
+    yield Violation('bad-value', error.message, path, droppable(path))
 
 
 def _find_meant_form(text: str, pattern: str) -> str | None:
-    """Return what a text would be in the form of a pattern of the schema, or `None`.
+    """Return a text in the form that a pattern of the schema wants, or `None`.
 
     Types as other places write them: `std_msgs/String` (ROS 1), `std_msgs.msg.String` (Python),
     `std_msgs::msg::String` (C++); behaviours with a dot, slashes, dashes, `.py` or `()` in them.
@@ -232,7 +230,7 @@ def _as_behaviour(text: str) -> str:
     return f'{module.removesuffix(".py").replace("/", ".")}:{function}'
 
 
-_EXPLANATIONS: dict[str, Callable[[ValidationError], Iterator[StructureFault]]] = {
+_EXPLANATIONS: dict[str, Callable[[ValidationError], Iterator[Violation]]] = {
     'additionalProperties': _explain_unknown_keys,
     'required': _explain_missing_keys,
     'type': _explain_type,

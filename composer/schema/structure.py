@@ -1,4 +1,4 @@
-"""The schema of the language: what it says of data, as findings in the words of the language.
+"""Checks data against the schema, and returns findings in the words of the language.
 
 The schema (JSON Schema 2020-12) is the one description of the structure, for editors too.
 """
@@ -13,24 +13,24 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import MAX_FINDINGS
 from composer.schema import schema_path
-from composer.schema.compiler import Acceptor, SchemaCompiler
+from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
-    from composer.schema.violations import StructureFault
+    from composer.schema.violations import Violation
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key, SourceMap
 
-# What editors accept in place of a number, a word and the like. Here, the values are in place.
+# Editors accept an expression in place of a value; here, expressions are evaluated already.
 _TEMPLATE = {'$ref': '#/$defs/template'}
 
-# What a file without these keys is read on with, once their absence has been reported.
+# The values for missing keys of the file, once they are reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
 
-# The sections whose entries have keys that count before the schema does; the definitions of these.
+# Sections whose entries have keys that count before the check, and their definitions.
 _OUTER_SECTIONS = {
     'args': 'argument',
     'nodes': 'node',
@@ -41,49 +41,49 @@ _DEPTH_OF_ENTRIES = 3
 
 
 def check_structure(document: Document) -> None:
-    """Check the data of a document against the schema, and drop from them what is wrong.
+    """Check the data of a document against the schema, and drop what is not valid.
 
-    What was dropped before, since its expression could not be evaluated, is removed as well. A
-    misspelt key is reported and then read as the nearest right one, so that what lies below it is
-    checked in the same run. What is wrong with values that depend on samples is dropped, and not
-    reported. Of data with more than a thousand errors nothing is left.
+    What was dropped before, because its expression could not be evaluated, is removed as well. A
+    misspelt key is reported and then read as the nearest known one: what stands below it is
+    checked in the same run. Sample values that are not valid are dropped without a finding. Of
+    data with more than a thousand findings nothing is left.
     """
     positions, data = document.positions, document.data or {}
     failed = [_entry_of(path) for path in document.dropped]
-    if failed or not _schema().accepts(data):
+    if failed or not _schema().is_valid(data):
         data = _copied(data)
     _remove_entries(data, failed)
-    findings = _mend_keys(data, positions)
+    findings = _correct_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
-    faults = _find_faults(data)
-    missing = {fault.path for fault in faults if fault.rule == 'missing-key'}
-    for fault in faults:
-        # What one key needs beside it is missing once, also if its entry needs it anyway.
-        known = fault.path in incomplete or (fault.path and fault.path[:-1] in missing)
-        if fault.path not in document.sampled_paths and not (
-            fault.rule == 'missing-key' and known
+    violations = _find_violations(data)
+    missing = {violation.path for violation in violations if violation.rule == 'missing-key'}
+    for violation in violations:
+        # A key that is missing twice, for its entry and for another key, is reported once.
+        known = violation.path in incomplete or (violation.path and violation.path[:-1] in missing)
+        if violation.path not in document.sampled_paths and not (
+            violation.rule == 'missing-key' and known
         ):
-            findings.append(fault.diagnostic(positions))
+            findings.append(violation.diagnostic(positions))
     document.diagnostics += findings
     if len(findings) >= MAX_FINDINGS:
         document.data, document.dropped = dict(_REQUIRED), set()
     else:
-        document.data, document.dropped = data, {*failed, *_drop_faulty(data, faults)}
+        document.data, document.dropped = data, {*failed, *_drop_invalid(data, violations)}
 
 
 def correct_outer_keys(document: Document) -> None:
-    """Correct misspelt keys that are read before the schema is checked.
+    """Correct misspelt keys that are read before the check against the schema.
 
     These are the keys of the file, of the declarations of arguments, and `foreach` and `when`.
     """
     data = document.data or {}
     if not all(map(_is_known, _outer_keys(data))):
         document.data = _copied(data)
-        document.diagnostics += _mend_keys(document.data, document.positions, _is_outer)
+        document.diagnostics += _correct_keys(document.data, document.positions, _is_outer)
 
 
 def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the definitions in the schema, '' for the file itself, and keys that they may have."""
+    """Yield the keys of the file and of outer entries, after their definitions in the schema."""
     yield from (('', key) for key in data)
     for section, definition in _OUTER_SECTIONS.items():
         entries = data.get(section)
@@ -111,24 +111,25 @@ def _is_outer(path: DataPath, meant: str) -> bool:
     return is_entry and (path[0] == 'args' or meant in ('foreach', 'when'))
 
 
-def _mend_keys(
+def _correct_keys(
     data: dict[str, Any],
     positions: SourceMap,
     is_wanted: Callable[[DataPath, str], bool] = lambda *_: True,
 ) -> list[Diagnostic]:
-    """Give misspelt keys their right names; return the findings for them."""
+    """Correct misspelt keys in place; return the findings for them."""
     findings: list[Diagnostic] = []
     while len(findings) < MAX_FINDINGS:
         names: dict[DataPath, dict[Key, str]] = {}
-        for fault in _find_faults(data):
-            if fault.meant is None or not is_wanted(fault.path, fault.meant):
+        for violation in _find_violations(data):
+            meant = violation.meant
+            if meant is None or not is_wanted(violation.path, meant):
                 continue
-            parent, key = fault.path[:-1], fault.path[-1]
+            parent, key = violation.path[:-1], violation.path[-1]
             renamed = names.setdefault(parent, {})
-            if fault.meant not in _value_at(data, parent) and fault.meant not in renamed.values():
-                renamed[key] = fault.meant
-                findings.append(fault.diagnostic(positions))
-                positions.move(fault.path, (*parent, fault.meant))
+            if meant not in _value_at(data, parent) and meant not in renamed.values():
+                renamed[key] = meant
+                findings.append(violation.diagnostic(positions))
+                positions.move(violation.path, (*parent, meant))
         if not any(names.values()):
             break
         for path, renamed in names.items():
@@ -136,31 +137,31 @@ def _mend_keys(
     return findings
 
 
-def _drop_faulty(data: dict[str, Any], faults: list[StructureFault]) -> Iterator[DataPath]:
-    """Remove what is wrong, or put something in its place; yield the paths of it."""
-    while faults:
-        entries = [fault.drop for fault in faults if not fault.stand_in]
-        for fault in faults:
-            if fault.stand_in:
-                key, value = fault.stand_in
-                _value_at(data, fault.path)[key] = value
-                yield (*fault.path, key)
+def _drop_invalid(data: dict[str, Any], violations: list[Violation]) -> Iterator[DataPath]:
+    """Remove or replace what is not valid, in place; yield its paths."""
+    while violations:
+        entries = [violation.drop for violation in violations if not violation.stand_in]
+        for violation in violations:
+            if violation.stand_in:
+                key, value = violation.stand_in
+                _value_at(data, violation.path)[key] = value
+                yield (*violation.path, key)
         yield from entries
         _remove_entries(data, entries)
         for key, value in _REQUIRED.items():
             data.setdefault(key, value)
-        faults = _find_faults(data)
+        violations = _find_violations(data)
 
 
 def is_sound(part: dict[str, Any]) -> bool:
-    """Return whether the schema finds nothing wrong with some top-level keys alone."""
-    return not _find_faults(_REQUIRED | part)
+    """Return whether some top-level keys alone are valid."""
+    return not _find_violations(_REQUIRED | part)
 
 
 def without_templates(schema: Any) -> Any:
-    """Return a schema without the alternatives that accept expressions.
+    """Return a schema without the alternatives for expressions.
 
-    An alternative that is left alone takes the place of its `anyOf`.
+    The only alternative left takes the place of its `anyOf`.
     """
     if isinstance(schema, list):
         return [without_templates(item) for item in schema if item != _TEMPLATE]
@@ -173,16 +174,16 @@ def without_templates(schema: Any) -> Any:
     return plain
 
 
-def _find_faults(data: dict[str, Any]) -> list[StructureFault]:
-    """Return the faults of the structure, a thousand at most."""
-    if _schema().accepts(data):
+def _find_violations(data: dict[str, Any]) -> list[Violation]:
+    """Return the violations, a thousand at most."""
+    if _schema().is_valid(data):
         return []
-    faults = (fault for error in _validator().iter_errors(data) for fault in explain(error))
-    return list(islice(faults, MAX_FINDINGS))
+    violations = (each for error in _validator().iter_errors(data) for each in explain(error))
+    return list(islice(violations, MAX_FINDINGS))
 
 
 def _copied(data: Any) -> Any:
-    """Return a copy in which nothing is shared: aliases and a file included twice share data."""
+    """Return a copy in which nothing is shared: aliases, and files included twice, share data."""
     if isinstance(data, dict):
         return {key: _copied(value) for key, value in data.items()}
     return [_copied(item) for item in data] if isinstance(data, list) else data
@@ -201,12 +202,12 @@ def _rename_keys(mapping: dict[Key, Any], names: dict[Key, str]) -> None:
 
 
 def _entry_of(path: DataPath) -> DataPath:
-    """Return the path of the mapping entry that holds a value; items of lists cannot go alone."""
+    """Return the path of the mapping entry of a value: items of lists cannot be dropped."""
     return tuple(takewhile(lambda key: isinstance(key, str), path))
 
 
 def _remove_entries(data: Any, paths: Iterable[DataPath]) -> None:
-    """Remove entries of nested mappings, also of those in lists, if they are there."""
+    """Remove entries of nested mappings and lists, if they exist."""
     for path in paths:
         mapping = data
         for key in path[:-1]:
@@ -226,7 +227,7 @@ def _child(data: Any, key: Key) -> Any:
 class _Schema:
     document: dict[str, Any]
     compiler: SchemaCompiler
-    accepts: Acceptor
+    is_valid: Check
 
 
 @cache
@@ -238,7 +239,7 @@ def _schema() -> _Schema:
 
 @cache
 def _validator() -> Any:
-    # Importing it takes a fifth of a check's time, and most files have no faults.
+    # Importing it takes a fifth of a check's time, and most files are valid.
     from composer.schema.validator import create_validator
 
     return create_validator(_schema().document, _schema().compiler)

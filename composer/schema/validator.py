@@ -1,4 +1,4 @@
-"""The JSON Schema validator, for what it says of faulty data."""
+"""The JSON Schema validator, which says what is not valid, and where."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _check_reference_fully = Draft202012Validator.VALIDATORS['$ref']
 
 
 def create_validator(schema: dict[str, Any], compiler: SchemaCompiler) -> Any:
-    """Return a validator that passes over those parts of the data that are right.
+    """Return a validator that skips the valid parts of the data.
 
     Args:
-        compiler: Of the same schema.
+        compiler: The compiler of the same schema.
     """
 
     def check_reference(

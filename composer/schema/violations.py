@@ -1,4 +1,4 @@
-"""Faults of structure as data, and how they are worded."""
+"""Violations of the schema as data, and their wording."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ _TYPE_WORDS = {
 }
 _LONGEST_SHOWN = 40
 
-# What an entry without one of these keys is read on with; the checks pass over them, since the
-# paths of stand-ins count as dropped.
+# The values for missing keys of an entry. Checks skip them: their paths count as dropped.
 _STAND_INS: dict[str, Mapping[str, Any]] = {
     **{kind.noun: kind.stand_in for kind in ENTITY_KINDS},
     'condition': {'topic': 'unknown'},
@@ -35,15 +34,15 @@ _STAND_INS: dict[str, Mapping[str, Any]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class StructureFault:
-    """One fault of structure.
+class Violation:
+    """One violation of the schema.
 
     Attributes:
-        path: The data that are wrong; of a key, the path of its value.
-        at_key: Whether the key is wrong and not the value.
-        drop: The smallest mapping entry without which the data can be read on.
-        meant: Of an unknown key, the one that it is nearest to.
-        stand_in: Of a missing key, the key and a value to read the rest of its mapping with.
+        path: Where it is; for a key, the path of its value.
+        at_key: Whether the key is wrong, rather than its value.
+        drop: The path of the smallest mapping entry to drop before reading on.
+        meant: For an unknown key, the nearest known one.
+        stand_in: For a missing key, the key and a value to read the rest of its mapping with.
     """
 
     rule: str
@@ -62,35 +61,33 @@ class StructureFault:
 
 
 def path_of(error: ValidationError) -> DataPath:
-    """Return where what an error speaks of is."""
+    """Return the path of the data that an error is about."""
     return tuple(error.absolute_path)
 
 
 def droppable(path: DataPath) -> DataPath:
-    """Return the path of the innermost mapping entry; items of lists cannot go alone."""
+    """Return the path of the innermost mapping entry: items of lists cannot be dropped alone."""
     while path and isinstance(path[-1], int):
         path = path[:-1]
     return path
 
 
-def missing_key(error: ValidationError, key: str, message: str) -> StructureFault:
-    """Return the fault of a key that is missing."""
+def missing_key(error: ValidationError, key: str, message: str) -> Violation:
+    """Return the violation for a missing key."""
     path = path_of(error)
     known = _STAND_INS.get(error.schema.get('title', ''), {})
     stand_in = (key, known[key]) if key in known else None
-    return StructureFault(
-        'missing-key', message, path, droppable(path), at_key=True, stand_in=stand_in
-    )
+    return Violation('missing-key', message, path, droppable(path), at_key=True, stand_in=stand_in)
 
 
-def conflicting_keys(error: ValidationError, keys: list[str]) -> StructureFault:
-    """Return the fault of keys that exclude each other."""
+def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
+    """Return the violation for keys that cannot be used together."""
     path = path_of(error)
     last = max(keys, key=list(error.instance).index)
     listed = ' and '.join(f"'{key}'" for key in keys)
-    return StructureFault(
+    return Violation(
         'conflicting-keys',
-        f'{listed} exclude each other{owner_of(error)}',
+        f'{listed} cannot be used together{owner_of(error)}',
         (*path, last),
         (*path, last),
         at_key=True,
@@ -98,11 +95,11 @@ def conflicting_keys(error: ValidationError, keys: list[str]) -> StructureFault:
     )
 
 
-def wrong_type(error: ValidationError, expected: str) -> StructureFault:
-    """Return the fault of a value of another type than is expected."""
+def wrong_type(error: ValidationError, expected: str) -> Violation:
+    """Return the violation for a value of a wrong type."""
     path = path_of(error)
     empty = error.instance is None and expected == 'a mapping'
-    return StructureFault(
+    return Violation(
         'wrong-type',
         f'expected {expected}, got {show_value(error.instance)}',
         path,
@@ -118,7 +115,7 @@ def describe_types(types: str | list[str]) -> str:
 
 
 def owner_of(error: ValidationError) -> str:
-    """Return the end of a message that says in what the fault is; empty for the whole file."""
+    """Return the end of a message, which names the entry; empty for the whole file."""
     title = error.schema.get('title')
     if not title or title == 'Composer system':
         return ''

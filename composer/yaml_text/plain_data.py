@@ -33,7 +33,7 @@ _MERGE_KEY = '<<'
 def construct_data(
     root: TreeNode | None, positions: SourceMap
 ) -> tuple[Any, tuple[Diagnostic, ...]]:
-    """Return the data of a tree and what was wrong with it; fill in its positions.
+    """Return the data of a tree and the findings; fill in its positions.
 
     Raises:
         CompositionError: Aliases expand to more than 300,000 values or 100 levels.
@@ -111,30 +111,30 @@ class _Constructor:
             # `{{ name }}` without quotes is a mapping whose key is a mapping.
             template = isinstance(node, MappingNode)
             quoting = 'put an expression in quotes: "{{ name }}"' if template else None
-            message = 'a key is a string, not a list or a mapping'
+            message = 'a key must be a string, not a list or a mapping'
             self._fault(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
-            self._fault(node, 'bad-key', 'a key is a string, and nothing stands here')
+            self._fault(node, 'bad-key', 'a key is a string, and this one is empty')
             return None
         self._fault(
             node,
             'bad-key',
-            f'a key is a string, and {node.text} is not one',
+            f'a key must be a string, and {node.text} is not',
             help=f"write '{node.text}'",
         )
         return node.text
 
     def _duplicate(self, key: str, node: TreeNode, span: Span) -> None:
-        first = Related('it stands here first', span)
+        first = Related('first used here', span)
         self.faults.append(
             diagnostic_at(
                 node.span,
                 'duplicate-key',
-                f"the key '{key}' stands twice in one mapping",
+                f"the key '{key}' appears twice in one mapping",
                 help='merge several with <<: [*one, *two]'
                 if key == _MERGE_KEY
-                else f'keep one; the first is in line {first.span.line}',
+                else f'keep one; the first is on line {first.span.line}',
                 related=[first],
             )
         )

@@ -34,7 +34,7 @@ _TAGGED_TYPES: dict[str, tuple[type, ...]] = {
 
 
 class ScalarError(ValueError):
-    """The text is no scalar of its tag, or a number beyond all bounds."""
+    """The text does not fit its tag, or is a number that is too long."""
 
 
 def parse_plain_scalar(text: str) -> Scalar:
@@ -62,11 +62,11 @@ def parse_tagged_scalar(text: str, tag: str) -> Scalar:
         return text
     types = _TAGGED_TYPES.get(tag)
     if types is None:
-        message = f"the tag {short_tag(tag)} is not one of YAML's core schema"
+        message = f"the tag {short_tag(tag)} is not part of YAML's core schema"
         raise ScalarError(message)
     value = parse_plain_scalar(text)
     if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
-        message = f'{text!r} is no {short_tag(tag)}'
+        message = f'{text!r} is not a {short_tag(tag)}'
         raise ScalarError(message)
     return float(value) if float in types and isinstance(value, int) else value
 
@@ -85,7 +85,7 @@ def short_tag(tag: str) -> str:
 
 def _parse_number(text: str) -> Scalar:
     if len(text) > _MAX_DIGITS and any(kind.fullmatch(text) for kind in (_INT, _OCT, _HEX)):
-        message = f'a number of {len(text)} digits fits no type of ROS'
+        message = f'a number of {len(text)} digits does not fit any ROS type'
         raise ScalarError(message)
     if _INT.fullmatch(text):
         return int(text, 10)

@@ -77,10 +77,10 @@ def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
 
 
 def compose_trees(text: str, source: SourceFile, *, alias_rule: str) -> list[TreeNode]:
-    """Return all documents of a text that takes no aliases.
+    """Return all documents of a text in which aliases are not allowed.
 
     Args:
-        alias_rule: The rule that aliases break.
+        alias_rule: The rule for findings about aliases.
 
     Raises:
         CompositionError: The text is not YAML, nests too deep, or holds an alias.
@@ -140,13 +140,13 @@ class _TreeBuilder:
         elif isinstance(event, yaml.DocumentStartEvent):
             self._documents += 1
             if self._most_documents is not None and self._documents > self._most_documents:
-                self._stop(event, 'several-documents', 'a file holds one YAML document, not more')
+                self._stop(event, 'several-documents', 'a file holds only one YAML document')
 
     def _enter(self, node: SequenceNode | MappingNode, event: Any) -> None:
         self._add(node, event.anchor)
         self._open.append(node)
         if len(self._open) > MAX_DEPTH:
-            self._stop(event, 'too-deep', f'the data nest more than {MAX_DEPTH} levels deep')
+            self._stop(event, 'too-deep', f'the data is nested more than {MAX_DEPTH} levels deep')
 
     def _add(self, node: TreeNode, anchor: str | None) -> None:
         self._nodes += 1
@@ -169,13 +169,11 @@ class _TreeBuilder:
 
     def _aliased(self, event: Any) -> TreeNode:
         if self._alias_rule is not None:
-            message = f'ROS takes no aliases here: write what *{event.anchor} stands for'
+            message = f'ROS does not support aliases here: write what *{event.anchor} stands for'
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(
-                event, 'unknown-alias', f'no anchor &{event.anchor} stands before this alias'
-            )
+            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} before this alias')
         if node in self._open:
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
         return node
@@ -201,7 +199,7 @@ def _syntax_fault(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
     if context and begun and mark and begun.line != mark.line:
-        context += f' that begins in line {begun.line + 1}'
+        context += f' that begins on line {begun.line + 1}'
     return diagnostic_at(
         span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
     )
@@ -211,14 +209,14 @@ def _syntax_help(span: Span) -> str | None:
     line = span.source.line(span.line)
     indent = line[: len(line) - len(line.lstrip())]
     if '\t' in indent or span.text == '\t':
-        return 'YAML is indented with spaces, never with tabs'
+        return 'indent YAML with spaces, not tabs'
     if line.count(': ') > 1:
         return "put a value that contains ': ' in quotes"
     return None
 
 
 def _character_fault(error: yaml.reader.ReaderError, text: str, source: SourceFile) -> Diagnostic:
-    # What the parser calls a position is one in bytes or in characters, whichever it reads.
+    # The position in the error counts bytes or characters, depending on the parser.
     found = yaml.reader.Reader.NON_PRINTABLE.search(text)
     before = f'{text[: found.start()]}^'.splitlines() if found else ['^']
     line, column = len(before), len(before[-1])

@@ -6,8 +6,8 @@ import pytest
 
 
 @pytest.fixture
-def face(node):
-    """Return the face of a live node for one entity."""
+def behaviour_node(node):
+    """Return a node as its behaviours see it."""
     from composer.runtime.nodes.behaviour_node import Node
 
     return Node(node, SimpleNamespace(), {}, SimpleNamespace(), lambda code: None)

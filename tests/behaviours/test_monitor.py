@@ -15,11 +15,11 @@ pytestmark = pytest.mark.ros
 class Watched:
     """A watch that is ticked once a second, with so many messages before each tick."""
 
-    def __init__(self, face, set_time, watch, **limits):
-        self._face, self._set_time = face, set_time
+    def __init__(self, behaviour_node, set_time, watch, **limits):
+        self._face, self._set_time = behaviour_node, set_time
         self.time = 100.0
         set_time(self.time)
-        self._ticks = watch(face, 'scan', **limits)
+        self._ticks = watch(behaviour_node, 'scan', **limits)
 
     def tick(self, messages=0):
         for n in range(messages):
@@ -30,37 +30,37 @@ class Watched:
         return next(self._ticks)
 
 
-def test_the_first_tick_begins_the_watch_and_says_nothing(face, set_time):
-    watched = Watched(face, set_time, watch, minimum_rate=5.0)
+def test_the_first_tick_begins_the_watch_and_says_nothing(behaviour_node, set_time):
+    watched = Watched(behaviour_node, set_time, watch, minimum_rate=5.0)
     assert watched.tick(messages=1) is None
     assert watched.tick(messages=5) is True
     assert watched.tick(messages=4) is False
     assert watched.tick(messages=6) is True
 
 
-def test_a_topic_is_stale_when_its_last_message_is_too_old(face, set_time):
-    watched = Watched(face, set_time, watch, maximum_age=2.0)
+def test_a_topic_is_stale_when_its_last_message_is_too_old(behaviour_node, set_time):
+    watched = Watched(behaviour_node, set_time, watch, maximum_age=2.0)
     assert watched.tick(messages=1) is None
     assert [watched.tick() for _ in range(3)] == [True, False, False]
     assert watched.tick(messages=1) is True
 
 
-def test_a_topic_that_was_never_heard_is_stale_after_a_while(face, set_time):
-    watched = Watched(face, set_time, watch, maximum_age=2.0)
+def test_a_topic_that_was_never_heard_is_stale_after_a_while(behaviour_node, set_time):
+    watched = Watched(behaviour_node, set_time, watch, maximum_age=2.0)
     assert [watched.tick() for _ in range(4)] == [None, True, True, False]
 
 
-def test_topics_of_one_node_are_watched_apart(face, set_time):
+def test_topics_of_one_node_are_watched_apart(behaviour_node, set_time):
     set_time(100.0)
-    scans, images = (watch(face, name, minimum_rate=1.0) for name in ('scan', 'image'))
+    scans, images = (watch(behaviour_node, name, minimum_rate=1.0) for name in ('scan', 'image'))
     assert (next(scans), next(images)) == (None, None)
-    count(face.with_own_state(), None, 'image')
+    count(behaviour_node.with_own_state(), None, 'image')
     set_time(101.0)
     assert (next(scans), next(images)) == (False, True)
 
 
-def test_diagnostics_tell_rate_age_and_fault(face, set_time):
-    watched = Watched(face, set_time, diagnose, minimum_rate=5.0, maximum_age=2.0)
+def test_diagnostics_tell_rate_age_and_fault(behaviour_node, set_time):
+    watched = Watched(behaviour_node, set_time, diagnose, minimum_rate=5.0, maximum_age=2.0)
     watched.tick()
     told = []
     for messages in (8, 1):

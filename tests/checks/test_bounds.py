@@ -30,7 +30,7 @@ def test_the_first_thousand_findings_are_shown_and_that_there_are_more(text, rul
     assert len(findings) == MAX_FINDINGS
     assert {finding.rule for finding in findings} == {rule}
     assert findings[-1].help == (
-        'there are more faults than these 1000; they show when these are mended'
+        'only the first 1000 findings are shown: fix them to see the others'
     )
 
 

@@ -57,7 +57,7 @@ def test_several_rules_are_silenced_at_once(check):
 
 def test_an_unknown_rule_is_a_warning_with_the_nearest_one(check):
     assert check('    log_level: info  # composer: ignore[bad-signatur]\n') == [
-        ('warning', 'unknown-rule', 4, "no rule is called 'bad-signatur'")
+        ('warning', 'unknown-rule', 4, "there is no rule 'bad-signatur'")
     ]
 
 
@@ -79,7 +79,7 @@ def test_what_stops_a_start_cannot_be_silenced(check):
         ('error', 'bad-value', 4),
         ('warning', 'unused-ignore', 4),
     ]
-    assert found[1][3] == "no comment silences 'bad-value': nothing can run before it is mended"
+    assert found[1][3] == "no comment silences 'bad-value': nothing can run until it is fixed"
 
 
 def test_a_comment_in_a_text_is_none(check):

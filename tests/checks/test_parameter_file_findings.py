@@ -62,10 +62,10 @@ def test_a_file_that_suits_is_left_alone(check):
 def test_what_matches_no_node_is_a_warning_at_its_name(check):
     text = '/robot/amr: {ros__parameters: {speed: 1.0}}\n/*: {ros__parameters: {speed: 1.0}}\n'
     assert check(ARM, p=text) == [
-        "p.yaml:1:1 unmatched-node-name: '/robot/amr' is the name of no node that uses this file, "
-        "and ROS ignores it → did you mean '/robot/arm'?",
-        "p.yaml:2:1 unmatched-node-name: '/*' is the name of no node that uses this file, "
-        'and ROS ignores it → it is used by: /robot/arm',
+        "p.yaml:1:1 unmatched-node-name: '/robot/amr' matches no node that uses this file, "
+        "so ROS ignores it → did you mean '/robot/arm'?",
+        "p.yaml:2:1 unmatched-node-name: '/*' matches no node that uses this file, "
+        'so ROS ignores it → it is used by: /robot/arm',
     ]
 
 
@@ -85,7 +85,7 @@ def test_what_no_node_declares_is_a_warning_at_its_key(check):
         'speed: 1': 'expected a double, and ROS takes this for an integer → write 1.0',
         'speed: 1e400': 'expected a double, and ROS takes this for a string',
         'speed: 2.5': '2.5 is above the maximum 2.0',
-        'mode: quick': "'quick' is none of its choices: slow, fast",
+        'mode: quick': "'quick' is not one of its choices: slow, fast",
         'mode: on': "expected a string, and ROS takes this for a bool → put it in quotes: 'on'",
         'gains: [1, 2]': (
             'expected a double_array, and ROS takes this for an integer_array → write [1.0, 2.0]'
@@ -158,11 +158,11 @@ def test_a_value_that_never_counts_is_a_warning(check):
 
     head = '/robot/arm:\n  ros__parameters:\n    mode: fast\n'
     assert said(head + '    mode: slow\n') == [
-        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: that of p.yaml:4 wins "
+        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: p.yaml:4 overrides it "
         '→ remove one of them'
     ]
     assert said(head + '/**: {ros__parameters: {mode: slow}}\n') == [
-        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: that of p.yaml:4 wins "
+        "p.yaml:3:5 overridden-parameter: 'mode' never has this value: p.yaml:4 overrides it "
         '→ the last name that matches a node wins: write wildcards above'
     ]
     assert said('/**: {ros__parameters: {mode: slow}}\n' + head) == []
@@ -172,7 +172,7 @@ def test_a_later_file_that_loses_by_its_type_is_a_warning(check):
     nodes = ARM.replace('[p.yaml]', '[p.yaml, q.yaml]')
     texts = ['/**: {ros__parameters: {count: 1}}', '/**: {ros__parameters: {count: 1.5}}']
     assert check(nodes, p=texts[0], q=texts[1]) == [
-        "q.yaml:1:25 overridden-parameter: 'count' never has this value: that of p.yaml:1 wins "
+        "q.yaml:1:25 overridden-parameter: 'count' never has this value: p.yaml:1 overrides it "
         '→ of two types ROS takes one, whichever comes first: give both the same type'
     ]
 

@@ -34,18 +34,18 @@ def findings(parameters):
         ),
         ('f: null', "parameter 'f': there is no value, and ROS has no null"),
         ('f: [1.0, null]', "parameter 'f': item 1: there is no value, and ROS has no null"),
-        ('f: [[1]]', "parameter 'f': item 0: a list of parameters holds no lists"),
-        ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters holds no mappings"),
-        ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit 64 bits"),
+        ('f: [[1]]', "parameter 'f': item 0: a list of parameters cannot contain lists"),
+        ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters cannot contain mappings"),
+        ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit in 64 bits"),
         (
             'f: [0, -9223372036854775809]',
-            "parameter 'f': -9223372036854775809 does not fit 64 bits",
+            "parameter 'f': -9223372036854775809 does not fit in 64 bits",
         ),
         (
             'f: {g: {}}',
             "parameter 'f.g': the mapping is empty, and ROS misreads what follows one",
         ),
-        ('f.g: 1, f: {g: 2}', "the parameter 'f.g' stands here a second time"),
+        ('f.g: 1, f: {g: 2}', "the parameter 'f.g' is given twice"),
     ],
 )
 def test_what_ros_refuses_or_misreads_is_a_finding(parameters, finding):

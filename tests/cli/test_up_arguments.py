@@ -57,7 +57,7 @@ def test_words_that_do_not_fit_are_an_error_of_usage_that_shows_the_declared_one
         2,
         '',
         "error: there is no argument 'c'; 'a': expected an integer, got 'ten'; 'b' is missing; "
-        f"'operation': 'divide' is none of '', add, subtract\n  help: {CALCULATOR_ARGUMENTS}",
+        f"'operation': 'divide' is not one of '', add, subtract\n  help: {CALCULATOR_ARGUMENTS}",
     )
 
 
@@ -71,7 +71,7 @@ def test_an_unknown_option_is_an_error_and_no_value(run, option):
 def test_negative_numbers_are_values_and_no_options(run):
     code, _, err = run('up', 'configs/calculator_client.yaml', '-5', '-6', '-7')
     assert code == 2
-    assert err.startswith("error: 'operation': '-7' is none of '', add, subtract\n")
+    assert err.startswith("error: 'operation': '-7' is not one of '', add, subtract\n")
 
 
 def test_a_file_whose_declarations_are_wrong_is_reported_before_its_words(run, tmp_path):

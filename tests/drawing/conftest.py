@@ -29,6 +29,20 @@ def draw(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def external_ends(draw):
+    """Return the picture of a node whose other ends are all outside the system."""
+    text = """
+        version: 1
+        nodes:
+          a:
+            publishers: {x: {type: std_msgs/msg/String, external: true}}
+            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
+            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
+    """
+    return draw(text)
+
+
+@pytest.fixture
 def needs_graphviz():
     if not (shutil.which('dot') or importlib.util.find_spec('pygraphviz')):
         pytest.skip('neither Graphviz nor the extra graph is installed')

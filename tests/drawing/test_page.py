@@ -154,6 +154,11 @@ def test_an_end_tells_its_qos(data):
     assert data['parts']['e0']['facts'] == ['std_msgs/msg/String', 'QoS: depth 5, best_effort']
 
 
+def test_a_topic_tells_its_external_ends(data):
+    assert data['parts']['c1']['name'] == '/echo'
+    assert data['parts']['c1']['facts'] == ['std_msgs/msg/String', 'external subscriptions']
+
+
 def test_findings_know_what_they_are_about(data):
     found = {finding['rule']: finding for finding in data['findings']}
     assert found['incompatible-qos']['part'] == 'e0'

@@ -275,16 +275,8 @@ def test_two_nodes_of_one_name_are_two(draw):
     assert ids == ['node:/a/n', "node:/a/n'"]
 
 
-def test_ends_elsewhere_of_either_side(draw):
-    text = """
-        version: 1
-        nodes:
-          a:
-            publishers: {x: {type: std_msgs/msg/String, external: true}}
-            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
-            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
-    """
-    channels = by_id(describe_picture(draw(text)), 'channels')
+def test_external_ends_of_either_side(external_ends):
+    channels = by_id(describe_picture(external_ends), 'channels')
     assert {key: each['external'] for key, each in channels.items()} == {
         'topic:/x': ['users'],
         'topic:/y': ['providers'],

@@ -34,8 +34,8 @@ def test_mermaid(draw):
     assert render_picture(draw(SYSTEM), 'mermaid').splitlines() == [
         'flowchart LR',
         '  n2(["alone"]):::node',
-        '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system hears<br/>\'/lonely\'"]:::warning',
-        '  xc1u(("elsewhere")):::external',
+        '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system subscribes<br/>to \'/lonely\'"]:::warning',
+        '  xc1u(("external")):::external',
         '  subgraph s0["/robot"]',
         '    n1(["mapper"]):::node',
         '    c0["/robot/front/scan<br/>std_msgs/msg/String"]:::topic',
@@ -76,16 +76,8 @@ def test_dot(draw):
     assert 'class="topic warning"' in lines[5]
 
 
-def test_clients_and_servers_elsewhere_stand_on_their_side(draw):
-    text = """
-        version: 1
-        nodes:
-          a:
-            publishers: {x: {type: std_msgs/msg/String, external: true}}
-            subscriptions: {y: {type: std_msgs/msg/String, external: true, publish: x}}
-            service_clients: {add: {type: std_srvs/srv/Trigger, external: true}}
-    """
-    lines = render_picture(draw(text), 'mermaid').splitlines()
+def test_clients_and_servers_elsewhere_stand_on_their_side(external_ends):
+    lines = render_picture(external_ends, 'mermaid').splitlines()
     assert [line.strip() for line in lines if '-.->' in line] == [
         'c0 -.-> xc0u',
         'xc1p -.-> c1',

@@ -89,10 +89,10 @@ nodes:
 @pytest.mark.parametrize(
     ('foreach', 'rule', 'message'),
     [
-        ('[1, 2]', 'bad-foreach', "foreach is a mapping, as in 'foreach: {i: [1, 2]}'"),
-        ('{}', 'bad-foreach', 'foreach has no variable in it'),
+        ('[1, 2]', 'bad-foreach', "foreach must be a mapping, as in 'foreach: {i: [1, 2]}'"),
+        ('{}', 'bad-foreach', 'foreach has no variables'),
         ('{i: 3}', 'bad-foreach', "'i' takes a list of values, not 3"),
-        ('{in: [3]}', 'bad-foreach', "'in' cannot stand in an expression as a name"),
+        ('{in: [3]}', 'bad-foreach', "'in' cannot be used as a name in expressions"),
         ('{i: "{{ nope }}"}', 'undefined-name', "'nope' is not defined"),
     ],
 )
@@ -104,7 +104,7 @@ def test_a_foreach_that_makes_no_sense_is_said_at_its_place(foreach, rule, messa
 
 def test_a_condition_that_is_no_boolean_is_said():
     system = load('nodes: {a: {when: "{{ 1 }}"}}')
-    assert messages(system) == [('bad-when', 'when is true or false, not 1')]
+    assert messages(system) == [('bad-when', 'when must be true or false, not 1')]
 
 
 def test_one_name_for_all_repetitions_is_said_with_the_way_out():
@@ -118,7 +118,7 @@ def test_more_entries_than_anybody_wants_need_to_be_asked_for():
     text = 'nodes: {"n{{ i }}": {foreach: {i: "{{ range(10001) }}"}}}\n'
     (finding,) = load(text).diagnostics
     assert finding.rule == 'too-many-entries'
-    assert finding.message == 'there are more than 10,000 entries in nodes'
+    assert finding.message == 'nodes has more than 10,000 entries'
     assert len(load(f'max_nodes: 10001\n{text}').spec.nodes) == 10001
 
 
@@ -163,7 +163,7 @@ nodes:
     assert messages(system) == [
         (
             'bad-expression',
-            "the environment has no 'NO_SUCH'; give a default, as in env('NO_SUCH', 'none')",
+            "the environment variable 'NO_SUCH' is not set; give a default, as in env('NO_SUCH', 'none')",
         ),
         ('bad-expression', "no package 'no_such_package' is installed"),
     ]

@@ -111,7 +111,7 @@ def test_what_lies_below_a_filled_key_keeps_its_place():
 
 def test_a_filled_key_that_is_there_already_is_a_duplicate():
     ((rule, message, place, text),) = faults('{rover: 1, "{{ name }}": 2}')
-    assert (rule, message) == ('duplicate-key', "the key 'rover' stands twice in one mapping")
+    assert (rule, message) == ('duplicate-key', "the key 'rover' appears twice in one mapping")
     assert (place, text) == ('7:18', '"{{ name }}"')
 
 
@@ -177,18 +177,18 @@ def test_nothing_is_in_scope_that_is_not_promised(name):
     [
         ('', 'unexpected end of the expression'),
         ('count +', 'unexpected end of the expression'),
-        ('count count', 'chunk after expression'),
+        ('count count', 'unexpected text after the expression'),
         ('1 / 0', 'the expression raised ZeroDivisionError: division by zero'),
         ("count + 'a'", "unsupported operand type(s) for +: 'int' and 'str'"),
         ('name.nothing', "'str object' has no attribute 'nothing'"),
         ('[name.nothing]', "'str object' has no attribute 'nothing'"),
-        ('name.upper', 'the expression gives a '),
+        ('name.upper', 'the expression returns a '),
         ('range(3)|pprint', "there is no filter 'pprint'"),
         ('1 is odder', "there is no test 'odder'"),
-        ('{1: 2}', 'the expression gives a dict, which YAML has no place for'),
+        ('{1: 2}', 'the expression returns a dict, which YAML cannot represent'),
         ('9 ** 99999', "the result of '**' is too large"),
         ("'a' * 10 ** 12", "the result of '*' is too large"),
-        ('1' * 400, 'a number of 1326 bits fits no type of ROS'),
+        ('1' * 400, 'a number of 1326 bits does not fit any ROS type'),
     ],
 )
 def test_an_expression_that_fails_says_why(expression, message):

@@ -59,30 +59,34 @@ def test_a_package_that_is_not_installed_is_named() -> None:
         (
             'sensor_msgs/msg/SetCameraInfo',
             (
-                "sensor_msgs/msg/SetCameraInfo: 'SetCameraInfo' is none of the messages of "
+                "sensor_msgs/msg/SetCameraInfo: 'SetCameraInfo' is not one of the messages of "
                 "'sensor_msgs'"
             ),
             "did you mean 'sensor_msgs/srv/SetCameraInfo'?",
         ),
         (
             'std_msgs/msg/Strin',
-            "std_msgs/msg/Strin: 'Strin' is none of the messages of 'std_msgs'",
+            "std_msgs/msg/Strin: 'Strin' is not one of the messages of 'std_msgs'",
             "did you mean 'std_msgs/msg/String'?",
         ),
         (
             'std_msgs/String',
-            "'std_msgs/String' is no interface name",
+            "'std_msgs/String' is not the name of an interface",
             "did you mean 'std_msgs/msg/String'?",
         ),
         (
             'std_msgs.msg.String',
-            "'std_msgs.msg.String' is no interface name",
+            "'std_msgs.msg.String' is not the name of an interface",
             "did you mean 'std_msgs/msg/String'?",
         ),
-        ('Twist', "'Twist' is no interface name", "did you mean 'geometry_msgs/msg/Twist'?"),
+        (
+            'Twist',
+            "'Twist' is not the name of an interface",
+            "did you mean 'geometry_msgs/msg/Twist'?",
+        ),
         (
             'rclpy/action/ActionClient',
-            'rclpy/action/ActionClient is a class, but no ROS interface',
+            'rclpy/action/ActionClient is a class, but not a ROS interface',
             None,
         ),
     ],
@@ -98,7 +102,7 @@ def test_each_way_to_be_wrong_has_its_own_message(
 @pytest.mark.parametrize('name', ['', '///', 'a/msg/b c', '../msg/X', 'std_msgs/msg/_string'])
 def test_what_is_no_name_is_never_imported(name: str) -> None:
     assert failure(name) == (
-        f'{name!r} is no interface name',
+        f'{name!r} is not the name of an interface',
         'write it in full: std_msgs/msg/String',
     )
 

@@ -79,15 +79,15 @@ def test_words_give_values_by_name_or_in_the_order_of_the_declarations(words, ch
         (['a', 'zzz:=3'], "there is no argument 'zzz'"),
         (['a', 'name:=b'], "'name' is given twice: 'a' and 'b'"),
         (['a', '3', '1', 'true', 'fast', 'x', '-1'],
-         "'x' is one value too many; '-1' is one value too many"),
+         "'x' is one argument too many; '-1' is one argument too many"),
         (['a', 'three'], "'count': expected an integer, got 'three'"),
         (['a', '3.0'], "'count': expected an integer, got 3.0"),
         (['a', ''], "'count': expected an integer, got ''"),
         (['a', 'null'], "'count': expected an integer, got 'null'"),
-        (['a', '9223372036854775808'], "'count': 9223372036854775808 does not fit 64 bits"),
+        (['a', '9223372036854775808'], "'count': 9223372036854775808 does not fit in 64 bits"),
         (['a', 'loud:=yes'], "'loud': expected a bool, got 'yes'"),
         (['a', 'loud:=1'], "'loud': expected a bool, got 1"),
-        (['a', 'mode:=slow'], "'mode': 'slow' is none of '', fast, very slow"),
+        (['a', 'mode:=slow'], "'mode': 'slow' is not one of '', fast, very slow"),
     ],
 )  # fmt: skip
 def test_words_that_do_not_fit_are_refused(words, message):
@@ -113,7 +113,7 @@ def test_all_that_is_wrong_is_one_error_that_shows_what_is_declared():
 def test_a_file_without_arguments_takes_no_words():
     text = 'version: 1\nnodes: {}'
     assert refusal('a:=1', '3', text=text) == (
-        "there is no argument 'a'; '3' is one value too many"
+        "there is no argument 'a'; '3' is one argument too many"
     )
 
 

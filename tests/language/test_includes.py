@@ -179,7 +179,7 @@ def test_a_fault_in_the_deepest_file_comes_with_the_chain_of_includes(write):
         ),
         (
             '{file: arm.yaml}',
-            ('missing-argument', 'robot.yaml:3:16', "'arm.yaml' wants the argument 'side'"),
+            ('missing-argument', 'robot.yaml:3:16', "'arm.yaml' needs the argument 'side'"),
         ),
         (
             '{file: arm.yaml, args: {side: l, joints: many}}',
@@ -282,7 +282,7 @@ def test_the_profiles_of_one_file_are_not_those_of_another(write, who):
     (finding,) = load_system(path).diagnostics
     assert (finding.rule, finding.message) == (
         'unknown-qos-profile',
-        "no QoS profile is called 'fast'",
+        "there is no QoS profile 'fast'",
     )
     assert finding.span.source.name == f'{who}.yaml'
     assert len(finding.related) == (who == 'leaf')
@@ -313,7 +313,7 @@ def test_files_that_include_each_other_over_and_over_are_bounded(write):
     )
     (finding,) = load_system(path).diagnostics
     assert finding.rule == 'too-many-entries'
-    assert finding.message == 'there are more than 50 entries in include of all files'
+    assert finding.message == 'include has more than 50 entries in all files together'
 
 
 def test_what_is_ignored_may_hold_variables_of_foreach(write):

@@ -66,19 +66,19 @@ def test_null_removes(write):
         (
             'nodes: {listner: null}',
             'site.yaml:1:9',
-            "null removes 'listner', which is not there",
+            "null removes 'listner', which does not exist",
             "did you mean 'listener'?",
         ),
         (
             'nodes: {talker: {timers: {tock: null}}}',
             'site.yaml:1:27',
-            "null removes 'tock', which is not there",
+            "null removes 'tock', which does not exist",
             "did you mean 'tick'?",
         ),
         (
             'nodes: {talker: {publishers: {x: {type: std_msgs/msg/Empty, qos: null}}}}',
             'site.yaml:1:61',
-            "null removes 'qos', which is not there",
+            "null removes 'qos', which does not exist",
             None,
         ),
         (

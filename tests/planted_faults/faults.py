@@ -100,7 +100,7 @@ def _set(system, path, value):
 
 
 def _typo(chance, word, others):
-    """Return a misspelt word that is none of the others, and nearer to it than to any of them."""
+    """Return a misspelt word that is not one of the others, and nearer to it than to any of them."""
     for _ in range(20):
         wrong = misspell(chance, word)
         lowered = {each.lower() for each in others} | {word.lower()}

@@ -1,4 +1,4 @@
-"""Foreign processes: what they are given, what is heard of them, and that none is left."""
+"""External processes: their environment and output, and that none is left at the end."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Findings as text: the excerpt shows the fault whatever the line looks like."""
+"""Findings as text: the excerpt shows the place whatever the line looks like."""
 
 import pytest
 
@@ -38,12 +38,12 @@ def test_an_empty_line_is_not_shown():
         ('a: \u202ex', 4, 2, 'a: \ufffdx', '   ^^'),
     ],
 )
-def test_the_carets_are_below_the_fault(line, column, length, shown, carets):
+def test_the_carets_mark_the_place(line, column, length, shown, carets):
     assert excerpt(line, column, length) == (shown, carets)
 
 
 @pytest.mark.parametrize('column', [1, 80, 81, 161, 162, 500, 999, 1000])
-def test_of_a_long_line_the_surroundings_of_the_fault_are_shown(column):
+def test_of_a_long_line_the_part_around_the_finding_is_shown(column):
     line = 'x' * (column - 1) + '!' + 'x' * (1000 - column)
     shown, carets = excerpt(line, column)
     assert len(shown) == 160

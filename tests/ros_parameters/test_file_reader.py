@@ -71,7 +71,7 @@ def test_several_documents_are_read_as_one():
 def test_a_document_that_is_no_mapping_is_refused(document):
     file = parse_parameter_file(f'/**: {{ros__parameters: {{a: 1}}}}\n--- {document}\n', 'p.yaml')
     (fault,) = file.faults
-    assert fault.message == "a value stands here, and no 'ros__parameters' above it"
+    assert fault.message == "this value has no 'ros__parameters' above it"
 
 
 def test_a_value_knows_its_place():
@@ -90,49 +90,47 @@ def test_a_file_may_hold_nothing(text):
 
 
 FAULTS = {
-    'a: 1': ("1:4 a value stands here, and no 'ros__parameters' above it"),
-    '- a': ("1:1 a value stands here, and no 'ros__parameters' above it"),
-    'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is no key of parameter files",
-    'a:\n  ros__parameterss: {b: 1}': "2:3 'ros__parameterss' is taken as 'ros__parameters'",
-    'ros__parameters: {b: 1}': "1:1 'ros__parameters' stands below the name of a node",
-    'a: {ros__parameters: 5}': "1:22 'ros__parameters' is a mapping of parameters",
-    'a: {ros__parameters: }': "1:22 'ros__parameters' is a mapping of parameters",
+    'a: 1': ("1:4 this value has no 'ros__parameters' above it"),
+    '- a': ("1:1 this value has no 'ros__parameters' above it"),
+    'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is not a key of parameter files",
+    'a:\n  ros__parameterss: {b: 1}': "2:3 ROS reads 'ros__parameterss' as 'ros__parameters'",
+    'ros__parameters: {b: 1}': "1:1 'ros__parameters' belongs below the name of a node",
+    'a: {ros__parameters: 5}': "1:22 'ros__parameters' must be a mapping of parameters",
+    'a: {ros__parameters: }': "1:22 'ros__parameters' must be a mapping of parameters",
     'a: {ros__parameters: {b: }}': "1:26 'b' has no value",
     'a: {ros__parameters: {b: [1, ~]}}': (
-        '1:30 a list has one type: this is a string, and the first item an integer'
+        '1:30 all items of a list have one type: this is a string, the first is an integer'
     ),
     'a: {ros__parameters: {b: [on, 1]}}': (
-        '1:31 a list has one type: this is an integer, and the first item a bool'
+        '1:31 all items of a list have one type: this is an integer, the first is a bool'
     ),
-    'a: {ros__parameters: {b: [[1]]}}': '1:27 a list of parameters holds no lists',
-    'a: {ros__parameters: {b: [{c: 1}]}}': '1:27 a list of parameters holds no mappings',
+    'a: {ros__parameters: {b: [[1]]}}': '1:27 a list of parameters cannot contain lists',
+    'a: {ros__parameters: {b: [{c: 1}]}}': '1:27 a list of parameters cannot contain mappings',
     'a: {ros__parameters: {b: {}}}': (
-        "1:23 'b' is an empty mapping, and ROS misreads what follows one"
+        "1:23 'b' is an empty mapping, and ROS misreads what follows it"
     ),
     'a: {ros__parameters: {b: 1}, c: {ros__parameters: {d: 1}}}': (
         "1:5 ROS misreads the names that follow 'ros__parameters'"
     ),
     'a: {ros__parameters: {b: {c.d: {e: 1}, f: 2}}}': (
-        "1:27 after 'c.d', ROS takes what follows to belong to a part of it"
+        "1:27 ROS reads what follows 'c.d' as a part of it"
     ),
     'a: {b/c: {ros__parameters: {d: 1}}, e: {ros__parameters: {d: 1}}}': (
-        "1:5 after 'b/c', ROS takes the names that follow to be in another namespace"
+        "1:5 ROS puts the names after 'b/c' into another namespace"
     ),
-    'a: {ros__parameters: {b: 1, b: {c: 2}}}': (
-        "1:23 'b' has a value and, elsewhere, names below it"
-    ),
+    'a: {ros__parameters: {b: 1, b: {c: 2}}}': ("1:23 'b' has both a value and names below it"),
     'a: {ros__parameters: {b: &x 1, c: *x}}': (
-        '1:35 ROS takes no aliases here: write what *x stands for'
+        '1:35 ROS does not support aliases here: write what *x stands for'
     ),
     'a-b: {ros__parameters: {c: 1}}': (
         "1:1 'a-b': a node name has only letters, digits and underscores"
     ),
     '/ar*: {ros__parameters: {c: 1}}': (
         "1:1 '/ar*': a node name has only letters, digits and underscores; "
-        "'*' and '**' stand alone between slashes"
+        "'*' and '**' must be alone between slashes"
     ),
-    'a: {ros__parameters: {"": 1}}': '1:23 a key is a text, and nothing stands here',
-    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key is a text, and this is a list or a mapping',
+    'a: {ros__parameters: {"": 1}}': '1:23 a key must be a string, and this one is empty',
+    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key must be a string, not a list or a mapping',
 }
 
 

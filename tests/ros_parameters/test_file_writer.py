@@ -1,6 +1,7 @@
 """Parameter files that Composer writes, which rcl reads back as the same values."""
 
 import math
+from types import MappingProxyType
 
 import pytest
 
@@ -9,7 +10,8 @@ from composer.ros_parameters.file_writer import render_parameters_for_all
 
 
 def test_integers_among_doubles_are_written_as_doubles():
-    text = render_parameters_for_all({'f': [1, 2.5], 'g': {'h': [1, 2]}})
+    parameters = MappingProxyType({'f': [1, 2.5], 'g': {'h': [1, 2]}})
+    text = render_parameters_for_all(parameters)
     assert text == '"/**":\n  ros__parameters:\n    f: [1.0, 2.5]\n    g:\n      h: [1, 2]\n'
 
 

@@ -39,12 +39,12 @@ COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
 
 def names_in_the_code():
     found = set()
-    for folder in SPEAKING:
-        for path in (PACKAGE / folder).rglob('*.py'):
-            for node in ast.walk(ast.parse(path.read_text())):
-                text = node.value if isinstance(node, ast.Constant) else None
-                if isinstance(text, str) and re.fullmatch('[a-z0-9]+(-[a-z0-9]+)+', text):
-                    found.add(text)
+    paths = [path for room in SPEAKING for path in (PACKAGE / room).rglob('*.py')]
+    for path in [*paths, PACKAGE / 'entity_kinds.py']:
+        for node in ast.walk(ast.parse(path.read_text())):
+            text = node.value if isinstance(node, ast.Constant) else None
+            if isinstance(text, str) and re.fullmatch('[a-z0-9]+(-[a-z0-9]+)+', text):
+                found.add(text)
     return found - NO_RULES - {rule for rule in found if rule.startswith('utf-')}
 
 

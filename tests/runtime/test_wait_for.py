@@ -150,8 +150,8 @@ def test_a_client_of_a_service_is_no_server(compose, peer, wait_for):
 
     assert child.wait() == 1
     assert child.lines[-2:] == [
-        "error: node 'user' (system.yaml:5) waited 1 s for the service '/ask': nobody serves it",
-        '  help: there is no service but those that every node has',
+        "error: node 'user' (system.yaml:5) waited 1 s for the service '/ask': nothing serves it",
+        '  help: there are no services except those of every node',
     ]
 
 
@@ -229,7 +229,7 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
     assert child.lines == [
         '[INFO] [free]: stops',
         "[INFO] [composer]: process 'driver' was ended by SIGINT",
-        "error: node 'late' (system.yaml:5) waited 1 s for the topic '/scam': nobody publishes it",
+        "error: node 'late' (system.yaml:5) waited 1 s for the topic '/scam': nothing publishes it",
         "  help: did you mean '/scan'?",
     ]
 
@@ -237,14 +237,18 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
 @pytest.mark.parametrize(
     ('condition', 'trouble', 'help_line'),
     [
-        ('topic: scan', "topic '/scan': nobody publishes it", 'published are: /words'),
-        ('service: reset', "service '/reset': nobody serves it", 'served are: /ask'),
-        ('action: grasp', "action '/grasp': nobody serves it", 'served are: /count'),
-        ('node: /robot/ghost', "node '/robot/ghost': it is not there", 'there are: /free, /peer'),
+        ('topic: scan', "topic '/scan': nothing publishes it", 'published topics: /words'),
+        ('service: reset', "service '/reset': nothing serves it", 'services: /ask'),
+        ('action: grasp', "action '/grasp': nothing serves it", 'actions: /count'),
+        (
+            'node: /robot/ghost',
+            "node '/robot/ghost': there is no such node",
+            'nodes: /free, /peer',
+        ),
         (
             'topic: held',
-            "topic '/held': nobody publishes it but 'slow' of this system, which has not started",
-            'published are: /words',
+            "topic '/held': nothing publishes it but 'slow' of this system, which has not started",
+            'published topics: /words',
         ),
     ],
 )

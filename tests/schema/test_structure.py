@@ -65,7 +65,7 @@ def test_a_right_file_has_no_faults():
             'version: 2\nnodes: {}',
             (
                 'unsupported-version',
-                'version 2 is not known; this Composer reads version 1',
+                'version 2 is not supported, only version 1',
                 '1:10',
                 None,
             ),
@@ -74,7 +74,7 @@ def test_a_right_file_has_no_faults():
             'version: "1"\nnodes: {}',
             (
                 'unsupported-version',
-                "version '1' is not known; this Composer reads version 1",
+                "version '1' is not supported, only version 1",
                 '1:10',
                 None,
             ),
@@ -83,7 +83,7 @@ def test_a_right_file_has_no_faults():
             'version: true\nnodes: {}',
             (
                 'unsupported-version',
-                'version true is not known; this Composer reads version 1',
+                'version true is not supported, only version 1',
                 '1:10',
                 None,
             ),
@@ -177,7 +177,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
         (
             '{subscriptions: {a: {type: a/msg/B, publish: b, with: {c: 1}}}}',
-            ('missing-key', "'with' needs 'behaviour' beside it", None),
+            ('missing-key', "'with' requires 'behaviour'", None),
         ),
         (
             '{timers: {a: {behaviour: b:c}}}',
@@ -199,7 +199,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
             '{timers: {a: {rate: 1, period: 1, behaviour: b:c}}}',
             (
                 'conflicting-keys',
-                "'period' and 'rate' exclude each other in timer 'a'",
+                "'period' and 'rate' cannot be used together in timer 'a'",
                 'keep one of them',
             ),
         ),
@@ -207,7 +207,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
             '{timers: {a: {rate: 1, behaviour: b:c, publish: d, message: 1}}}',
             (
                 'conflicting-keys',
-                "'behaviour' and 'message' exclude each other in timer 'a'",
+                "'behaviour' and 'message' cannot be used together in timer 'a'",
                 'keep one of them',
             ),
         ),

@@ -150,7 +150,7 @@ def test_an_anchor_may_be_given_anew():
         ('a: &a\n  <<: *a', '2:7: error[cyclic-alias]: the alias *a contains itself'),
         ('a: &a {b: &b {c: *a}}', '1:18: error[cyclic-alias]: the alias *a contains itself'),
         ('? &a [*a]\n: 1', '1:7: error[cyclic-alias]: the alias *a contains itself'),
-        ('a: *b\nb: &b 1', '1:4: error[unknown-alias]: no anchor &b stands before this alias'),
+        ('a: *b\nb: &b 1', '1:4: error[unknown-alias]: no anchor &b before this alias'),
         (
             'a: {<<: 3}',
             '1:9: error[bad-merge]: the merge key << takes a mapping, or a list of them',
@@ -191,11 +191,11 @@ def test_aliases_do_not_nest_deeper_than_text():
 
 def test_a_duplicate_key_shows_both_places():
     assert said('nodes:\n  rover: {}\n  "rover": {}\n') == [
-        "file.yaml:3:3: error[duplicate-key]: the key 'rover' stands twice in one mapping\n"
+        "file.yaml:3:3: error[duplicate-key]: the key 'rover' appears twice in one mapping\n"
         '  3 |   "rover": {}\n'
         '    |   ^^^^^^^\n'
-        '  file.yaml:2:3: it stands here first\n'
-        '  help: keep one; the first is in line 2'
+        '  file.yaml:2:3: first used here\n'
+        '  help: keep one; the first is on line 2'
     ]
 
 
@@ -221,15 +221,15 @@ def test_the_first_of_duplicate_keys_counts():
         ('\ufeff', 'file.yaml: error[unreadable-file]: the file is empty'),
         (
             '- version: 1',
-            'file.yaml:1:1: error[wrong-type]: a file is a mapping with the keys version and nodes',
+            'file.yaml:1:1: error[wrong-type]: a file must be a mapping with the keys version and nodes',
         ),
         (
             '\n  hello',
-            'file.yaml:2:3: error[wrong-type]: a file is a mapping with the keys version and nodes',
+            'file.yaml:2:3: error[wrong-type]: a file must be a mapping with the keys version and nodes',
         ),
         (
             '--- ~',
-            'file.yaml:1:5: error[wrong-type]: a file is a mapping with the keys version and nodes',
+            'file.yaml:1:5: error[wrong-type]: a file must be a mapping with the keys version and nodes',
         ),
         (
             b'version: 1\nname: caf\xe9\n',
@@ -249,7 +249,7 @@ def test_the_first_of_duplicate_keys_counts():
         ),
         (
             'a: 1\n---\nb: 2\n',
-            'file.yaml:2:1: error[several-documents]: a file holds one YAML document, not more',
+            'file.yaml:2:1: error[several-documents]: a file holds only one YAML document',
         ),
     ],
 )
@@ -260,7 +260,7 @@ def test_an_unreadable_text_gets_one_clear_line(text, line):
 @pytest.mark.parametrize(
     ('text', 'line', 'column', 'help_text'),
     [
-        ('a:\n\tb: 1\n', 2, 1, 'YAML is indented with spaces, never with tabs'),
+        ('a:\n\tb: 1\n', 2, 1, 'indent YAML with spaces, not tabs'),
         ('a: b: c\n', 1, 5, "put a value that contains ': ' in quotes"),
         ('a: [1, 2\nb: 3\n', 2, 2, None),
         ('a: {b: 1\n', 2, 1, None),
@@ -280,12 +280,12 @@ def test_a_fault_of_syntax_has_a_place(text, line, column, help_text):
 
 
 def test_an_open_quote_says_where_it_was_opened():
-    assert 'begins in line 2' in first_line('a: 1\nb: "never\nclosed\n')
+    assert 'begins on line 2' in first_line('a: 1\nb: "never\nclosed\n')
 
 
 @pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? '])
 def test_ten_thousand_levels_are_one_finding(opening):
-    assert 'error[too-deep]: the data nest more than 100 levels deep' in first_line(
+    assert 'error[too-deep]: the data is nested more than 100 levels deep' in first_line(
         opening * 10_000
     )
 
@@ -341,18 +341,18 @@ def test_yaml_is_read_by_the_core_schema():
 @pytest.mark.parametrize(
     ('text', 'line'),
     [
-        ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not one of YAML's core schema"),
-        ('a: !!int x', "1:4: error[bad-scalar]: 'x' is no !!int"),
+        ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not part of YAML's core schema"),
+        ('a: !!int x', "1:4: error[bad-scalar]: 'x' is not a !!int"),
         ('a: !!set {b}', '1:4: error[bad-tag]: a !!set is not allowed here'),
         (
             'a: !!python/object/apply:os.system [x]',
             '1:4: error[bad-tag]: a !!python/object/apply:os.system is not allowed here',
         ),
         ('a: !!map [b]', '1:4: error[bad-tag]: a !!map is not allowed here'),
-        ('1: a', '1:1: error[bad-key]: a key is a string, and 1 is not one'),
-        ('null: a', '1:1: error[bad-key]: a key is a string, and null is not one'),
-        ('?\n: a', '1:2: error[bad-key]: a key is a string, and nothing stands here'),
-        ('[a]: b', '1:1: error[bad-key]: a key is a string, not a list or a mapping'),
+        ('1: a', '1:1: error[bad-key]: a key must be a string, and 1 is not'),
+        ('null: a', '1:1: error[bad-key]: a key must be a string, and null is not'),
+        ('?\n: a', '1:2: error[bad-key]: a key is a string, and this one is empty'),
+        ('[a]: b', '1:1: error[bad-key]: a key must be a string, not a list or a mapping'),
     ],
 )
 def test_tags_and_keys_are_those_of_plain_data(text, line):

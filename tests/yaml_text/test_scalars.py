@@ -79,7 +79,7 @@ def test_everything_else_is_a_string(text):
 )
 def test_an_endless_number_is_refused(digits):
     with pytest.raises(
-        ScalarError, match=f'^a number of {len(digits)} digits fits no type of ROS$'
+        ScalarError, match=f'^a number of {len(digits)} digits does not fit any ROS type$'
     ):
         parse_plain_scalar(digits)
 
@@ -112,15 +112,15 @@ def test_a_tag_says_the_type(text, tag, value):
 @pytest.mark.parametrize(
     ('text', 'tag', 'message'),
     [
-        ('twelve', TAG + 'int', "'twelve' is no !!int"),
-        ('1.5', TAG + 'int', "'1.5' is no !!int"),
-        ('true', TAG + 'int', "'true' is no !!int"),
-        ('true', TAG + 'float', "'true' is no !!float"),
-        ('yes', TAG + 'bool', "'yes' is no !!bool"),
-        ('1', TAG + 'bool', "'1' is no !!bool"),
-        ('0', TAG + 'null', "'0' is no !!null"),
-        ('a', TAG + 'binary', "the tag !!binary is not one of YAML's core schema"),
-        ('a', '!own', "the tag !own is not one of YAML's core schema"),
+        ('twelve', TAG + 'int', "'twelve' is not a !!int"),
+        ('1.5', TAG + 'int', "'1.5' is not a !!int"),
+        ('true', TAG + 'int', "'true' is not a !!int"),
+        ('true', TAG + 'float', "'true' is not a !!float"),
+        ('yes', TAG + 'bool', "'yes' is not a !!bool"),
+        ('1', TAG + 'bool', "'1' is not a !!bool"),
+        ('0', TAG + 'null', "'0' is not a !!null"),
+        ('a', TAG + 'binary', "the tag !!binary is not part of YAML's core schema"),
+        ('a', '!own', "the tag !own is not part of YAML's core schema"),
     ],
 )
 def test_text_that_is_not_of_its_tag_is_refused(text, tag, message):

@@ -1,4 +1,4 @@
-"""Behaviours: that they exist, can be called, and take what they will be given."""
+"""Behaviours exist, can be called, and take the arguments that they get."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check all behaviours by the text of their modules; none is imported."""
+    """Check all behaviours without importing them."""
     broken: set[str] = set()
     for node in context.spec.nodes.values():
         for binding in node_bindings(node):
@@ -39,7 +39,7 @@ def check_behaviour_call(
     kind: FunctionKind | None,
     signature: inspect.Signature | None,
 ) -> Iterator[Diagnostic]:
-    """Check that a function can be bound where it is; what is `None` cannot be told."""
+    """Check that a function fits its place; a kind or signature of `None` is unknown."""
     behaviour = binding.behaviour
     if kind is not None and kind.is_generator and not binding.may_yield:
         yield context.at_value(
@@ -56,16 +56,16 @@ def check_behaviour_call(
 def _explain_broken_module(
     context: CheckContext, binding: Binding, module: ModuleSource
 ) -> Diagnostic:
-    """Say it where the module is named first: it is one fault, however many behaviours it has."""
+    """Return one finding for all behaviours of a module, where the module is named first."""
     behaviour = binding.behaviour
     place = module.place_of(module.error_line) if module.error_line else None
     return context.at_value(
         behaviour.path,
         'broken-module',
-        f"the module '{behaviour.module}' is not Python: {module.syntax_error}",
+        f"the module '{behaviour.module}' is not valid Python: {module.syntax_error}",
         part=behaviour.module,
         first=True,
-        related=[Related('this is what Python does not take', place)] if place else [],
+        related=[Related('the error is here', place)] if place else [],
     )
 
 
@@ -129,10 +129,10 @@ def _check_signature(
     by_keyword = _keyword_parameters(signature)
     taken = _positional_parameters(signature)[: len(binding.parameters)]
     free = [name for name in by_keyword or () if name not in taken]
-    # What is given, with misspelt names as they were meant: their finding is enough.
+    # A misspelt name counts as the name that it means: it has a finding of its own.
     was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
     given = set(free if was_dropped else behaviour.arguments)
-    # An argument whose expression failed is given all the same.
+    # An argument counts as given although its expression has an error.
     given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
@@ -161,7 +161,7 @@ def _check_signature(
 def _check_values(
     context: CheckContext, binding: Binding, signature: inspect.Signature
 ) -> Iterator[Diagnostic]:
-    """Check constant arguments against the annotations with built-in types."""
+    """Check the values of arguments against annotations with built-in types."""
     behaviour = binding.behaviour
     for keyword, value in behaviour.arguments.items():
         parameter = signature.parameters.get(keyword)
@@ -176,7 +176,7 @@ def _check_values(
 
 
 def _annotated_types(parameter: inspect.Parameter) -> set[str]:
-    """Return the built-in types that an annotation names; none if it names anything else."""
+    """Return the built-in types of an annotation; none if it has other types."""
     annotation = parameter.annotation
     text = annotation if isinstance(annotation, str) else getattr(annotation, '__name__', '')
     names = {name.strip() for name in text.strip('\'"').split('|')} - {'None'}
@@ -198,7 +198,7 @@ def _shown(value: Any) -> str:
     return repr(value)
 
 
-# What a value of YAML may be for a parameter with such an annotation.
+# The types of YAML values that fit an annotation.
 _SCALARS: dict[str, tuple[type, ...]] = {
     'bool': (bool,),
     'float': (float, int),

@@ -1,7 +1,7 @@
-"""Expressions over the fields of a message, before there is one.
+"""Check expressions over the fields of a message, without the message.
 
-What is wrong with them whatever the message holds: what cannot be read, names and filters that do
-not exist, and fields that a message has not.
+Errors that no message can avoid are reported: bad syntax, unknown names, filters and tests, and
+unknown fields.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
     from composer.interfaces.catalogue import InterfaceCatalogue
 
-# With these a name may be anything.
+# These accept undefined names.
 _FOR_UNDEFINED = ('d', 'default', 'defined', 'undefined')
 
 
 @dataclass(frozen=True, slots=True)
-class ExpressionFault:
-    """One thing that is wrong with an expression.
+class ExpressionFinding:
+    """One error in an expression.
 
     Attributes:
-        part: The text in it that is meant; empty for all of it.
+        part: The text in it that has the error; empty for all of it.
     """
 
     rule: str
@@ -39,20 +39,20 @@ class ExpressionFault:
     help: str | None = None
 
 
-def find_expression_faults(
+def check_expression(
     code: str, heard: MessageDescription, catalogue: InterfaceCatalogue
-) -> Iterator[ExpressionFault]:
-    """Yield what is wrong with an expression over the fields of a message.
+) -> Iterator[ExpressionFinding]:
+    """Yield the errors in an expression over the fields of a message.
 
     Args:
-        heard: The message; its fields are in scope, and it itself as `message`.
-        catalogue: Describes nested messages; what it does not know is taken as right.
+        heard: The message; in scope are its fields, and the message as `message`.
+        catalogue: Describes nested messages; those that it does not know are not checked.
     """
     sandbox = Sandbox()
     try:
         expression = sandbox.parse_expression(code)
     except TemplateError as error:
-        yield ExpressionFault('bad-expression', str(error.message))
+        yield ExpressionFinding('bad-expression', str(error.message))
         return
     types = {'message': FieldType('message', heard.name)}
     types |= {field.name: field.type for field in heard.fields}
@@ -64,8 +64,8 @@ def find_expression_faults(
         if isinstance(each, nodes.Filter | nodes.Test) and each.name in _FOR_UNDEFINED
     }
     for node in every:
-        if id(node) not in guarded and (fault := walk.find_fault(node)):
-            yield fault
+        if id(node) not in guarded and (finding := walk.check(node)):
+            yield finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,38 +74,40 @@ class _Walk:
     types: dict[str, FieldType]
     catalogue: InterfaceCatalogue
 
-    def find_fault(self, node: nodes.Expr) -> ExpressionFault | None:
+    def check(self, node: nodes.Expr) -> ExpressionFinding | None:
         match node:
             case nodes.Name():
-                return self._find_name_fault(node.name)
+                return self._check_name(node.name)
             case nodes.Filter() if node.name not in self.sandbox.filters:
                 return self._explain_missing('filter', node.name, list(self.sandbox.filters))
             case nodes.Test() if node.name not in self.sandbox.tests:
                 return self._explain_missing('test', node.name, list(self.sandbox.tests))
             case nodes.Getattr():
-                return self._find_field_fault(node)
+                return self._check_field(node)
         return None
 
-    def _find_name_fault(self, name: str) -> ExpressionFault | None:
+    def _check_name(self, name: str) -> ExpressionFinding | None:
         if name in self.types or name in self.sandbox.globals:
             return None
         help_text = suggest(name, self.types, 'in scope are')
-        return ExpressionFault('undefined-name', f"'{name}' is not defined", name, help_text)
+        return ExpressionFinding('undefined-name', f"'{name}' is not defined", name, help_text)
 
-    def _explain_missing(self, what: str, name: str, known: list[str]) -> ExpressionFault:
+    def _explain_missing(self, what: str, name: str, known: list[str]) -> ExpressionFinding:
         message = f"there is no {what} '{name}'"
-        return ExpressionFault('bad-expression', message, name, suggest(name, known, 'there are'))
+        return ExpressionFinding(
+            'bad-expression', message, name, suggest(name, known, 'there are')
+        )
 
-    def _find_field_fault(self, node: nodes.Getattr) -> ExpressionFault | None:
+    def _check_field(self, node: nodes.Getattr) -> ExpressionFinding | None:
         owner = self._describe(self._type_of(node.node))
-        # Descriptions of installed packages are without constants, whose names are such.
+        # Descriptions of installed packages lack constants, which have names in capitals.
         if owner is None or owner.field(node.attr) or node.attr.isupper():
             return None
         error = unknown_field(owner.name, node.attr, [field.name for field in owner.fields])
-        return ExpressionFault('unknown-field', str(error), node.attr, error.help)
+        return ExpressionFinding('unknown-field', str(error), node.attr, error.help)
 
     def _type_of(self, node: nodes.Node) -> FieldType | None:
-        """Return the type of what an expression gives, if it is a field and its place is plain."""
+        """Return the type of a field that an expression names, or `None`."""
         match node:
             case nodes.Name():
                 return self.types.get(node.name)

@@ -18,7 +18,7 @@ from composer.language.specs import REENTRANT
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator
 
-    from composer.checks.connections.topology import Endpoint, Graph
+    from composer.checks.connections.topology import Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
     from composer.language.bindings import Binding
@@ -67,17 +67,17 @@ class _Wait:
         return f"{self.binding.owner} of node '{self.node.name}'"
 
 
-def check_deadlocks(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_deadlocks(context: CheckContext) -> Iterator[Diagnostic]:
     """No behaviour waits for a service that needs what the behaviour keeps."""
-    waits = list(_find_waits(context, graph))
+    waits = list(_find_waits(context))
     yield from _check_hooks(context, waits)
     yield from _check_groups(context, waits)
 
 
-def _find_waits(context: CheckContext, graph: Graph) -> Iterator[_Wait]:
+def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     servers = {
         (end.node.name, end.entity.name): (channel, end)
-        for channel in graph.of_kind('service')
+        for channel in context.topology.of_kind('service')
         for end in channel.users
         if len(channel.providers) == 1
     }
@@ -192,7 +192,7 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
     if len(chain) == 1:
         message = (
             f"{first} waits for service '{first.service}', which its own callback group serves: "
-            'neither can go on'
+            'neither can continue'
         )
     else:
         names = [f"'{wait.service}'" for wait in chain]
@@ -201,14 +201,14 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         way = ' → '.join(names)
         message = (
             f'{first} waits for a chain of services that comes back to its own callback group, '
-            f'so that none can go on: {way}'
+            f'so none can continue: {way}'
         )
     return context.at_value(
         first.path,
         'service-deadlock',
         message,
         part=first.binding.behaviour.function,
-        help=f"give {last.server.noun} '{last.server.entity.name}' a group of its own, "
+        help=f"give {last.server.kind.noun} '{last.server.entity.name}' a group of its own, "
         "or 'group: reentrant'",
         related=_places(context, chain[:_MOST_SHOWN]),
     )

@@ -13,7 +13,7 @@ from composer.python_source.return_values import always_answers
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from composer.checks.connections.topology import Endpoint, Graph
+    from composer.checks.connections.topology import Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import BehaviourSpec
@@ -33,14 +33,14 @@ class _Relay:
     is_plain: bool
 
 
-def check_loops(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_loops(context: CheckContext) -> Iterator[Diagnostic]:
     """No message runs in a circle for ever.
 
     Relays without a behaviour pass on every message: an error. Behaviours of which every path
     returns a payload do so as well, and a closed loop of control may be meant: a warning. A
     behaviour that may return `None` can end the loop.
     """
-    relays = list(_find_relays(context, graph))
+    relays = list(_find_relays(context))
     plain = [relay for relay in relays if relay.is_plain]
     reported: set[str] = set()
     for loop in _find_loops(plain):
@@ -51,13 +51,13 @@ def check_loops(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
             yield _explain(context, loop, 'message-loop')
 
 
-def _find_relays(context: CheckContext, graph: Graph) -> Iterator[_Relay]:
+def _find_relays(context: CheckContext) -> Iterator[_Relay]:
     published = {
         (end.node.name, end.entity.name): channel.name
-        for channel in graph.of_kind('topic')
+        for channel in context.topology.of_kind('topic')
         for end in channel.providers
     }
-    for channel in graph.of_kind('topic'):
+    for channel in context.topology.of_kind('topic'):
         for end in channel.users:
             relay = end.entity
             target = published.get((end.node.name, getattr(relay, 'publish', None) or ''))
@@ -87,7 +87,7 @@ def _explain(context: CheckContext, loop: list[_Relay], rule: str) -> Diagnostic
     return context.at_value(
         (*first.end.path, 'publish'),
         rule,
-        f'each message runs in a circle for ever: {way}',
+        f'messages go in a circle forever: {way}',
         help='publish on another topic, or let a behaviour return None where it ends',
         related=[
             context.related(relay.end.path, f"{relay.end} passes it on to '{relay.published}'")

@@ -11,7 +11,7 @@ from composer.language.qos_conflicts import QosConflict, find_qos_conflicts
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from composer.checks.connections.topology import Channel, Endpoint, Graph
+    from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
     from composer.language.specs import QosSpec
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 Policies = tuple[tuple[str, Any], ...]
 
 
-def check_qos_pairs(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_qos_pairs(context: CheckContext) -> Iterator[Diagnostic]:
     """Every subscription can hear every publisher of its topic, and so with services.
 
     What has the same QoS is looked at once: one finding for each pair of different ones.
     """
     for kind in ('topic', 'service'):
-        for channel in graph.of_kind(kind):
+        for channel in context.topology.of_kind(kind):
             if channel.providers and channel.users:
                 yield from _check_channel(context, channel)
 
@@ -122,7 +122,7 @@ def _related(
         while profile in context.spec.qos:
             spec = context.spec.qos[profile]
             if policy in spec.policies:
-                message = f"the profile '{profile}' says so"
+                message = f"the profile '{profile}' sets it"
                 yield context.related_value((*spec.path, policy), message)
                 break
             profile = spec.profile

@@ -1,4 +1,4 @@
-"""Who meets whom: all publishers, subscriptions, servers and clients by their full names.
+"""The topology of a system: its topics, services and actions by full names, and their ends.
 
 Names are resolved as ROS does: namespaces, private names, then the node's remapping rules. ROS 2
 Jazzy does not remap the names of actions, only those of the topics and services they consist of.
@@ -7,32 +7,22 @@ Jazzy does not remap the names of actions, only those of the topics and services
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
+from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
 from composer.language.specs import NodeSpec
 from composer.names import expand_name, find_namespace_fault, find_topic_name_fault, remap_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-    from composer.checks.context import CheckContext
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, ProcessSpec, QosSpec, SystemSpec
-    from composer.yaml_text.positions import DataPath
+    from composer.yaml_text.positions import DataPath, SourceMap
 
-ChannelKind: TypeAlias = Literal['topic', 'service', 'action']
-# An end that may be there: its kind, whether it provides, and its type, `None` for any.
-Doubt: TypeAlias = tuple[ChannelKind, bool, str | None]
+# An end that may exist: its channel, whether it provides, and its type, `None` for any.
+PossibleEnd: TypeAlias = tuple[ChannelKind, bool, str | None]
 
-# By the sections of a node: what meets under one name, and the entity in words.
-_SECTIONS: dict[str, tuple[ChannelKind, str]] = {
-    'publishers': ('topic', 'publisher'),
-    'subscriptions': ('topic', 'subscription'),
-    'services': ('service', 'service'),
-    'service_clients': ('service', 'service client'),
-    'actions': ('action', 'action'),
-    'action_clients': ('action', 'action client'),
-}
-_PROVIDING = ('publishers', 'services', 'actions')
 _SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
 # By the keys of a node that switch them on (rclpy's `ParameterService` and the like).
 _SERVICES_OF_ROS = {
@@ -51,15 +41,11 @@ _SERVICES_OF_ROS = {
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """One end of a channel.
-
-    Attributes:
-        noun: Its kind in words, as in `service client`.
-    """
+    """One end of a channel."""
 
     node: NodeSpec
     entity: EndSpec
-    noun: str
+    kind: EntityKind
 
     @property
     def path(self) -> DataPath:
@@ -74,12 +60,11 @@ class Endpoint:
     @property
     def written(self) -> str:
         """The name of the channel as the file has it."""
-        kind = 'topic' if self.noun in ('publisher', 'subscription') else self.noun.split()[0]
-        return str(getattr(self.entity, kind))
+        return str(getattr(self.entity, str(self.kind.channel)))
 
     def __str__(self) -> str:
         """Return `publisher 'scan' of node 'lidar'`."""
-        return f"{self.noun} '{self.entity.name}' of node '{self.node.name}'"
+        return f"{self.kind.noun} '{self.entity.name}' of node '{self.node.name}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,19 +88,19 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Graph:
+class Topology:
     """All channels of a system.
 
     Attributes:
-        of_ros: The full names of the services that ROS itself gives to the nodes.
-        doubts: The ends that channels may have beside: their names hang on an argument that is
-            not given yet, or they are missing or misnamed for a fault of their own.
-        left_out: What nodes have that are left out by their `when`.
+        ros_services: The full names of the services that ROS itself gives to the nodes.
+        possible: Ends that channels may have as well: their names depend on an argument that is
+            not given yet, or they are missing or misnamed because of another error.
+        left_out: The channels of nodes that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
-    of_ros: frozenset[str]
-    doubts: frozenset[Doubt]
+    ros_services: frozenset[str]
+    possible: frozenset[PossibleEnd]
     left_out: frozenset[tuple[ChannelKind, str]]
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
@@ -123,67 +108,67 @@ class Graph:
         return (channel for channel in self.channels.values() if channel.kind == kind)
 
     def may_have_more(self, channel: Channel) -> bool:
-        """Return whether the end that a channel lacks may be one that nobody knows."""
+        """Return whether the end that a channel lacks may be one of the possible ones."""
         is_provider = not channel.providers
         types = (None, *(end.entity.type for end in channel.ends))
-        return any((channel.kind, is_provider, type_) in self.doubts for type_ in types)
+        return any((channel.kind, is_provider, type_) in self.possible for type_ in types)
 
 
-def build_graph(context: CheckContext) -> Graph:
-    """Return who meets whom in a system."""
-    doubts = _Doubts(context)
+def build_topology(
+    system: LoadedSystem, spec: SystemSpec, has_real_type: Callable[[EndSpec], bool]
+) -> Topology:
+    """Return the topology of a system.
+
+    Args:
+        has_real_type: Returns whether the type of an entity is the one that is meant.
+    """
+    uncertain = _UncertainNames(system, spec)
     channels: dict[tuple[ChannelKind, str], Channel] = {}
-    unsure: set[Doubt] = set(doubts.lacking)
-    for node, section, entity in _entities(context.spec):
-        kind, noun = _SECTIONS[section]
-        provides = section in _PROVIDING
-        if doubts.about_name(node, entity.path, kind):
-            unsure.add((kind, provides, None))
+    possible: set[PossibleEnd] = set(uncertain.missing)
+    for node, kind, channel_kind, entity in _ends(spec):
+        name = getattr(entity, channel_kind)
+        if uncertain.has(node, entity.path, channel_kind):
+            possible.add((channel_kind, kind.provides, None))
             continue
-        name = full_name(node, kind, getattr(entity, kind))
         # Without a type, too, it would be a reason to say nothing of any other.
-        if is_doubtful(context, node, getattr(entity, kind)) and context.has_real_type(entity):
-            unsure.add((kind, provides, entity.type))
-        channel = channels.setdefault((kind, name), Channel(kind, name))
-        ends = channel.providers if provides else channel.users
-        ends.append(Endpoint(node, entity, noun))
-    of_ros = (name for node in context.spec.nodes.values() for name in _services_of_ros(node))
-    return Graph(
-        channels, frozenset(of_ros), frozenset(unsure), frozenset(_channels_left_out(context))
+        if is_misnamed(system.positions, node, name) and has_real_type(entity):
+            possible.add((channel_kind, kind.provides, entity.type))
+        key = channel_kind, full_name(node, channel_kind, name)
+        channel = channels.setdefault(key, Channel(*key))
+        ends = channel.providers if kind.provides else channel.users
+        ends.append(Endpoint(node, entity, kind))
+    services = (name for node in spec.nodes.values() for name in _services_of_ros(node))
+    left_out = (
+        (channel_kind, full_name(node, channel_kind, getattr(entity, channel_kind)))
+        for node, _, channel_kind, entity in (_ends(system.unused) if system.unused else ())
     )
+    return Topology(channels, frozenset(services), frozenset(possible), frozenset(left_out))
 
 
-def _entities(spec: SystemSpec) -> Iterator[tuple[NodeSpec, str, EndSpec]]:
+def _ends(spec: SystemSpec) -> Iterator[tuple[NodeSpec, EntityKind, ChannelKind, EndSpec]]:
     for node in spec.nodes.values():
-        for section in _SECTIONS:
-            for entity in getattr(node, section).values():
-                yield node, section, entity
+        for kind, entity in node.ends():
+            if kind.channel:
+                yield node, kind, kind.channel, entity
 
 
 def _is_bad_rule(rule: tuple[str, str]) -> bool:
     source, target = rule
-    return _is_misnamed(source.rpartition('://')[2], target)
+    return _is_no_name(source.rpartition('://')[2], target)
 
 
-def is_doubtful(context: CheckContext, node: NodeSpec, name: str) -> bool:
-    """Return whether a name, or the namespace that this node alone has, is none of ROS."""
-    if _is_misnamed(name):
+def is_misnamed(positions: SourceMap, node: NodeSpec, name: str) -> bool:
+    """Return whether ROS refuses a name, or the namespace that this node alone has."""
+    if _is_no_name(name):
         return True
-    spans = context.system.positions.values
+    spans = positions.values
     own = spans.get((*node.path, 'namespace'))
     is_own = own is not None and own != spans.get(('defaults', 'namespace'))
     return is_own and find_namespace_fault(node.namespace) is not None
 
 
-def _is_misnamed(*names: str) -> bool:
+def _is_no_name(*names: str) -> bool:
     return any(find_topic_name_fault(name) for name in names)
-
-
-def _channels_left_out(context: CheckContext) -> Iterator[tuple[ChannelKind, str]]:
-    unused = context.system.unused
-    for node, section, entity in _entities(unused) if unused else ():
-        kind, _ = _SECTIONS[section]
-        yield kind, full_name(node, kind, getattr(entity, kind))
 
 
 def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
@@ -201,25 +186,29 @@ def _services_of_ros(node: NodeSpec) -> Iterator[str]:
             yield from (expand_name(f'~/{name}', node.name, node.namespace) for name in names)
 
 
-class _Doubts:
-    """Which names are not the real ones: samples, and what stands in for something wrong."""
+class _UncertainNames:
+    """Names that are not the real ones: samples, and what stands in for something wrong.
 
-    def __init__(self, context: CheckContext) -> None:
-        positions = context.system.positions
-        sampled = set(context.system.sampled)
+    Attributes:
+        missing: The ends that may be missing because data were dropped.
+    """
+
+    def __init__(self, system: LoadedSystem, spec: SystemSpec) -> None:
+        positions = system.positions
+        sampled = set(system.sampled)
         paths = {
             path
             for spans in ((positions.keys, positions.values) if sampled else ())
             for path, span in spans.items()
             if span in sampled
         }
-        self._paths = paths | context.system.dropped
-        self.lacking = {
-            doubt
-            for path in context.system.dropped
+        self._paths = paths | system.dropped
+        self.missing = {
+            end
+            for path in system.dropped
             if path[:1] == ('include',)
             or (path[:1] == ('nodes',) and len(path) <= _DEPTH_OF_ENTITIES)
-            for doubt in _doubts_about(path)
+            for end in _ends_lost_with(path)
         }
         self._nodes = {
             path[1]
@@ -227,13 +216,11 @@ class _Doubts:
             if path[:1] == ('nodes',) and len(path) > 1 and _moves_node(path)
         }
         self._misruled = {
-            node.path[-1]
-            for node in context.spec.nodes.values()
-            if any(map(_is_bad_rule, node.remap))
+            node.path[-1] for node in spec.nodes.values() if any(map(_is_bad_rule, node.remap))
         }
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
-    def about_name(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
+    def has(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
         """Return whether an entity may have another name than it seems."""
         if kind in _SCHEMES and node.path[-1] in self._misruled:
             return True
@@ -251,20 +238,21 @@ class _Doubts:
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4
 _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
-    *_SECTIONS,
+    *(kind.section for kind in CHANNEL_KINDS),
     'namespace',
     'remap',
 }
 
 
-def _doubts_about(path: DataPath) -> set[Doubt]:
+def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
     """Return what ends may be missing without the data at a path."""
     section = str(path[_DEPTH_OF_SECTIONS]) if len(path) > _DEPTH_OF_SECTIONS else ''
     if section in _WITHOUT_CHANNELS and path[0] == 'nodes':
         return set()
     # An unknown key may be any section, misspelt.
-    sections = [section] if section in _SECTIONS else list(_SECTIONS)
-    return {(_SECTIONS[each][0], each in _PROVIDING, None) for each in sections}
+    known = KIND_OF_SECTION.get(section)
+    kinds = [known] if known else CHANNEL_KINDS
+    return {(kind.channel, kind.provides, None) for kind in kinds if kind.channel}
 
 
 def _moves_node(path: DataPath) -> bool:

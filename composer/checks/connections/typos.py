@@ -1,4 +1,4 @@
-"""Names of what may be elsewhere, a slip of the pen away from what is here.
+"""Typos in names that no declaration has to match.
 
 What is waited for may come from programs that no file declares, a remapping rule may be for what a
 behaviour makes with rclpy itself, and a callback group may have any name: only a name that is all
@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from composer.checks.connections.topology import build_graph, full_name
-from composer.checks.connections.waits import waiters
+from composer.checks.connections.topology import full_name
+from composer.checks.connections.wait_conditions import waiters
 from composer.language.specs import REENTRANT
 from composer.names import expand_name, with_article
 from composer.spelling import count_edits, did_you_mean
@@ -32,29 +32,29 @@ _LONG = 8
 _MOST_COMPARED = 2_000
 
 
-def check_slips(context: CheckContext) -> Iterator[Diagnostic]:
+def check_typos(context: CheckContext) -> Iterator[Diagnostic]:
     """What is nowhere in the system is not a misspelt name of something that is."""
     yield from _check_conditions(context)
     yield from _check_rules(context)
     yield from _check_groups(context)
 
 
-def find_slip(word: str, options: Iterable[str]) -> str | None:
+def find_typo(word: str, options: Iterable[str]) -> str | None:
     """Return the option that a word is a misspelling of, and not a name in its own right.
 
-    One part of it, between slashes and underscores, has a slip; a long one may have two. Numbers
-    are no slips.
+    One part of it, between slashes and underscores, has a typo; a long one may have two. Other
+    numbers are no typos.
     """
     parts = _SEPARATORS.split(word)
     for option in options:
         others = _SEPARATORS.split(option)
         pairs = [pair for pair in zip(parts, others, strict=False) if pair[0] != pair[1]]
-        if len(parts) == len(others) and len(pairs) == 1 and _is_slip(*pairs[0]):
+        if len(parts) == len(others) and len(pairs) == 1 and _is_typo(*pairs[0]):
             return option
     return None
 
 
-def _is_slip(word: str, other: str) -> bool:
+def _is_typo(word: str, other: str) -> bool:
     if min(len(word), len(other)) < _SHORTEST or _digits(word) != _digits(other):
         return False
     return count_edits(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
@@ -78,7 +78,7 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
         names = present[condition.kind]
         if name in names or len(names) > _MOST_COMPARED:
             continue
-        near = find_slip(name, names)
+        near = find_typo(name, names)
         if near:
             meant = _as_written(condition.name, near, waiter.namespace or '/')
             yield context.at_value(
@@ -93,12 +93,11 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     """Return the full names of what there is to wait for, left out or not, by its kind."""
     system = context.system
     specs = [context.spec, *([system.unused] if system.unused else [])]
-    graph = build_graph(context)
     present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
-    for channel in graph.channels.values():
+    for channel in context.topology.channels.values():
         if channel.providers:
             present[channel.kind].add(channel.name)
-    for kind, name in graph.left_out:
+    for kind, name in context.topology.left_out:
         present[kind].add(name)
     present['node'] = {node.full_name for spec in specs for node in spec.nodes.values()}
     return present
@@ -121,7 +120,7 @@ def _as_written(name: str, full: str, namespace: str) -> str:
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check remapping rules; one of an include is for all that is in it."""
     matching: set[Span] = set()
-    slips: dict[Span, Diagnostic] = {}
+    typos: dict[Span, Diagnostic] = {}
     for node in context.spec.nodes.values():
         if not node.remap:
             continue
@@ -133,14 +132,14 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             name = expand_name(bare, node.name, node.namespace)
             if name in names:
                 matching.add(span)
-            elif near := find_slip(name, names):
-                slips[span] = context.at_key(
+            elif near := find_typo(name, names):
+                typos[span] = context.at_key(
                     path,
                     _RULE,
                     f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
                     help=did_you_mean(_as_written(bare, near, node.namespace)),
                 )
-    yield from (finding for span, finding in slips.items() if span not in matching)
+    yield from (finding for span, finding in typos.items() if span not in matching)
 
 
 def _names_of(node: NodeSpec) -> set[str]:
@@ -152,7 +151,7 @@ def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         for entity in (*node.triggers, *node.services.values()):
             group = entity.group
-            if group and group != REENTRANT and _is_slip(group, REENTRANT):
+            if group and group != REENTRANT and _is_typo(group, REENTRANT):
                 yield context.at_value(
                     (*entity.path, 'group'),
                     _RULE,

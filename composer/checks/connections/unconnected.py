@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.checks.connections.topology import is_doubtful
+from composer.checks.connections.topology import is_misnamed
 from composer.spelling import did_you_mean, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.checks.connections.topology import Channel, Endpoint, Graph
+    from composer.checks.connections.topology import Channel, Endpoint, Topology
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
 
@@ -33,52 +33,48 @@ _OF_ACTIONS = '/_action/'
 # Names are compared one by one; a file that wants more suggestions is checked without the rest.
 _MOST_COMPARED = 5_000
 
-_MESSAGES = {
-    'publisher': ('no-subscription', "nothing in this system hears '{}'"),
-    'subscription': ('no-publisher', "nothing in this system publishes '{}'"),
-    'service client': ('no-server', "nothing in this system serves '{}'"),
-    'action client': ('no-server', "nothing in this system serves '{}'"),
-}
 
-
-def check_other_ends(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
     """Everyone who needs another end has one, or says that it is elsewhere."""
     if context.spec.processes:
         # Nobody knows what programs publish, hear and serve.
         return
-    partners = _Partners(graph)
-    for channel in graph.channels.values():
-        if not _is_alone(context, graph, channel):
+    partners = _Partners(context.topology)
+    for channel in context.topology.channels.values():
+        if not _is_alone(context, channel):
             continue
         for end in channel.ends:
-            if end.noun in _MESSAGES and not getattr(end.entity, 'external', True):
+            if end.kind.unmatched and not getattr(end.entity, 'external', True):
                 near = partners.nearest(channel, end)
-                yield _explain(context, channel, end, near)
+                yield _explain(context, channel, end, near, *end.kind.unmatched)
 
 
-def _is_alone(context: CheckContext, graph: Graph, channel: Channel) -> bool:
+def _is_alone(context: CheckContext, channel: Channel) -> bool:
+    topology = context.topology
     if channel.providers and channel.users:
         return False
-    if (channel.kind, channel.name) in graph.left_out:
+    if (channel.kind, channel.name) in topology.left_out:
         return False
-    if channel.name in _OF_ROS or channel.name in graph.of_ros or _OF_ACTIONS in channel.name:
+    if channel.name in _OF_ROS or channel.name in topology.ros_services:
         return False
-    # A name with a fault is a finding of its own.
-    is_misnamed = any(is_doubtful(context, end.node, end.written) for end in channel.ends)
-    return not is_misnamed and not graph.may_have_more(channel)
+    if _OF_ACTIONS in channel.name:
+        return False
+    # A wrong name is a finding of its own.
+    positions = context.system.positions
+    has_wrong_name = any(is_misnamed(positions, end.node, end.written) for end in channel.ends)
+    return not has_wrong_name and not topology.may_have_more(channel)
 
 
 def _explain(
-    context: CheckContext, channel: Channel, end: Endpoint, near: str | None
+    context: CheckContext, channel: Channel, end: Endpoint, near: str | None, rule: str, text: str
 ) -> Diagnostic:
-    rule, message = _MESSAGES[end.noun]
     inner = (*end.path, channel.kind)
     at = context.at_value if inner in context.system.positions.values else context.at_key
-    help_text = "say 'external: true' if the other end is elsewhere"
+    help_text = "write 'external: true' if the other end is elsewhere"
     return at(
         inner,
         rule,
-        message.format(channel.name),
+        text.format(channel.name),
         help=f'{did_you_mean(near)} Otherwise {help_text}' if near else help_text,
     )
 
@@ -86,10 +82,10 @@ def _explain(
 class _Partners:
     """Whom those without another end may have meant: names with an end of the right type."""
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, topology: Topology) -> None:
         # Names are compared without their namespaces, in which all names look alike.
         self._names: dict[tuple[str, str, bool], dict[str, str]] = {}
-        for channel in graph.channels.values():
+        for channel in topology.channels.values():
             last = channel.name.rpartition('/')[2]
             for ends, provides in ((channel.providers, True), (channel.users, False)):
                 for end in ends:

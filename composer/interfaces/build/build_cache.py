@@ -1,14 +1,14 @@
-"""Where built interface packages are kept, so that they are built once.
+"""Cache built interface packages.
 
     $XDG_CACHE_HOME/composer/interfaces/
         example_interfaces-1f6a…/          a finished package, never changed
-        example_interfaces-1f6a….partial/  one in the making
-        example_interfaces-1f6a….lock      locked by whoever makes it
+        example_interfaces-1f6a….partial/  an unfinished package
+        example_interfaces-1f6a….lock      locked by the process that builds it
 
-A package is made in its partial folder and renamed at the end, so a name without `.partial` is
-whole. The lock is passed on to generators and compilers: while one of them still writes, nobody
-else starts, even if the process that wanted the package was killed. A partial folder without a
-lock is waste.
+A package is built in its partial folder, which is renamed at the end: a folder without `.partial`
+is complete. Generators and compilers inherit the lock: no other process builds the package while
+one of them still writes, even if the process that started them was killed. A partial folder whose
+lock is free is removed.
 """
 
 import fcntl
@@ -25,10 +25,10 @@ from pathlib import Path
 from composer.errors import ComposerError
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 
-# To be raised whenever the builder makes something else of the same definitions.
+# Raise it whenever the builder builds something else from the same definitions.
 BUILDER_FORMAT = 1
 
-# Packages of ROS whose releases may change what is built, or what it runs with.
+# Packages of ROS whose releases may change what is built, or what it needs.
 _VERSIONED_PACKAGES = (
     'rclpy',
     'rosidl_runtime_c',
@@ -58,7 +58,7 @@ class BuildFolder:
 
 
 def find_cache() -> Path:
-    """Get the cache's folder; a relative `XDG_CACHE_HOME` does not count, by its specification."""
+    """Return the folder of the cache; a relative `XDG_CACHE_HOME` is ignored, as specified."""
     home = os.environ.get('XDG_CACHE_HOME', '')
     base = Path(home) if home.startswith('/') else Path.home() / '.cache'
     return base / 'composer' / 'interfaces'
@@ -69,12 +69,12 @@ def compute_key(
     prefixes: Iterable[Path],
     used: Mapping[str, str],
 ) -> str:
-    """Compute by what a built package is known: equal keys mean an equal result.
+    """Compute the key of a built package: equal keys mean equal results.
 
     Args:
         definitions: what it is built from.
         prefixes: where ROS is installed.
-        used: the keys of packages that it uses and that are built as well.
+        used: the keys of the packages that it uses and that were built too.
 
     Returns:
         16 hexadecimal digits.
@@ -85,8 +85,8 @@ def compute_key(
     parts += [f'{name} {key}' for name, key in sorted(used.items())]
     parts += [text for source in sorted(definitions.sources.items()) for text in source]
     parts += map(str, prefixes)
-    foreign = {reference.message.partition('/')[0] for reference in definitions.references}
-    names = (*_VERSIONED_PACKAGES, *sorted(foreign - {definitions.package}))
+    used_names = {reference.message.partition('/')[0] for reference in definitions.references}
+    names = (*_VERSIONED_PACKAGES, *sorted(used_names - {definitions.package}))
     parts += [_package_version(name, prefixes) for name in names]
     for part in parts:
         data = part.encode()
@@ -99,15 +99,12 @@ def provide_cached(
     build: Callable[[BuildFolder], None],
     waiting: Callable[[], None],
 ) -> Path:
-    """Get a package from the cache, building it if it is not there.
+    """Return the folder of a package in the cache; build the package if it is not there.
 
     Args:
-        name: of the package's folder in the cache.
+        name: the name of the folder.
         build: fills the folder.
-        waiting: called before waiting for another process that builds the same.
-
-    Returns:
-        the package's folder.
+        waiting: called before waiting for another process that builds the same package.
 
     Raises:
         CacheError: the cache cannot be written.
@@ -129,7 +126,7 @@ def provide_cached(
 
 
 def _fill(place: Path, folder: BuildFolder, build: Callable[[BuildFolder], None]) -> None:
-    _remove_waste(place.parent, place)
+    _remove_leftovers(place.parent, place)
     shutil.rmtree(folder.path, ignore_errors=True)
     folder.path.mkdir()
     try:
@@ -141,7 +138,7 @@ def _fill(place: Path, folder: BuildFolder, build: Callable[[BuildFolder], None]
 
 @contextmanager
 def _lock(place: Path, waiting: Callable[[], None]) -> Iterator[int]:
-    """Hold the lock of a package; it ends when no process has its file open any more."""
+    """Hold the lock of a package; it is free when no process has its file open."""
     descriptor = os.open(_lock_file(place), os.O_RDWR | os.O_CREAT, 0o644)
     try:
         try:
@@ -154,8 +151,8 @@ def _lock(place: Path, waiting: Callable[[], None]) -> Iterator[int]:
         os.close(descriptor)
 
 
-def _remove_waste(cache: Path, current: Path) -> None:
-    """Remove what killed builds of other packages left."""
+def _remove_leftovers(cache: Path, current: Path) -> None:
+    """Remove the partial folders that killed builds of other packages left."""
     for path in cache.glob('*.partial'):
         place = path.with_suffix('')
         if place == current:
@@ -178,7 +175,7 @@ def _lock_file(place: Path) -> Path:
 
 
 def _numpy_version() -> str:
-    """Get NumPy's version without importing it: built extensions depend on it."""
+    """Return the version of NumPy, on which built extensions depend, without importing it."""
     spec = find_spec('numpy')
     with suppress(OSError):
         if spec and spec.origin:
@@ -187,7 +184,7 @@ def _numpy_version() -> str:
 
 
 def _package_version(package: str, prefixes: Iterable[Path]) -> str:
-    """Read a package's manifest, which has its version; a missing package is a version, too."""
+    """Return the manifest of a package, which has its version; an empty text if it is missing."""
     for prefix in prefixes:
         with suppress(OSError):
             return (prefix / 'share' / package / 'package.xml').read_text(encoding='utf-8')

@@ -27,18 +27,18 @@ class BuildError(ComposerError):
     """A generator or a compiler failed on definitions that look right.
 
     Attributes:
-        output: all that it wrote.
+        output: all its output.
     """
 
     def __init__(self, package: str, error: JobError) -> None:
-        """Show the errors in the output, or else its end."""
+        """Show the lines with errors in the output, or its last lines."""
         lines = error.output.strip().splitlines()
         shown = [line for line in lines if 'error' in line.lower()] or lines
         text = '\n'.join(f'  {line}' for line in shown[-_SHOWN_LINES:])
         super().__init__(
             f'{package} could not be built: {error}\n{text}',
-            help='the definitions were read without faults, so this may be a fault of the '
-            'installed generators or compilers, or of Composer',
+            help='the definitions have no errors, so the cause may be the installed generators '
+            'or compilers, or Composer itself',
         )
         self.output = error.output
 
@@ -49,18 +49,18 @@ class DependencyMissingError(ComposerError):
 
 @dataclass(frozen=True, slots=True)
 class Dependencies:
-    """What a package is built on.
+    """The packages that a package is built on.
 
     Attributes:
         prefixes: where ROS is installed.
-        built: the prefixes of packages built before, by name.
+        built: the prefixes of packages that were built before, by name.
     """
 
     prefixes: Sequence[Path]
     built: Mapping[str, Path]
 
     def locate(self, package: str) -> Path:
-        """Find the prefix of a package that definitions use.
+        """Return the prefix of a package that definitions use.
 
         Raises:
             DependencyMissingError: it is not there.
@@ -84,10 +84,10 @@ def build_package(
     """Build a package into an empty folder.
 
     Args:
-        definitions: without faults.
+        definitions: without errors.
         prefix: becomes the package's prefix; it may be moved afterwards, together with those of
             `dependencies.built`, which have to lie beside it.
-        dependencies: where the packages are that it uses.
+        dependencies: the packages that it uses.
         descriptors: open files that the programs inherit: a lock that must not end before them.
 
     Raises:
@@ -123,7 +123,7 @@ def build_package(
 
 
 def _all_used(definitions: PackageDefinitions, dependencies: Dependencies) -> set[str]:
-    """List the packages whose headers are needed: those used, and those that these use."""
+    """Return the packages whose headers are needed: those used, and those that these use."""
     found = set(used_packages(definitions))
     for message in {reference.message for reference in definitions.references}:
         package, _, name = message.partition('/')

@@ -1,6 +1,6 @@
-"""The programs that turn definitions into a loadable package, as jobs with their order.
+"""The jobs that generate, compile and link an interface package.
 
-One program generates all sources; the compilers run side by side, and the libraries are linked in
+One program generates all sources; the compilers run in parallel, and the libraries are linked in
 the order in which they use each other. A package is laid out as a ROS prefix: `share/`,
 `include/`, `lib/`, and `python/` with the modules.
 """
@@ -16,7 +16,7 @@ from composer.interfaces.build import generation
 from composer.interfaces.build.jobs import Job
 from composer.interfaces.build.toolchain import Toolchain
 
-# -w: warnings on generated code help nobody. NDEBUG leaves out comparisons of constants.
+# -w: nobody can fix warnings in generated code. NDEBUG leaves out comparisons of constants.
 _COMPILE_FLAGS = ('-fPIC', '-O1', '-w', '-pipe', '-DNDEBUG')
 _LINK_FLAGS = ('-shared', '-Wl,--no-as-needed')
 
@@ -75,7 +75,7 @@ LIBRARIES = (
         ('rosidl_generator_c',),
         ('rosidl_typesupport_introspection_c', 'rosidl_runtime_c', 'rcutils'),
     ),
-    # Linking the two type supports has them loaded, and rosidl_typesupport_c finds them by name.
+    # Linking the two type supports loads them, and rosidl_typesupport_c finds them by name.
     Library(
         'rosidl_typesupport_c',
         'c++',
@@ -93,7 +93,7 @@ LIBRARIES = (
         ('rosidl_runtime_c', 'rcutils'),
     ),
 )
-# The slowest first, so that none is left over at the end.
+# The slowest first, to keep all workers busy until the end.
 _GENERATION_ORDER = (
     'rosidl_generator_py',
     'rosidl_typesupport_fastrtps_c',
@@ -111,17 +111,17 @@ _EXTENSION = Library(
 
 @dataclass(frozen=True, slots=True)
 class BuildPlan:
-    """What is built, and where.
+    """What to build, and where.
 
     Attributes:
         package: its name.
         prefix: the folder that becomes the package's prefix; `definitions/` in `build/` and
             `share/<package>/` hold its definition files already.
         interfaces: such as `msg/Name`.
-        used: the prefix of each interface package that this one consists of.
-        siblings: those of `used` that were built here, with their final places beside this one's.
-        toolchain: to build with.
-        workers: how many programs run at a time.
+        used: the prefix of each interface package that this one uses.
+        siblings: those of `used` that were built too, which end up beside this one.
+        toolchain: the programs and files to build with.
+        workers: the number of programs that run at a time.
     """
 
     package: str
@@ -134,7 +134,7 @@ class BuildPlan:
 
     @property
     def build(self) -> Path:
-        """The folder for what is not part of the package."""
+        """The folder for intermediate files."""
         return self.prefix / 'build'
 
     @property
@@ -150,7 +150,7 @@ class BuildPlan:
 
 
 def plan_jobs(plan: BuildPlan) -> list[Job]:
-    """List the jobs of a build."""
+    """Return the jobs of a build."""
     libraries = (*LIBRARIES, _EXTENSION)
     compile_all = [_compile_job(plan, library) for library in libraries]
     link_all = [_link_job(plan, library) for library in libraries]
@@ -185,9 +185,9 @@ def _arguments_path(plan: BuildPlan) -> Path:
 
 
 def _generation_job(plan: BuildPlan) -> Job:
-    # -P: this program's own folder must not hide modules of the generators.
+    # -P: the folder of this program must not hide modules of the generators.
     command = [sys.executable, '-P', str(generation.__file__), str(_arguments_path(plan))]
-    # Run here, so that relative entries of PYTHONPATH keep their meaning.
+    # Relative entries of PYTHONPATH depend on the current folder.
     return Job('generate', lambda: command, Path.cwd())
 
 
@@ -221,7 +221,7 @@ def _link_job(plan: BuildPlan, library: Library) -> Job:
     objects = plan.build / 'objects' / library.generator
     flags = [*_LINK_FLAGS, f'-Wl,-soname,{target.name}', *_runtime_paths(plan, library)]
     if library.generator not in {'rosidl_generator_py', 'extension'}:
-        # Nothing may be left open but what the Python program brings.
+        # Python resolves the symbols of the others.
         flags.append('-Wl,-z,defs')
     libraries = _linked_libraries(plan, library)
 
@@ -234,7 +234,7 @@ def _link_job(plan: BuildPlan, library: Library) -> Job:
 
 
 def _runtime_paths(plan: BuildPlan, library: Library) -> list[str]:
-    """Have the loader find the package's own libraries, those built beside it, and ROS's."""
+    """Return the flags by which the loader finds the libraries that a library uses."""
     up = '../..' if library is _EXTENSION else '..'
     own = '$ORIGIN/../../lib' if library is _EXTENSION else '$ORIGIN'
     beside = [f'$ORIGIN/{up}/../{place.name}/lib' for place in plan.siblings.values()]
@@ -248,7 +248,7 @@ def _runtime_paths(plan: BuildPlan, library: Library) -> list[str]:
 def _linked_libraries(plan: BuildPlan, library: Library) -> list[str]:
     paths = [plan.library(name) for name in library.uses]
     if library is not _EXTENSION:
-        # Whatever has messages in its fields also calls the C functions of their structures.
+        # Code for a field that is a message calls the C functions of its structure.
         paths += [
             path
             for name, prefix in plan.used.items()

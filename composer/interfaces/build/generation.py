@@ -1,12 +1,12 @@
 """Generate the sources of an interface package with ROS's own generators.
 
-This is a program of its own, run as `generation.py ARGUMENTS.json`, and imports nothing of
-Composer: the generators print, take over `sys.stdout` and leave state behind. What all of them
-need is imported once; then each runs in a fork. `composer.interfaces.build.compilation` writes the
+This is a program, run as `generation.py ARGUMENTS.json`, that imports nothing of Composer: the
+generators print, replace `sys.stdout` and keep state. It imports once what all of them need, and
+then runs each in a fork. `composer.interfaces.build.compilation` writes the
 arguments.
 
-Each generator leaves beside its sources the *units* that have to be compiled: files that include
-many sources, because a compiler reads the headers of ROS once per unit.
+Beside the sources of each generator it writes *units* to compile: files that include many sources,
+because a compiler reads the headers of ROS once per unit.
 """
 
 import importlib
@@ -21,7 +21,7 @@ from typing import Any
 
 TYPE_SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
 
-# What can be included after each other; descriptions define the same static names again and again.
+# Sources that can be joined in one unit; those of descriptions define the same static names.
 _JOINED_SUFFIXES = (
     '__functions.c',
     '__type_support.c',
@@ -32,7 +32,7 @@ _JOINED_SUFFIXES = (
 
 
 def main(arguments_path: str) -> None:
-    """Generate all that the arguments ask for."""
+    """Generate what the arguments list."""
     arguments = json.loads(Path(arguments_path).read_text(encoding='utf-8'))
     _check_template_engine()
     _describe(arguments)
@@ -41,7 +41,7 @@ def main(arguments_path: str) -> None:
 
 
 def _run_in_forks(steps: Sequence[Callable[[], None]], workers: int) -> None:
-    """Run steps in processes of their own, a few at a time, and exit if one fails."""
+    """Run each step in a fork, a few at a time, and exit if one fails."""
     waiting = list(steps)
     running: set[int] = set()
     failed = False
@@ -143,7 +143,7 @@ def _write_arguments(name: str, arguments: dict[str, Any], output: Path) -> Path
 
 
 def _move_headers(output: Path, generated: Iterable[Path], arguments: dict[str, Any]) -> None:
-    """Bring the headers of all generators together, where packages that use this one find them."""
+    """Move the headers to where packages that use this one find them."""
     for path in generated:
         if path.suffix == '.h':
             target = Path(arguments['include'], path.relative_to(output))
@@ -152,7 +152,7 @@ def _move_headers(output: Path, generated: Iterable[Path], arguments: dict[str, 
 
 
 def _write_visibility_header(name: str, arguments: dict[str, Any]) -> None:
-    """Fill in the one header that CMake configures."""
+    """Write the header that rosidl has CMake configure."""
     template = Path(arguments['templates'][name], f'{name}__visibility_control.h.in')
     if not template.exists():
         return
@@ -177,7 +177,7 @@ def _write_units(name: str, arguments: dict[str, Any], sources: list[Path]) -> N
 
 
 def _move_modules(output: Path, modules: Path) -> None:
-    """Move the Python modules to where they are imported from."""
+    """Move the Python modules to the folder of the Python package."""
     for path in sorted(output.rglob('*.py')):
         target = modules / path.relative_to(output)
         target.parent.mkdir(parents=True, exist_ok=True)

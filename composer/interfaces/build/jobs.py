@@ -1,4 +1,4 @@
-"""Run programs in parallel, each as soon as those that it waits for are done."""
+"""Run programs in parallel, each as soon as the programs before it are done."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ class JobError(Exception):
     """
 
     def __init__(self, job: str, output: str) -> None:
-        """Keep what a report needs."""
+        """Store the output; the message has the name of the job."""
         super().__init__(f'{job} failed')
         self.job = job
         self.output = output
@@ -31,11 +31,11 @@ class Job:
     """A program to run.
 
     Attributes:
-        name: to refer to it. command: gives the program and its arguments when it is started, and
-        not before: files may then
-            be listed that earlier jobs wrote.
-        folder: where it runs.
-        after: names of the jobs that must be done before.
+        name: its name, unique among the jobs.
+        command: returns the program and its arguments; it is called when the job starts, and can
+            list files that earlier jobs wrote.
+        folder: the working directory.
+        after: the names of the jobs that must be done before.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Job:
 
 
 class _Programs:
-    """The programs that run now, so that they can be ended together."""
+    """The running programs, which can be stopped together."""
 
     def __init__(self, environment: Mapping[str, str], descriptors: Sequence[int]) -> None:
         self._environment = environment
@@ -78,7 +78,7 @@ class _Programs:
             raise JobError(job.name, output)
 
     def stop(self) -> None:
-        """End what still runs, with the programs that it started, and start nothing more."""
+        """Kill the running programs with their child processes, and start no more."""
         with self._lock:
             self._stopped = True
             for program in self._running:
@@ -93,16 +93,16 @@ def run_jobs(
     environment: Mapping[str, str],
     descriptors: Sequence[int] = (),
 ) -> None:
-    """Run jobs until all are done; a job that could start earlier is listed earlier.
+    """Run jobs until all are done; of those that can start, the first ones start first.
 
     Args:
-        jobs: without circles.
-        workers: how many run at a time.
-        environment: of all of them.
+        jobs: without cycles.
+        workers: the number of jobs that run at a time.
+        environment: the environment variables of all programs.
         descriptors: open files that the programs inherit.
 
     Raises:
-        JobError: one failed. The others have been ended by then, as on any other exception.
+        JobError: one failed; the others were stopped, as on any other exception.
     """
     waiting = list(jobs)
     done: set[str] = set()

@@ -1,4 +1,4 @@
-"""Provide the interface packages that a system names: installed, cached, or built now."""
+"""Make interface packages importable: installed ones, cached ones, and those built now."""
 
 import importlib
 import sys
@@ -21,7 +21,7 @@ Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
 
 class ModuleTakenError(ComposerError):
-    """Python already has another module of an interface package's name."""
+    """Another Python module has the name of an interface package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class ProvidedPackage:
     Attributes:
         package: its name.
         prefix: where it is, for an `InterfaceCatalogue`.
-        origin: whether it was `installed`, `cached` by an earlier start, or `built` now.
+        origin: `installed`, `cached` by an earlier start, or `built` now.
     """
 
     package: str
@@ -51,7 +51,7 @@ def provide_packages(
 
     Raises:
         DefinitionsDifferError: a package is installed with other definitions.
-        BuildToolsMissingError: the system lacks what building needs.
+        BuildToolsMissingError: the system has not all that a build needs.
         BuildError: a generator or compiler failed.
         CacheError: the cache cannot be written.
         ModuleTakenError: another Python module has a package's name.
@@ -61,7 +61,7 @@ def provide_packages(
 
 
 class _Provider:
-    """Provides packages in order, knowing those before."""
+    """Provides packages one after the other; each can use those before it."""
 
     def __init__(self, prefixes: Sequence[Path], progress: Callable[[str], None]) -> None:
         self._prefixes = prefixes
@@ -72,7 +72,7 @@ class _Provider:
     def provide(self, definitions: PackageDefinitions) -> ProvidedPackage:
         installed = find_package(definitions.package, self._prefixes, INTERFACE_INDEX)
         if installed is not None:
-            # Imported here, as the builder below: a cached start must not pay for it.
+            # Imported here, as the builder below: with a cached package it is not needed.
             from composer.interfaces.definitions.differences import require_same
 
             require_same(definitions, installed)
@@ -118,10 +118,10 @@ class _Provider:
 
 
 def make_importable(package: str, prefix: Path) -> None:
-    """Have `import package` find the package in a prefix, now and in modules imported later.
+    """Let Python import a package from a prefix.
 
     Raises:
-        ModuleTakenError: another module of that name is found first.
+        ModuleTakenError: Python finds another module of that name first.
     """
     folder = prefix / 'python'
     if str(folder) not in sys.path:

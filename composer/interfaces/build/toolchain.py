@@ -1,4 +1,4 @@
-"""What building an interface package needs from the system, found or missed all at once."""
+"""Find the compilers, generators and headers for a build, or report all that are missing."""
 
 import os
 import shlex
@@ -29,11 +29,11 @@ class BuildToolsMissingError(ComposerError):
     """Interface packages cannot be built with what is installed.
 
     Attributes:
-        missing: what is not there, such as `a C++ compiler`.
+        missing: what is missing, such as `C++ compiler`.
     """
 
     def __init__(self, missing: Sequence[str], advice: Sequence[str]) -> None:
-        """Name all that is missing, and what to install."""
+        """List what is missing, and what to install."""
         super().__init__(
             f'interface packages cannot be built: there is no {", no ".join(missing)}',
             help='; '.join(dict.fromkeys(advice)),
@@ -46,7 +46,7 @@ class Toolchain:
     """The programs and files to build with.
 
     Attributes:
-        c: the C compiler, with arguments if `CC` has some.
+        c: the C compiler, with the arguments in `CC`.
         cxx: the C++ compiler, likewise.
         templates: the folder of each generator's templates, by its name.
         python_includes: folders with the headers of Python and NumPy.
@@ -61,26 +61,26 @@ class Toolchain:
 
 
 def find_toolchain(prefixes: Sequence[Path]) -> Toolchain:
-    """Find all that a build needs.
+    """Find what a build needs.
 
-    The environment variables `CC` and `CXX` name other compilers, as everywhere.
+    The environment variables `CC` and `CXX` name other compilers.
 
     Args:
         prefixes: where ROS is installed.
 
     Raises:
-        BuildToolsMissingError: something is not there; all of it is named.
+        BuildToolsMissingError: something is missing; the error lists all of it.
     """
     compilers = {variable: _find_compiler(variable) for variable in _COMPILERS}
     templates = {name: find_path(f'share/{name}/resource', prefixes) for name in GENERATORS}
     includes = {'Python.h': _python_include(), 'numpy/arrayobject.h': _numpy_include()}
-    lacking = [
-        *_lacking_compilers(compilers),
-        *_lacking_headers(includes),
-        *_lacking_generators(templates, prefixes),
+    missing = [
+        *_missing_compilers(compilers),
+        *_missing_headers(includes),
+        *_missing_generators(templates, prefixes),
     ]
-    if lacking:
-        raise BuildToolsMissingError(*zip(*lacking, strict=True))
+    if missing:
+        raise BuildToolsMissingError(*zip(*missing, strict=True))
     return Toolchain(
         c=compilers['CC'],
         cxx=compilers['CXX'],
@@ -101,7 +101,7 @@ def _find_compiler(variable: str) -> tuple[str, ...]:
     return ()
 
 
-def _lacking_compilers(compilers: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, str]]:
+def _missing_compilers(compilers: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, str]]:
     for variable, language in (('CC', 'C'), ('CXX', 'C++')):
         if compilers[variable]:
             continue
@@ -112,7 +112,7 @@ def _lacking_compilers(compilers: Mapping[str, tuple[str, ...]]) -> Iterator[tup
             yield f'{language} compiler', 'install gcc and g++ (Debian, Ubuntu: apt install g++)'
 
 
-def _lacking_headers(includes: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
+def _missing_headers(includes: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
     for header, folder in includes.items():
         if (folder / header).is_file():
             continue
@@ -125,7 +125,7 @@ def _lacking_headers(includes: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
             yield header, 'install NumPy: pip install numpy'
 
 
-def _lacking_generators(
+def _missing_generators(
     templates: Mapping[str, Path | None],
     prefixes: Sequence[Path],
 ) -> Iterator[tuple[str, str]]:

@@ -1,8 +1,6 @@
-"""The notation of `.msg` files, as `rosidl_adapter` reads it.
+"""Parse definitions with `rosidl_adapter.parser`, the reference, into Composer's records.
 
-`rosidl_adapter.parser` is the reference for what a definition may say; this module calls it and
-returns Composer's records. What it refuses is a `SyntaxFault` here, whichever of its many
-exceptions it raises.
+Whatever it raises becomes a `DefinitionSyntaxError`.
 """
 
 import importlib
@@ -20,16 +18,16 @@ from composer.interfaces.descriptions import (
 )
 
 
-class SyntaxFault(Exception):  # noqa: N818 (a fault of the input, caught by its reader)
-    """What `rosidl_adapter` says against a definition."""
+class DefinitionSyntaxError(Exception):
+    """`rosidl_adapter` refuses a definition."""
 
 
 class ParserMissingError(ComposerError):
-    """No `rosidl_adapter` is installed, so definitions cannot be read."""
+    """Definitions cannot be read: `rosidl_adapter` is not installed."""
 
 
 def load_parser() -> Any:
-    """Get `rosidl_adapter.parser`.
+    """Return `rosidl_adapter.parser`.
 
     Raises:
         ParserMissingError: it is not installed.
@@ -45,39 +43,39 @@ def load_parser() -> Any:
 
 
 def parse_value(type_text: str, text: str) -> object:
-    """Read the value of a constant or the default of a field, an array as a tuple.
+    """Parse the value of a constant or the default of a field; an array becomes a tuple.
 
     Args:
-        type_text: a sound type, such as `int32[3]`.
+        type_text: a type without errors, such as `int32[3]`.
         text: the value as written.
 
     Raises:
-        SyntaxFault: the type cannot have that value.
+        DefinitionSyntaxError: the type cannot have that value.
     """
     parser = load_parser()
     try:
         field_type = parser.Type(type_text, context_package_name='any')
         return _plain_value(parser.parse_value_string(field_type, text))
     except parser.InvalidValue as error:
-        raise SyntaxFault(str(error)) from error
+        raise DefinitionSyntaxError(str(error)) from error
     except NotImplementedError as error:
         message = f'a field of type {type_text} takes no default value'
-        raise SyntaxFault(message) from error
+        raise DefinitionSyntaxError(message) from error
     except (ValueError, IndexError) as error:
-        message = f'{text!r} is no value of type {type_text}'
-        raise SyntaxFault(message) from error
+        message = f'{text!r} is not a value of type {type_text}'
+        raise DefinitionSyntaxError(message) from error
 
 
 def parse_message(package: str, name: str, text: str) -> MessageDescription:
-    """Read a whole message, or one part of a service or an action.
+    """Parse a whole message, or one part of a service or an action.
 
     Args:
-        package: the package that it belongs to.
+        package: its package.
         name: its full name, such as `std_srvs/srv/SetBool_Request`.
         text: its definition.
 
     Raises:
-        SyntaxFault: the reference parser refuses it.
+        DefinitionSyntaxError: the reference parser refuses it.
     """
     parser = load_parser()
     try:
@@ -85,7 +83,7 @@ def parse_message(package: str, name: str, text: str) -> MessageDescription:
         with redirect_stderr(StringIO()):
             message = parser.parse_message_string(package, name.rpartition('/')[2], text)
     except Exception as error:
-        raise SyntaxFault(str(error) or type(error).__name__) from error
+        raise DefinitionSyntaxError(str(error) or type(error).__name__) from error
     return MessageDescription(
         name,
         tuple(_field(field) for field in message.fields),
@@ -128,7 +126,7 @@ def _plain_value(value: object) -> object:
 
 
 def _comment(element: Any) -> str:
-    """Join a comment's lines, with the unit such as `[m/s]` that the parser mostly cuts out."""
+    """Return a comment with its unit such as `[m/s]`, which the parser cuts out."""
     text = '\n'.join(element.annotations.get('comment', ())).strip()
     unit = f'[{element.annotations["unit"]}]' if 'unit' in element.annotations else ''
     return text if unit in text else f'{text} {unit}'.strip()

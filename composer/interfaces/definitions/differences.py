@@ -1,33 +1,32 @@
-"""Does a folder define what the installed package of that name has?
+"""Compare the definitions in a folder with those of the installed package of that name.
 
 Fields, their types and order, defaults and constants count; comments do not. An installed package
 may have more interfaces than the folder.
 """
 
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import unified_diff
 from pathlib import Path
 
 from composer.errors import ComposerError
 from composer.interfaces.definitions.installed_definitions import describe_package
 from composer.interfaces.definitions.package_folder import PackageDefinitions
-from composer.interfaces.definitions.statements import SEPARATOR
-from composer.interfaces.descriptions import (
-    ActionDescription,
-    InterfaceDescription,
-    MessageDescription,
-    ServiceDescription,
-)
+from composer.interfaces.definitions.rendering import render_definition
+from composer.interfaces.descriptions import InterfaceDescription
+
+# Type descriptions have no char: they describe such a field as the uint8 that it is.
+_CHAR_FIELD = re.compile(r'^char(?!\S* \w+=)')
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """An interface that a folder defines otherwise than the installed package.
+    """An interface that a folder defines differently from the installed package.
 
     Attributes:
         name: full name of the interface.
-        diff: what changes from the installed definition to the folder's, in unified form.
+        diff: the unified diff from the installed definition to that in the folder.
     """
 
     name: str
@@ -35,7 +34,7 @@ class Difference:
 
 
 class DefinitionsDifferError(ComposerError):
-    """A folder's definitions are not those of the installed package.
+    """The definitions in a folder are not those of the installed package.
 
     Attributes:
         differences: one for each interface.
@@ -47,25 +46,25 @@ class DefinitionsDifferError(ComposerError):
         prefix: Path,
         differences: list[Difference],
     ) -> None:
-        """Show all differences."""
+        """Show all differences in the message."""
         diffs = '\n'.join(difference.diff for difference in differences)
         super().__init__(
             f'{definitions.package} is installed in {prefix}, and {definitions.folder} defines it '
-            f'otherwise:\n{diffs}',
+            f'differently:\n{diffs}',
             help='use the installed definitions, or give the package in the folder another name',
         )
         self.differences = tuple(differences)
 
 
 def require_same(definitions: PackageDefinitions, prefix: Path) -> None:
-    """Refuse a folder that does not define what is installed.
+    """Check that a folder defines what is installed.
 
     Args:
-        definitions: of the folder, without faults.
+        definitions: of the folder, without errors.
         prefix: where the package is installed.
 
     Raises:
-        DefinitionsDifferError: it defines something else.
+        DefinitionsDifferError: it does not.
     """
     differences = compare_definitions(definitions, prefix)
     if differences:
@@ -76,7 +75,7 @@ def compare_definitions(definitions: PackageDefinitions, prefix: Path) -> list[D
     """Compare a folder's definitions with the installed package's.
 
     Args:
-        definitions: of the folder, without faults.
+        definitions: of the folder, without errors.
         prefix: where the package is installed.
     """
     installed = describe_package(definitions.package, prefix)
@@ -106,26 +105,5 @@ def _compare(
 
 
 def _render(interface: InterfaceDescription) -> list[str]:
-    """Write an interface in the notation of definition files, without comments."""
-    match interface:
-        case MessageDescription():
-            parts: tuple[MessageDescription, ...] = (interface,)
-        case ServiceDescription():
-            parts = (interface.request, interface.response)
-        case ActionDescription():
-            parts = (interface.goal, interface.result, interface.feedback)
-    lines = []
-    for part in parts:
-        lines += [SEPARATOR, *_render_message(part)]
-    return lines[1:]
-
-
-def _render_message(message: MessageDescription) -> Iterator[str]:
-    for constant in message.constants:
-        yield f'{constant.type} {constant.name}={constant.value!r}'
-    for field in message.fields:
-        # A char is described as a uint8, which it is.
-        char = field.type.kind == 'char'
-        field_type = replace(field.type, kind='uint8') if char else field.type
-        default = '' if field.default is None else f' {field.default!r}'
-        yield f'{field_type} {field.name}{default}'
+    lines = render_definition(interface, comments=False)
+    return [_CHAR_FIELD.sub('uint8', line) for line in lines]

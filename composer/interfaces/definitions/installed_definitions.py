@@ -14,7 +14,7 @@ from composer.interfaces.descriptions import InterfaceDescription
 
 
 def describe_interface(full_name: str, prefixes: Sequence[Path]) -> InterfaceDescription | None:
-    """Describe one interface, or return None where there is none of that name.
+    """Describe one interface; None if there is none of that name.
 
     Args:
         full_name: such as `std_msgs/msg/Header`.
@@ -29,7 +29,7 @@ def describe_interface(full_name: str, prefixes: Sequence[Path]) -> InterfaceDes
 
 
 def describe_package(package: str, prefix: Path) -> dict[str, InterfaceDescription]:
-    """Describe all interfaces of a package, those without a definition by type descriptions.
+    """Describe all interfaces of a package; those without a definition by type descriptions.
 
     Args:
         package: its name.

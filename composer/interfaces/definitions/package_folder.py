@@ -1,7 +1,6 @@
-"""Interface definitions of one package: a folder with `msg/`, `srv/` and `action/`.
+"""Read the interface definitions of one package: a folder with `msg/`, `srv/` and `action/`.
 
-Reading never stops at a fault: everything that is wrong is a `Diagnostic` with its position, and
-all that is right is described.
+Each error is a `Diagnostic` with its position; definitions without errors are described.
 See https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
 """
 
@@ -12,7 +11,7 @@ from typing import Final
 
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.interfaces.definitions.definition_parser import (
-    SyntaxFault,
+    DefinitionSyntaxError,
     load_parser,
     parse_message,
 )
@@ -45,12 +44,12 @@ _WHAT_IS_SEPARATED: Final = {
 
 @dataclass(frozen=True, slots=True)
 class TypeReference:
-    """A place where a definition uses a message.
+    """A field whose type is a message.
 
     Attributes:
-        span: where.
+        span: the place of the type.
         user: full name of the message that has the field.
-        message: the message meant, such as `std_msgs/Header`.
+        message: that message, such as `std_msgs/Header`.
     """
 
     span: Span
@@ -60,16 +59,16 @@ class TypeReference:
 
 @dataclass(frozen=True, slots=True)
 class PackageDefinitions:
-    """What a folder defines.
+    """The definitions in a folder.
 
     Attributes:
         package: name of the interface package.
-        folder: where its definitions are.
+        folder: the folder of its definitions.
         sources: text of every definition file, by its path in the folder (`msg/Name.msg`).
-        interfaces: what is defined, by full name (`example_interfaces/srv/AddTwoInts`); without
-            those that have faults.
+        interfaces: the definitions without errors, by full name
+            (`example_interfaces/srv/AddTwoInts`).
         references: uses of messages, for `check_definitions`.
-        diagnostics: what is wrong.
+        diagnostics: the errors.
     """
 
     package: str
@@ -80,13 +79,13 @@ class PackageDefinitions:
     diagnostics: tuple[Diagnostic, ...]
 
     def messages(self) -> frozenset[str]:
-        """List the messages that are defined, faulty ones included, without the package."""
+        """Return the names of the messages, those with errors included, without the package."""
         return frozenset(Path(name).stem for name in self.sources if name.startswith('msg/'))
 
 
 @dataclass(slots=True)
 class _Reading:
-    """What is collected while a package is read."""
+    """What was read so far of a package."""
 
     package: str
     sources: dict[str, str] = field(default_factory=dict)
@@ -108,7 +107,7 @@ def load_definitions(package: str, folder: Path) -> PackageDefinitions:
     """
     reading = _Reading(package)
     if not load_parser().is_valid_package_name(package):
-        message = f'{package!r} is no name of a package'
+        message = f'{package!r} is not the name of a package'
         advice = 'expected small letters, digits and single underscores, beginning with a letter'
         reading.diagnostics.append(_about_file(folder, 'bad-name', message, advice))
     paths = list(_list_files(reading, folder))
@@ -129,7 +128,7 @@ def load_definitions(package: str, folder: Path) -> PackageDefinitions:
 
 
 def _list_files(reading: _Reading, folder: Path) -> Iterator[Path]:
-    """List the definition files, noting those that lie in the wrong folder."""
+    """Yield the definition files, and report those in the wrong folder."""
     for kind in PARTS:
         for path in sorted((folder / kind).glob('*')):
             suffix = path.suffix.removeprefix('.')
@@ -152,8 +151,8 @@ def _read_file(reading: _Reading, path: Path) -> None:
     full_name = f'{reading.package}/{kind}/{name}'
     for section, part in zip(sections, PARTS[kind], strict=False):
         _check_section(reading, section, f'{full_name}{part}')
-    sound = len(reading.diagnostics) == before
-    if sound and load_parser().is_valid_package_name(reading.package):
+    has_no_errors = len(reading.diagnostics) == before
+    if has_no_errors and load_parser().is_valid_package_name(reading.package):
         _describe(reading, full_name, sections)
 
 
@@ -178,7 +177,7 @@ def _check_name(reading: _Reading, path: Path) -> None:
     name = path.stem
     if '_' in name or not load_parser().is_valid_message_name(name):
         better = ''.join(part[:1].upper() + part[1:] for part in name.split('_'))
-        message = f'{name!r} is no name of an interface: expected CamelCase'
+        message = f'{name!r} is not the name of an interface: expected CamelCase'
         advice = did_you_mean(f'{better}{path.suffix}')
         reading.diagnostics.append(_about_file(path, 'bad-name', message, advice))
 
@@ -255,7 +254,7 @@ def _describe(reading: _Reading, full_name: str, sections: list[Section]) -> Non
     for section, part in zip(sections, PARTS[kind], strict=True):
         try:
             parts.append(parse_message(reading.package, f'{full_name}{part}', section.text))
-        except SyntaxFault as error:
+        except DefinitionSyntaxError as error:
             place = Span(section.source, section.start, 1, 0)
             reading.diagnostics.append(diagnostic_at(place, 'bad-syntax', str(error)))
             return

@@ -16,11 +16,11 @@ from composer.interfaces.definitions.statement_rules import list_primitive_types
 from composer.interfaces.descriptions import ActionDescription, ServiceDescription
 from composer.spelling import did_you_mean, find_nearest
 
-# What services and actions consist of beside their own parts (rosidl_parser.definition).
+# The packages that every service and every action uses (rosidl_parser.definition).
 SERVICE_PACKAGES = frozenset({'builtin_interfaces', 'service_msgs'})
 ACTION_PACKAGES = SERVICE_PACKAGES | {'action_msgs', 'unique_identifier_msgs'}
 
-# Where a message is looked for whose package was forgotten.
+# Where to look for a message that is written without its package.
 _COMMON = ('builtin_interfaces', 'std_msgs', 'geometry_msgs', 'sensor_msgs', 'nav_msgs')
 
 
@@ -64,7 +64,7 @@ def load_packages(
 
 
 def used_packages(definitions: PackageDefinitions) -> frozenset[str]:
-    """List the other packages that a package's interfaces consist of."""
+    """Return the other packages whose messages a package uses."""
     packages = {reference.message.partition('/')[0] for reference in definitions.references}
     for interface in definitions.interfaces.values():
         if isinstance(interface, ServiceDescription):
@@ -78,10 +78,10 @@ def check_definitions(
     packages: Sequence[PackageDefinitions],
     catalogue: InterfaceCatalogue,
 ) -> list[Diagnostic]:
-    """Collect all that is wrong with packages, each by itself and together, in order of position.
+    """Return the errors in packages, each by itself and together, in order of position.
 
     Args:
-        packages: all that are defined in folders; they count before installed ones.
+        packages: all those in folders; they count before installed ones.
         catalogue: what is installed.
     """
     known = _Messages(packages, catalogue)
@@ -99,7 +99,7 @@ def check_definitions(
 
 
 class _Messages:
-    """The messages that there are, by package."""
+    """The known messages, by package."""
 
     def __init__(
         self,
@@ -112,12 +112,12 @@ class _Messages:
         }
 
     def packages(self) -> set[str]:
-        """List the packages with interfaces."""
+        """Return the packages with interfaces."""
         defined = (name for name, messages in self._by_package.items() if messages is not None)
         return {*defined, *self._catalogue.packages()}
 
     def of(self, package: str) -> frozenset[str] | None:
-        """List the messages of a package; None where there is no such package."""
+        """Return the messages of a package; None if there is no such package."""
         if package not in self._by_package:
             names = self._catalogue.names('msg', package)
             installed = names or package in self._catalogue.packages()
@@ -130,7 +130,7 @@ def order_packages(packages: Iterable[PackageDefinitions]) -> list[PackageDefini
     """Sort packages so that each comes after those that it uses.
 
     Args:
-        packages: that `check_definitions` has nothing against.
+        packages: without errors, as `check_definitions` finds them.
     """
     by_name = {package.package: package for package in packages}
     graph = {name: used_packages(package) & by_name.keys() for name, package in by_name.items()}
@@ -176,7 +176,7 @@ def _unknown_message(reference: TypeReference, known: _Messages) -> Diagnostic:
 
 
 def _check_containment(packages: Sequence[PackageDefinitions]) -> Iterator[Diagnostic]:
-    """Find messages that contain themselves, which no memory can hold."""
+    """Find messages that contain themselves."""
     references = {
         (reference.user, reference.message.replace('/', '/msg/')): reference
         for package in packages

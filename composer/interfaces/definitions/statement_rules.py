@@ -1,8 +1,7 @@
-"""What one line of an interface definition may say.
+"""Check single lines of interface definitions.
 
-The limits are those of `rosidl_adapter.parser`, and beyond it those of the code that the
-generators write: names that are keywords of C, C++ or Python, and values that do not survive the
-way through IDL.
+The rules are those of `rosidl_adapter.parser`, and those of the code that the generators write: no
+names that are keywords of C, C++ or Python, and no values that get lost on their way through IDL.
 """
 
 import keyword
@@ -12,11 +11,15 @@ from collections.abc import Iterator
 from typing import Final
 
 from composer.diagnostics import Diagnostic, Span, diagnostic_at
-from composer.interfaces.definitions.definition_parser import SyntaxFault, load_parser, parse_value
+from composer.interfaces.definitions.definition_parser import (
+    DefinitionSyntaxError,
+    load_parser,
+    parse_value,
+)
 from composer.interfaces.definitions.statements import Statement
+from composer.interfaces.field_values import FLOAT32_MAX
 from composer.spelling import did_you_mean, find_nearest
 
-FLOAT32_MAX: Final = (2 - 2**-23) * 2.0**127
 _TYPE: Final = re.compile(
     r'(?P<base>[^<>=\[\]]+)(?P<bound><=[^<>=\[\]]*)?(?P<array>\[[^\[\]]*\])?',
 )
@@ -35,7 +38,7 @@ _C_KEYWORDS: Final = """
 """
 RESERVED_NAMES: Final = frozenset(_C_KEYWORDS.split()) | frozenset(keyword.kwlist)
 
-# What people write who know another language, or ROS 1.
+# Names of types in other languages and in ROS 1.
 _OTHER_NAMES: Final = {
     'boolean': 'bool',
     'int': 'int32',
@@ -54,23 +57,23 @@ _OTHER_NAMES: Final = {
 
 
 def list_primitive_types() -> tuple[str, ...]:
-    """List the types that need no package."""
+    """Return the names of the primitive types."""
     # The parser knows these two, and the generators do not.
     ros1_types = {'time', 'duration'}
     return tuple(name for name in load_parser().PRIMITIVE_TYPES if name not in ros1_types)
 
 
 def translate_type(name: str) -> str | None:
-    """Get ROS 2's name of a type that is called otherwise elsewhere, or None."""
+    """Return the ROS 2 name of a type that has another name elsewhere, or None."""
     return _OTHER_NAMES.get(name)
 
 
 def find_message(package: str, type_text: str) -> str | None:
-    """Get the message that a type refers to, such as `std_msgs/Header`, or None.
+    """Return the message that a type refers to, such as `std_msgs/Header`, or None.
 
     Args:
-        package: to which a name without a package belongs.
-        type_text: such as `Header[]`, or something wrong.
+        package: the package of names without one.
+        type_text: such as `Header[]`; it may have errors.
     """
     match = _TYPE.fullmatch(type_text)
     other_package, _, name = match['base'].rpartition('/') if match else ('', '', '')
@@ -83,8 +86,8 @@ def check_statement(statement: Statement) -> Iterator[Diagnostic]:
     """Check one line by itself: its indentation, type, name and value."""
     if statement.indent:
         yield _check_indent(statement)
-    type_faults = list(_check_type(statement))
-    yield from type_faults
+    type_errors = list(_check_type(statement))
+    yield from type_errors
     match statement.kind:
         case 'unfinished':
             message = f'expected a name after the type {statement.type.text!r}'
@@ -93,7 +96,7 @@ def check_statement(statement: Statement) -> Iterator[Diagnostic]:
             yield from _check_constant_name(statement.name)
         case 'field':
             yield from _check_field_name(statement.name)
-    if statement.value is not None and not type_faults:
+    if statement.value is not None and not type_errors:
         yield from _check_value(statement, statement.value)
 
 
@@ -114,7 +117,7 @@ def _check_type(statement: Statement) -> Iterator[Diagnostic]:
         yield diagnostic_at(
             span,
             'bad-type',
-            f'{span.text!r} is no type',
+            f'{span.text!r} is not a type',
             help='without spaces: int32[], int32[3] or int32[<=3] for arrays, string<=10 for text',
         )
         return
@@ -126,7 +129,7 @@ def _check_type(statement: Statement) -> Iterator[Diagnostic]:
         yield diagnostic_at(
             span.narrowed_to(array),
             'bad-type',
-            f'{array!r} is no size of an array: expected [], [N] or [<=N] with N from 1',
+            f'{array!r} is not the size of an array: expected [], [N] or [<=N] with N from 1',
         )
     if statement.kind == 'constant' and (bound or array or not primitive):
         yield diagnostic_at(
@@ -151,12 +154,12 @@ def _check_bound(span: Span, base: str) -> Iterator[Diagnostic]:
         yield diagnostic_at(
             span,
             'bad-type',
-            f'{span.text!r} is no bound: expected <= and a whole number from 1',
+            f'{span.text!r} is not a bound: expected <= and a whole number from 1',
         )
 
 
 def _check_message_name(span: Span) -> Iterator[Diagnostic]:
-    """Check the form of a message's name; whether there is such a message is not known here."""
+    """Check the form of a message's name, not whether there is such a message."""
     parser = load_parser()
     package, _, name = span.text.rpartition('/')
     if '/' in package:
@@ -164,11 +167,11 @@ def _check_message_name(span: Span) -> Iterator[Diagnostic]:
         yield diagnostic_at(
             span,
             'bad-type',
-            f'{span.text!r} is no type: expected package/Message',
+            f'{span.text!r} is not a type: expected package/Message',
             help=did_you_mean(f'{first}/{name}'),
         )
     elif package and not parser.is_valid_package_name(package):
-        yield diagnostic_at(span, 'bad-type', f'{package!r} is no name of a package')
+        yield diagnostic_at(span, 'bad-type', f'{package!r} is not the name of a package')
     elif not parser.is_valid_message_name(name):
         types = list_primitive_types()
         nearest = translate_type(span.text) or find_nearest(span.text, types)
@@ -188,11 +191,11 @@ def _check_constant_name(span: Span) -> Iterator[Diagnostic]:
     better = _snake_case(span.text).upper()
     advice = did_you_mean(better if parser.is_valid_constant_name(better) else None)
     if any(character in span.text for character in '"\'<>'):
-        advice = 'a line with = is a constant: no default value or type with spaces may have one'
+        advice = 'a line with = is a constant: defaults and types with spaces cannot contain one'
     yield diagnostic_at(
         span,
         'bad-name',
-        f'{span.text!r} is no name of a constant: expected capitals, digits and single '
+        f'{span.text!r} is not the name of a constant: expected capitals, digits and single '
         'underscores',
         help=advice,
     )
@@ -205,7 +208,7 @@ def _check_field_name(span: Span) -> Iterator[Diagnostic]:
         yield diagnostic_at(
             span,
             'bad-name',
-            f'{span.text!r} is no name of a field: expected small letters, digits and single '
+            f'{span.text!r} is not the name of a field: expected small letters, digits and single '
             'underscores, beginning with a letter',
             help=did_you_mean(better if parser.is_valid_field_name(better) else None),
         )
@@ -228,7 +231,7 @@ def _check_value(statement: Statement, span: Span) -> Iterator[Diagnostic]:
     rule = 'bad-constant' if statement.kind == 'constant' else 'bad-default'
     try:
         value = parse_value(statement.type.text, span.text)
-    except SyntaxFault as error:
+    except DefinitionSyntaxError as error:
         yield diagnostic_at(span, rule, str(error))
         return
     if value == ():
@@ -240,7 +243,7 @@ def _check_value(statement: Statement, span: Span) -> Iterator[Diagnostic]:
 
 
 def _find_unwritable(type_text: str, value: object) -> str | None:
-    """Say why a value that the parser takes cannot be written into the generated code."""
+    """Return why a valid value cannot be written into the generated code, or None."""
     if isinstance(value, float):
         if not math.isfinite(value):
             return 'a value must be finite: the generators cannot write infinity or NaN'

@@ -1,6 +1,6 @@
-"""The lines of an interface definition, cut into their parts with positions.
+"""Split interface definitions into sections and statements, with positions.
 
-The cuts are those of `rosidl_adapter.parser`: a tab counts as a space, `#` starts a comment even
+Lines are split as in `rosidl_adapter.parser`: a tab counts as a space, `#` starts a comment even
 inside quotes, the type ends at the first space, and a line with `=` after its type is a constant.
 """
 
@@ -26,7 +26,7 @@ class Statement:
         indent: number of spaces before it; the reference parser allows none.
         type: as written.
         name: as written; of an unfinished statement, the empty place behind the type.
-        value: the constant's value or the field's default, where there is one.
+        value: the constant's value or the field's default, if there is one.
     """
 
     kind: StatementKind
@@ -56,7 +56,7 @@ class Section:
         return '\n'.join(self.source.lines[self.start - 1 : self.stop - 1])
 
     def statements(self) -> Iterator[Statement]:
-        """Cut every line that defines something."""
+        """Yield a statement for each line that defines something."""
         for number in range(self.start, self.stop):
             statement = split_line(self.source, number)
             if statement is not None:
@@ -64,7 +64,7 @@ class Section:
 
 
 def split_sections(source: SourceFile) -> list[Section]:
-    """Cut a service or an action at its separators, sloppily written ones included."""
+    """Split a service or an action at its separators, including badly written ones."""
     sections = []
     start = 1
     for stop, line in enumerate([*source.lines, SEPARATOR], start=1):
@@ -75,12 +75,12 @@ def split_sections(source: SourceFile) -> list[Section]:
 
 
 def is_near_separator(line: str) -> bool:
-    """Tell a line that is, or is meant to be, the separator between the parts of a definition."""
+    """Return whether a line is, or is meant to be, a separator."""
     return _NEAR_SEPARATOR.fullmatch(line) is not None
 
 
 def split_line(source: SourceFile, number: int) -> Statement | None:
-    """Cut one line; None where it is empty or a comment."""
+    """Split one line; None if it is empty or a comment."""
     text = source.line(number).replace('\t', ' ').partition('#')[0].rstrip()
     content = text.lstrip(' ')
     if not content:

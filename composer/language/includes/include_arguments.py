@@ -69,7 +69,7 @@ def _origin(system: LoadedSystem, path: DataPath) -> str:
 
 
 def _missing_argument(argument: ArgumentSpec, place: IncludeEntry) -> Diagnostic:
-    message = f"'{place.file}' wants the argument '{argument.name}'"
+    message = f"'{place.file}' needs the argument '{argument.name}'"
     help_text = f"give it under 'args': {argument}"
     return diagnostic_at(place.span, 'missing-argument', message, help=help_text)
 
@@ -84,5 +84,5 @@ def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:
         return f"'{argument.name}': {fault}"
     if argument.choices and value not in argument.choices:
         choices = ', '.join(map(str, argument.choices))
-        return f"'{argument.name}': {value!r} is none of {choices}"
+        return f"'{argument.name}': {value!r} is not one of {choices}"
     return None

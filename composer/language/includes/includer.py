@@ -94,8 +94,8 @@ class Includer:
         if counts[section] <= self._limit:
             return False
         self._inclusions = self._limit + 1
-        message = f'there are more than {self._limit:,} entries in {section} of all files'
-        help_text = "if that is meant, raise 'max_nodes' at the top of the file"
+        message = f'{section} has more than {self._limit:,} entries in all files together'
+        help_text = "raise 'max_nodes' at the top of the file if that is intended"
         entry.report('too-many-entries', message, help_text)
         return True
 
@@ -137,8 +137,7 @@ class Includer:
                 yield diagnostic_at(
                     part.positions.key(('environment', name)),
                     'ignored-environment',
-                    f"'{name}' is not set: only the environment of the file that is started "
-                    'counts',
+                    f"'{name}' is not set: only the environment of the main file counts",
                     help="set it in that file, or for a process under 'env'",
                 )
 

@@ -111,7 +111,7 @@ class IncludeMerger:
             diagnostic_at(
                 inclusion.part.positions.key(('nodes', name)),
                 'duplicate-node',
-                f"there is a node '{full}' already",
+                f"a node '{full}' already exists",
                 help="give the include a 'namespace'",
                 related=[*inner, inclusion.entry.here],
             )

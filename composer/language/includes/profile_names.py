@@ -87,7 +87,7 @@ def drop_unknown_profiles(system: LoadedSystem) -> None:
             finding = diagnostic_at(
                 span,
                 'unknown-qos-profile',
-                f"no QoS profile is called '{name}'",
+                f"there is no QoS profile '{name}'",
                 help=suggest(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
             )
             system.diagnostics.append(finding)

@@ -26,13 +26,13 @@ from composer.language.specs import (
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from composer.language.specs import OnError
     from composer.yaml_text.positions import DataPath
 
 
-def parse_entities(node: Data, path: DataPath) -> dict[str, Mapping[str, Any]]:
+def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
     """Return the specs of all entities of a node, by section and name."""
     return {
         section: parse_entries(node, path, section, partial(parse, node))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
+_PLAIN_KEYS = [each.name for each in fields(NodeSpec) if each.default is not MISSING]
+
+
 def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
     """Return the node that the file calls `key`, which may be its full name."""
     namespace, _, name = key.rpartition('/')
@@ -24,13 +27,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
     return NodeSpec(
         name=name,
         namespace=namespace or '/',
-        description=data.get('description', ''),
-        log_level=data.get('log_level'),
-        use_sim_time=data.get('use_sim_time', False),
         parameter_services=data.get('parameter_services', _has_parameters(data)),
-        rosout=data.get('rosout', True),
-        type_description_service=data.get('type_description_service', False),
-        logger_services=data.get('logger_services', False),
         state=MappingProxyType(data.get('state', {})),
         remap=tuple(data.get('remap', {}).items()),
         on_start=_parse_hook(data, path, 'on_start'),
@@ -39,6 +36,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         wait_for=parse_conditions(data, path),
         parameter_files=tuple(data.get('parameter_files', ())),
         path=path,
+        **{key: data[key] for key in _PLAIN_KEYS if key in data},
         **parse_entities(data, path),
         **parse_run_options({}, data),
     )

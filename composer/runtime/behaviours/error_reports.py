@@ -12,7 +12,7 @@ from composer.runtime.behaviours.tracebacks import format_behaviour_error, place
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.runtime.behaviours.calls import Owner
+    from composer.runtime.behaviours.running_calls import Owner
 
 # At most one line about the same entity in this time.
 _QUIET_SEC = 1.0

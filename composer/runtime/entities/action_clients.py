@@ -18,8 +18,8 @@ from composer.errors import (
     GoalTimeoutError,
 )
 from composer.interfaces.classes import import_interface
-from composer.runtime.behaviours.calls import Owner
 from composer.runtime.behaviours.requests import Requests
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 

@@ -15,7 +15,8 @@ from rclpy.qos import QoSProfile
 from composer.interfaces.classes import import_interface
 from composer.python_source.modules import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
-from composer.runtime.behaviours.calls import FAILED, Owner, Progress, return_result
+from composer.runtime.behaviours.calls import FAILED, return_result
+from composer.runtime.behaviours.running_calls import Owner, Progress
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.messages.payloads import converter_for
 

@@ -16,7 +16,8 @@ from rclpy.parameter import Parameter
 
 from composer.errors import StartError
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
-from composer.runtime.behaviours.calls import FAILED, Owner, return_result
+from composer.runtime.behaviours.calls import FAILED, return_result
+from composer.runtime.behaviours.running_calls import Owner
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.interfaces.classes import import_interface
-from composer.runtime.behaviours.calls import Owner, return_result
+from composer.runtime.behaviours.calls import return_result
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.qos_profiles import create_qos_profile
 

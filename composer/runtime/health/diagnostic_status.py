@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 if TYPE_CHECKING:
-    from composer.runtime.behaviours.calls import Owner
+    from composer.runtime.behaviours.running_calls import Owner
     from composer.runtime.health.statistics import EntityReport
 
 _P99 = 0.99

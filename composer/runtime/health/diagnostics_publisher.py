@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rclpy.context import Context
 
-    from composer.runtime.behaviours.calls import RunningCall
+    from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.statistics import EntityKey, HealthRegistry
 
 # Writing a message holds the interpreter's lock: large systems send several smaller ones.

@@ -10,14 +10,14 @@ from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.processes.backoff import Backoff
-from composer.runtime.behaviours.calls import RunningCall
+from composer.runtime.behaviours.running_calls import RunningCall
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from composer.runtime.behaviours.calls import Owner, RunningCalls
     from composer.runtime.behaviours.error_reports import ErrorReporter
+    from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 
 _CHECKS_PER_LIMIT = 4
 _SHORTEST_PAUSE_SEC = 0.01
@@ -86,10 +86,10 @@ class HangLimit:
 
 
 class WatchedNode(Protocol):
-    """What is looked at of a node.
+    """What `HangWatcher` checks of a node.
 
     Attributes:
-        limits: By the entities in words.
+        limits: By the owners of the behaviours.
     """
 
     @property

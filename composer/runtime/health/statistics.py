@@ -16,7 +16,7 @@ from composer.runtime.behaviours.tracebacks import summarize
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from composer.runtime.behaviours.calls import Owner, RunningCall
+    from composer.runtime.behaviours.running_calls import Owner, RunningCall
 
 # Durations are sorted into 8 buckets for each power of two; none is narrower than 256 ns.
 _UNIT_BITS = 8

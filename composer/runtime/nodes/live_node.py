@@ -16,14 +16,9 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
-from composer.runtime.behaviours.calls import (
-    FAILED,
-    BehaviourCall,
-    Owner,
-    RunningCalls,
-    discard_result,
-)
+from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
+from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.nodes.behaviour_node import Node

@@ -104,7 +104,7 @@ def test_a_ring_of_services_is_found_once(check, behaviour):
     nodes = ring('a', 'b', 'c', behaviour=behaviour)
     assert deadlocks(check, nodes) == [5]
     (message,) = check(nodes, CODE, rule='service-deadlock')
-    assert message.endswith("none can go on: '/b/set_it' → '/c/set_it' → '/a/set_it'")
+    assert message.endswith("none can continue: '/b/set_it' → '/c/set_it' → '/a/set_it'")
 
 
 def test_a_chain_that_ends_is_no_ring(check):

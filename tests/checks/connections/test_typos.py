@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.checks.connections.typos import find_slip
+from composer.checks.connections.typos import find_typo
 
 RULE = 'likely-misspelling'
 
@@ -19,7 +19,7 @@ RULE = 'likely-misspelling'
     ],
 )
 def test_a_slip_is_found(word, option):
-    assert find_slip(word, [option]) == option
+    assert find_typo(word, [option]) == option
 
 
 @pytest.mark.parametrize(
@@ -36,8 +36,8 @@ def test_a_slip_is_found(word, option):
         ('/trjetcori', '/trajectory'),
     ],
 )
-def test_another_name_is_no_slip(word, option):
-    assert find_slip(word, [option]) is None
+def test_another_name_is_no_typo(word, option):
+    assert find_typo(word, [option]) is None
 
 
 WAITS = """

@@ -8,7 +8,7 @@ import pytest
 from building import WriteDefinitions
 
 from composer.ament import ament_prefixes
-from composer.interfaces.build import cache
+from composer.interfaces.build import build_cache
 from composer.interfaces.build.build_cache import (
     BuildFolder,
     CacheError,
@@ -21,7 +21,7 @@ from composer.interfaces.definitions.package_folder import PackageDefinitions, l
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'home'))
-    return cache.find_cache()
+    return build_cache.find_cache()
 
 
 def build(folder: BuildFolder) -> None:
@@ -38,7 +38,7 @@ def no_wait() -> None:
 
 def test_a_relative_cache_home_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('XDG_CACHE_HOME', 'relative')
-    assert cache.find_cache() == Path.home() / '.cache/composer/interfaces'
+    assert build_cache.find_cache() == Path.home() / '.cache/composer/interfaces'
 
 
 def test_a_package_is_built_once(home: Path) -> None:
@@ -173,6 +173,6 @@ def test_python_numpy_builder_and_used_builds_make_another_key(
         ('_numpy_version', lambda: '99'),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(cache, name, value)
+            patch.setattr(build_cache, name, value)
             keys.add(compute_key(definitions, prefixes, {}))
     assert len(keys) == 5

@@ -3,8 +3,8 @@ import sys
 import pytest
 
 from composer.interfaces.definitions.definition_parser import (
+    DefinitionSyntaxError,
     ParserMissingError,
-    SyntaxFault,
     load_parser,
     parse_message,
     parse_value,
@@ -39,11 +39,11 @@ def test_values_are_python_values(type_text: str, text: str, value: object) -> N
             ),
         ),
         ('std_msgs/Header', '1', 'a field of type std_msgs/Header takes no default value'),
-        ('string[]', '[,]', "'[,]' is no value of type string[]"),
+        ('string[]', '[,]', "'[,]' is not a value of type string[]"),
     ],
 )
 def test_a_wrong_value_is_a_fault(type_text: str, text: str, message: str) -> None:
-    with pytest.raises(SyntaxFault) as caught:
+    with pytest.raises(DefinitionSyntaxError) as caught:
         parse_value(type_text, text)
     assert str(caught.value) == message
 
@@ -56,7 +56,7 @@ def test_a_unit_stays_in_the_comment() -> None:
 def test_a_wrong_message_is_a_fault_and_prints_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    with pytest.raises(SyntaxFault):
+    with pytest.raises(DefinitionSyntaxError):
         parse_message('p', 'p/msg/M', 'int32 A\n')
     assert capsys.readouterr() == ('', '')
 

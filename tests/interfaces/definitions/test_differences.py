@@ -40,7 +40,7 @@ def test_a_difference_is_shown(write_definitions: WriteDefinitions) -> None:
     with pytest.raises(DefinitionsDifferError) as caught:
         require_same(load_definitions('std_srvs', folder), prefix)
     assert str(caught.value) == (
-        f'std_srvs is installed in {prefix}, and {folder} defines it otherwise:\n'
+        f'std_srvs is installed in {prefix}, and {folder} defines it differently:\n'
         f'--- {prefix}/share/std_srvs/srv/SetBool.srv\n'
         f'+++ {folder}/srv/SetBool.srv\n'
         '@@ -2,3 +2,3 @@\n'

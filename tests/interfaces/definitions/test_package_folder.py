@@ -38,7 +38,7 @@ def test_a_message_is_described_with_fields_constants_and_comments(
         }
     )
     definitions = load_definitions('robots', folder)
-    assert definitions.diagnostics == []
+    assert definitions.diagnostics == ()
     assert definitions.interfaces == {
         'robots/msg/Robot': MessageDescription(
             'robots/msg/Robot',
@@ -156,7 +156,7 @@ def test_installed_definitions_have_no_faults(package: str) -> None:
     prefix = find_package(package, ament_prefixes(), INTERFACE_INDEX)
     assert prefix is not None
     definitions = load_definitions(package, prefix / 'share' / package)
-    assert definitions.diagnostics == []
+    assert definitions.diagnostics == ()
     assert set(definitions.interfaces) == {
         name
         for kind in ('msg', 'srv', 'action')
@@ -166,4 +166,4 @@ def test_installed_definitions_have_no_faults(package: str) -> None:
 
 def test_shipped_definitions_have_no_faults() -> None:
     for folder in SHIPPED.iterdir():
-        assert load_definitions(folder.name, folder).diagnostics == []
+        assert load_definitions(folder.name, folder).diagnostics == ()

@@ -43,7 +43,7 @@ FAULTY = [
         'string text "a=b"',
         'bad-name',
         'text "a',
-        'a line with = is a constant: no default value or type with spaces may have one',
+        'a line with = is a constant: defaults and types with spaces cannot contain one',
     ),
     ('  int32 a', 'indented-definition', '  ', "remove the 2 spaces before 'int32'"),
     ('uint8 A=256', 'bad-constant', '256', None),

@@ -7,7 +7,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.runtime.behaviours.calls import FAILED, BehaviourCall, Owner, RunningCalls
+from composer.runtime.behaviours.calls import FAILED, BehaviourCall
+from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 
 
 def call_of(function, running, deliver=lambda _: None, failed=lambda owner, error: None):

@@ -1,4 +1,4 @@
-"""Behaviours that run for long: what is said about them, and who is affected."""
+"""Behaviours that run for long: what is reported, and that nothing else is affected."""
 
 import re
 

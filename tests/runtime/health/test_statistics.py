@@ -1,4 +1,4 @@
-"""How entities fare: the numbers, and what a diagnostic status says of them."""
+"""The health of entities: the numbers, and the diagnostic status made of them."""
 
 import random
 import threading
@@ -11,13 +11,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.validate_node_name import validate_node_name
 
 from composer.executor import MissedCounts
-from composer.runtime.behaviours.calls import (
-    FAILED,
-    BehaviourCall,
-    Owner,
-    RunningCall,
-    RunningCalls,
-)
+from composer.runtime.behaviours.calls import FAILED, BehaviourCall
+from composer.runtime.behaviours.running_calls import Owner, RunningCall, RunningCalls
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.diagnostics_publisher import node_name
 from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry

@@ -1,4 +1,4 @@
-"""Ends of topics that cannot talk to each other: who, with whom, and why."""
+"""Endpoints of one topic that can never match: both ends and the reason are logged."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A thread that looks at the system from time to time."""
+"""A thread that checks the system periodically."""
 
 import pytest
 

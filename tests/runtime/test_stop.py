@@ -1,4 +1,4 @@
-"""What waits half-way is ended at a stop and before a restart, and no stop lasts for ever."""
+"""Suspended behaviours end at a stop and before a restart, and every stop comes to its end."""
 
 import pytest
 

@@ -17,9 +17,9 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from composer.checks.connections.topology import ChannelKind
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.entity_kinds import ChannelKind
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, SystemSpec
 
 

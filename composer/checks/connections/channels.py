@@ -1,35 +1,23 @@
-"""Wiring: what meets under one name fits together, and nobody is alone."""
+"""Topics, services and actions: one type, and one server."""
 
 from __future__ import annotations
 
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from composer.checks.connections.deadlocks import check_deadlocks
-from composer.checks.connections.loops import check_loops
-from composer.checks.connections.qos import check_qos_pairs
-from composer.checks.connections.topology import build_graph
-from composer.checks.connections.unconnected import check_other_ends
 from composer.names import with_article
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterator
 
-    from composer.checks.connections.topology import Channel, Endpoint, Graph
+    from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
 
 
-def check_wiring(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check who meets whom, over all nodes."""
-    graph = build_graph(context)
-    for rule in _RULES:
-        yield from rule(context, graph)
-
-
-def _check_types(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_channel_types(context: CheckContext) -> Iterator[Diagnostic]:
     """All ends of a channel have one type; Fast DDS refuses a second one in the same process."""
-    for channel in graph.channels.values():
+    for channel in context.topology.channels.values():
         # Of a type that there is not, that has been said.
         ends = [end for end in channel.ends if context.has_real_type(end.entity)]
         if len({end.entity.type for end in ends}) > 1:
@@ -54,9 +42,9 @@ def _explain_types(
             )
 
 
-def _check_servers(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
+def check_servers(context: CheckContext) -> Iterator[Diagnostic]:
     """A service or action has one server; it is undefined which one answers otherwise."""
-    for channel in graph.channels.values():
+    for channel in context.topology.channels.values():
         if channel.kind == 'topic':
             continue
         for server in channel.providers[1:]:
@@ -69,13 +57,3 @@ def _check_servers(context: CheckContext, graph: Graph) -> Iterator[Diagnostic]:
                 help=f'serve it once, or give this one another name with {channel.kind}:',
                 related=[context.related(first.path, f'{first} serves it too')],
             )
-
-
-_RULES: tuple[Callable[[CheckContext, Graph], Iterable[Diagnostic]], ...] = (
-    _check_types,
-    _check_servers,
-    check_qos_pairs,
-    check_other_ends,
-    check_loops,
-    check_deadlocks,
-)

@@ -1,0 +1,95 @@
+"""The structure of the package: which room imports which, and what a folder holds."""
+
+import ast
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import composer
+
+PACKAGE = Path(composer.__file__).parent
+# From low to high: a room imports from itself and from rooms above it in this list.
+ROOMS = (
+    *('errors', 'version', 'spelling', 'names', 'ament', 'entity_kinds', 'rules', 'diagnostics'),
+    *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
+    *('python_source', 'checks', 'reports', 'drawing', 'executor', 'processes', 'runtime'),
+    *('cli', 'api', '__init__', '__main__'),
+)
+# Of these names there are several, which are the same thing in several rooms.
+SHARED_NAMES = {
+    '__init__.py',
+    'names.py',  # the rules for names, and their checks
+    'parameters.py',  # their checks, and their life in a node
+    'qos.py',  # profiles and policies, and their checks
+    'json_document.py',  # the same form, of findings and of drawings
+}
+MOST_FILES = 16
+
+
+def _is_code(path):
+    # Projects to copy, and examples, which may be wrong on purpose.
+    inside = path.relative_to(PACKAGE).parts
+    return inside[0] != 'templates' and not (inside[0] == 'rules' and len(inside) > 2)
+
+
+FILES = sorted(path for path in PACKAGE.rglob('*.py') if _is_code(path))
+
+
+def name_of(path):
+    parts = ['composer', *path.relative_to(PACKAGE).with_suffix('').parts]
+    return '.'.join(parts[:-1] if parts[-1] == '__init__' else parts)
+
+
+MODULES = {name_of(path): path for path in FILES}
+
+
+def room_of(module):
+    parts = module.split('.')
+    return parts[1] if len(parts) > 1 else '__init__'
+
+
+@cache
+def imports_of(module):
+    """Return the modules that one imports anywhere, those for type checkers included."""
+    found = set()
+    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            assert not node.level, f'{module} has a relative import'
+            inner = {f'{node.module}.{alias.name}' for alias in node.names}
+            found |= inner & MODULES.keys()
+            found |= {node.module} if inner - MODULES.keys() else set()
+    return found & MODULES.keys() - {module}
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_imports_point_down(module):
+    order = ROOMS.index(room_of(module))
+    upwards = {each for each in imports_of(module) if ROOMS.index(room_of(each)) > order}
+    assert not upwards
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    pending = {module: set(imports_of(module)) for module in MODULES}
+    while free := {module for module, needs in pending.items() if not needs}:
+        pending = {module: needs - free for module, needs in pending.items() if module not in free}
+    assert not pending
+
+
+def test_the_executor_knows_nothing_of_composer():
+    inside = {module for module in MODULES if room_of(module) == 'executor'}
+    outside = {each for module in inside for each in imports_of(module)} - inside
+    assert outside == {'composer.errors'}
+
+
+def test_a_folder_is_read_at_a_glance():
+    counts = Counter(path.parent for path in FILES)
+    assert {folder: count for folder, count in counts.items() if count > MOST_FILES} == {}
+
+
+def test_a_file_name_means_one_thing():
+    counts = Counter(path.name for path in FILES)
+    assert {name for name, count in counts.items() if count > 1} == SHARED_NAMES
