@@ -21,14 +21,14 @@ _TITLES = {
     'action': 'An action',
     'action_client': 'An action client',
     'parameter': 'A parameter',
-    'hook': 'A behaviour of the node itself',
+    'hook': 'A behaviour',
     'argument': 'An argument',
     'include': 'An include',
-    'foreach': 'Repeating an entry',
+    'foreach': 'Variables of foreach',
     'process': 'An external process',
-    'process_restart': 'Restarting a process',
-    'process_stop': 'Stopping a process',
-    'condition': 'A condition of wait_for',
+    'process_restart': 'A restart policy',
+    'process_stop': 'A stop policy',
+    'condition': 'A condition',
     'qos': 'QoS',
     'qos_profile': 'A QoS profile',
 }
@@ -131,7 +131,7 @@ def _conditions(owner: dict[str, Any]) -> Iterator[str]:
             )
             yield f'{word} of {listed} is required.'
     for key, needed in owner.get('dependentRequired', {}).items():
-        yield f'`{key}` needs {" and ".join(f"`{other}`" for other in needed)} too.'
+        yield f'`{key}` requires {" and ".join(f"`{other}`" for other in needed)}.'
     excluded = owner.get('not', {}).get('required')
     if excluded:
         yield f'{" and ".join(f"`{key}`" for key in excluded)} cannot be used together.'

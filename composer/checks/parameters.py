@@ -112,7 +112,7 @@ def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[D
         path = (*parameter.path, 'maximum')
         yield context.at_value(path, _RULE, f'the maximum {high} is below the minimum {low}')
     if parameter.step is not None and (low is None or high is None):
-        message = "'step' needs 'minimum' and 'maximum', too"
+        message = "'step' requires 'minimum' and 'maximum'"
         yield context.at_key((*parameter.path, 'step'), _RULE, message)
     yield from _check_choices(context, parameter)
 

@@ -1,4 +1,4 @@
-"""`foreach` and `when`: entries repeated for the values of variables, entries that are left out.
+"""`foreach` and `when`: repeats entries for each value of a variable, or leaves them out.
 
 Both stand in the entries of some sections. What an entry is repeated for is in scope in its key
 and in all below it; an entry that is left out is still held against the schema.
@@ -24,7 +24,7 @@ MAX_ENTRIES = 10_000
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
-# What a variable without a list of values stands for.
+# The value of a variable without a list of values.
 _SAMPLE = 1
 
 
@@ -59,7 +59,7 @@ def expand_document(
 
 def _limit_of(data: Mapping[str, Any]) -> int:
     limit = data.get('max_nodes')
-    # The schema says what else is wrong.
+    # The schema reports any other value.
     return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
 
 
@@ -95,7 +95,7 @@ class _Expansion:
                 self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
                 before = -1
             if len(self._document.diagnostics) > before >= 0:
-                # It is missing for a fault, not for having no values.
+                # It is missing because of an error, not because there are no values.
                 self._document.dropped.add(path)
         return self._entries
 
@@ -151,7 +151,7 @@ class _Expansion:
         if not isinstance(values, list):
             if at not in self._document.dropped:
                 self._report(at, f"'{name}' takes a list of values, not {values!r}")
-            # So that the rest of the entry is read once, too.
+            # The rest of the entry is still read once.
             values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:

@@ -62,7 +62,7 @@ def _measure(text: str, sandbox: Sandbox) -> int:
         try:
             length = _find_end(head, sandbox)
         except TemplateSyntaxError:
-            # It may be the cut that is wrong with it.
+            # The cut may be the cause.
             if len(head) == len(text):
                 raise
         else:

@@ -102,7 +102,7 @@ class TemplateEvaluator:
         return _as_text(self._evaluate(written, path, is_key=True))
 
     def is_sampled(self, path: DataPath) -> bool:
-        """Return whether the value at a path hangs on samples."""
+        """Return whether the value at a path depends on samples."""
         return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
@@ -119,7 +119,7 @@ class TemplateEvaluator:
             return self._compute(text, expressions, span)
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
             self.document.dropped.add(path)
-            # With the real value it may succeed.
+            # It may succeed with the real value.
             if not sampled or isinstance(error, UndefinedError):
                 self.document.diagnostics.append(self._explain(error, span))
             return text
@@ -144,7 +144,7 @@ class TemplateEvaluator:
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
         for expression in expressions:
-            # What is wrong with it is said when it is evaluated.
+            # Errors are reported when it is evaluated.
             with suppress(TemplateError):
                 names |= self._sandbox.names_in(code_of(text, expression))
         return frozenset(names)
@@ -170,7 +170,7 @@ class TemplateEvaluator:
         return diagnostic_at(span, 'bad-expression', _describe(error))
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
-        """Say that two keys of one mapping come out the same."""
+        """Report that two keys of one mapping evaluate to the same."""
         self.document.diagnostics.append(
             diagnostic_at(
                 self.positions.key(path),
@@ -182,7 +182,7 @@ class TemplateEvaluator:
 
 
 def _describe(error: Exception) -> str:
-    """Return what went wrong in one line."""
+    """Return an error in one line."""
     if isinstance(error, SecurityError):
         return f'the expression is not allowed: {error.message}'
     if isinstance(error, TemplateSyntaxError):
@@ -194,7 +194,7 @@ def _describe(error: Exception) -> str:
 
 
 def _as_data(value: Any) -> Any:
-    """Return a value as YAML could hold it; what it cannot hold raises."""
+    """Return a value as YAML can represent it; raise if it cannot."""
     if isinstance(value, StrictUndefined):
         str(value)  # raises what is undefined
     if isinstance(value, str):

@@ -1,7 +1,7 @@
-"""ROS's own parameter files, as rcl reads them, with the place of each value.
+"""Reads ROS's own parameter files as rcl does, with the position of each value.
 
-What rcl refuses is a finding, and so is what it takes as something else than is written: names
-that follow `ros__parameters`, empty mappings, lists in lists.
+What rcl refuses is a finding, and so is what it misreads: names that follow `ros__parameters`,
+empty mappings, lists in lists.
 Source: `parse_key` and `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c`).
 """
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 PARAMETERS_KEY = 'ros__parameters'
 _SHAPE_HELP = 'a parameter file is node: {ros__parameters: {name: value}}; /** means every node'
-_TYPO = ':='
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,11 +39,11 @@ class ParameterEntry:
     """A value in a parameter file.
 
     Attributes:
-        pattern: Which nodes it is for.
+        pattern: The nodes it is for, as a name with wildcards.
         keys: Its name, key by key; dots join them.
         opened: How many mappings of names begin with this value.
-        type: As `infer_parameter_type` tells; `None` for an empty list, which has none.
-        spans: Those of a list's items.
+        type: A parameter type; `None` for an empty list.
+        spans: The positions of a list's items.
     """
 
     pattern: str
@@ -65,10 +64,10 @@ class ParameterEntry:
 
 @dataclass(frozen=True, slots=True)
 class ParameterFile:
-    """What could be read of a parameter file, in the order of its text, and what was wrong.
+    """The readable part of a parameter file, in the order of its text, and the findings.
 
     Attributes:
-        patterns: The names of nodes, with those that have no parameters.
+        patterns: All names of nodes, also those without parameters.
     """
 
     patterns: tuple[tuple[str, Span], ...] = ()
@@ -80,7 +79,7 @@ def read_parameter_file(path: Path, name: str | None = None) -> ParameterFile:
     """Read a file.
 
     Args:
-        name: How the file is called in findings; by default as `path` is written.
+        name: The name of the file in findings; by default `path`.
     """
     name = name or str(path)
     content = read_content(path, name)
@@ -122,7 +121,7 @@ class _Reader:
         """Read a mapping of names of nodes, or of what belongs to them.
 
         Args:
-            place: That of the last name before it.
+            place: The position of the last name before it.
             is_last: Whether nothing follows in the mappings around it, the outermost excepted.
         """
         if not isinstance(node, MappingNode):
@@ -230,7 +229,7 @@ class _Reader:
             self._opened = 0
 
     def check_double_names(self) -> None:
-        """A name is a value or a mapping of names, for one name of nodes."""
+        """Report names that have a value and, elsewhere, names below them."""
         mappings = {
             (entry.pattern, '.'.join(entry.keys[:count]))
             for entry in self.entries
@@ -280,20 +279,19 @@ def _join(prefix: str, key: str) -> str:
 
 def _help_for(node: TreeNode) -> str | None:
     """Return the help for a scalar that was meant as a key with its value."""
-    if not isinstance(node, ScalarNode) or _TYPO not in node.text:
-        return None
-    name, _, value = node.text.partition(_TYPO)
-    return f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"
+    return _explain_assignment(node.text) if isinstance(node, ScalarNode) else None
 
 
 def _explain_typo(finding: Diagnostic) -> Diagnostic:
-    """Return a syntax fault with the help for `:=`, if that is what stands around it."""
+    """Return a syntax error with help about `:=`, if that stands on its line or the one before."""
     span = finding.span
     near = (span.source.line(span.line), span.source.line(span.line - 1)) if span else ()
-    typo = next((line.strip() for line in near if _TYPO in line), None)
-    if typo is None:
-        return finding
-    name, _, value = typo.partition(_TYPO)
-    return replace(
-        finding, help=f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"
-    )
+    advice = next(filter(None, map(_explain_assignment, near)), None)
+    return replace(finding, help=advice) if advice else finding
+
+
+def _explain_assignment(text: str) -> str | None:
+    name, separator, value = text.partition(':=')
+    if not separator:
+        return None
+    return f"write '{name.strip()}: {value.strip()}', ':=' is for command lines"

@@ -14,7 +14,7 @@ _ONE, _ANY = '*', '**'
 
 
 def find_pattern_fault(pattern: str) -> str | None:
-    """Return why rcl refuses a file for such a name, or `None` if it does not."""
+    """Return why rcl refuses a file with such a name of nodes, or `None` if it does not."""
     if pattern in ('/**', '/*'):
         return None
     namespace, _, name = pattern.rpartition('/')
@@ -31,10 +31,10 @@ def find_pattern_fault(pattern: str) -> str | None:
 
 
 def matches_pattern(pattern: str, full_name: str) -> bool:
-    """Return whether rclpy takes parameters that stand below `pattern` for a node."""
+    """Return whether a node takes the parameters below `pattern`."""
     parts = pattern.removeprefix('/').split('/')
     names = full_name.removeprefix('/').split('/')
-    # Which numbers of the name's first parts are matched by those of the pattern so far.
+    # How many parts of the name the parts of the pattern so far can match.
     reached = {0}
     for part in parts:
         if part == _ANY:

@@ -1,4 +1,4 @@
-"""What parameter files give a node: rcl puts them together, and rclpy picks what matches.
+"""Which values a node gets from parameter files: rcl merges the files, rclpy picks what matches.
 
 In short: later files win over earlier ones, and in a file what stands further down. In detail, as
 measured with rclpy 7.1 and rcl 9.2:
@@ -36,7 +36,7 @@ _PARAMETER_OPTIONS = ('-p', '--param')
 
 
 def find_overrides(files: Iterable[ParameterFile], full_name: str) -> dict[str, ParameterEntry]:
-    """Return which values a node takes from its parameter files, by the parameters' names."""
+    """Return the values that a node takes from its parameter files, by parameter name."""
     tables: dict[str, _Table] = {}
     for file in files:
         for pattern, _ in file.patterns:
@@ -53,7 +53,7 @@ def find_overrides(files: Iterable[ParameterFile], full_name: str) -> dict[str, 
 def parse_command_line(
     ros_arguments: Sequence[str], full_name: str
 ) -> Mapping[str, tuple[Any, str]]:
-    """Return value and type of the parameters that `-p` gives a node, by their names.
+    """Return value and type of the parameters that `-p` gives a node, by parameter name.
 
     Empty lists have no type and are left out.
     """
@@ -88,7 +88,7 @@ class _Table:
         self._slots[index][entry.type] = entry
 
     def values(self) -> dict[str, ParameterEntry]:
-        """Return the parameters with the value that counts."""
+        """Return the value that wins for each parameter."""
         found = {}
         for name, slots in zip(self._names, self._slots, strict=True):
             best = min(slots, key=_rank, default=None)
@@ -97,7 +97,7 @@ class _Table:
         return found
 
     def _place(self, keys: tuple[str, ...]) -> int:
-        """Return where a key goes; one in a mapping takes the place of that mapping's name."""
+        """Return the index of a key; a key in a mapping replaces the name of that mapping."""
         name = '.'.join(keys)
         sought = '.'.join(keys[:-1]) or name
         if self._indices.get(sought):

@@ -1,4 +1,4 @@
-"""The types of ROS parameters, and which one a value of YAML has.
+"""The types of ROS parameters, and the type of a YAML value.
 
 Source: `rcl_interfaces/msg/ParameterType`; the names are those of `rclpy.parameter.Parameter.Type`
 in lower case.
@@ -36,9 +36,9 @@ def infer_parameter_type(value: Any) -> str | None:
 
 
 def convert_parameter_value(value: Any, type_name: str | None) -> Any:
-    """Return the value with integers made doubles where the type wants doubles.
+    """Return the value with integers converted to doubles where the type has doubles.
 
-    A value that does not fit its type comes back as it is.
+    A value that does not fit its type is returned unchanged.
     """
     if type_name == 'double' and type(value) is int:
         return float(value)
@@ -53,7 +53,7 @@ def find_type_fault(value: Any, type_name: str) -> str | None:
 
 
 def find_type_faults(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Yield why a value is not of a parameter type; faults of items with their index."""
+    """Yield why a value is not of a parameter type; for an item, with its index."""
     item_type = type_name.removesuffix('_array')
     if item_type == type_name:
         if fault := _find_scalar_fault(value, type_name):

@@ -35,9 +35,9 @@ _FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off'
 _DOTTED = re.compile(r'(\.nan|\.NaN|\.NAN|[-+]?\.(?:inf|Inf|INF))')
 
 _SPACE = r'[ \t\n\v\f\r]*'
-# What `strtol` takes whole in base 0: a zero in front makes it octal.
+# What `strtol` reads to its end in base 0: a leading zero makes it octal.
 _INTEGER = re.compile(rf'{_SPACE}([-+]?)(?:0[xX]([0-9a-fA-F]+)|(0[0-7]*)|([1-9][0-9]*))')
-# What `strtod` takes whole.
+# What `strtod` reads to its end.
 _DECIMAL = re.compile(rf'{_SPACE}[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?')
 _HEXADECIMAL = re.compile(
     rf'{_SPACE}[-+]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][-+]?[0-9]+)?'
@@ -51,7 +51,7 @@ _MAX_LENGTH = 1000
 
 
 def parse_override(text: str) -> tuple[Any, str | None] | None:
-    """Return value and type of what follows `:=` on a command line; `None` if rcl refuses it."""
+    """Return the value after `:=` on a command line, and its type; `None` if rcl refuses it."""
     faults: list[Diagnostic] = []
     try:
         trees = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
@@ -67,7 +67,7 @@ class ValueReader:
     """Reads values.
 
     Args:
-        faults: What is wrong with them is added to it.
+        faults: Findings are added to it.
     """
 
     def __init__(self, faults: list[Diagnostic]) -> None:
@@ -77,7 +77,7 @@ class ValueReader:
         """Return a value, `None` if rcl refuses it.
 
         Args:
-            key: What the file calls it.
+            key: The name of the parameter in the file.
         """
         if isinstance(node, ScalarNode):
             if node.text or node.quoted:
@@ -151,7 +151,7 @@ def _read_integer(text: str) -> int | None:
     sign, *digits = match.groups()
     value = next(int(text, base) for text, base in zip(digits, (16, 8, 10), strict=True) if text)
     value = -value if sign == '-' else value
-    # What does not fit is tried as a double.
+    # If it does not fit, rcl tries a double.
     return value if INT64_MIN <= value <= INT64_MAX else None
 
 

@@ -135,7 +135,7 @@ def _explain_dependency(error: ValidationError) -> Iterator[Violation]:
             if key in error.instance and other not in error.instance:
                 yield Violation(
                     'missing-key',
-                    f"'{key}' needs '{other}', too",
+                    f"'{key}' requires '{other}'",
                     (*path, key),
                     (*path, key),
                     at_key=True,

@@ -36,9 +36,9 @@ class IgnoreComment:
 
 
 def read_ignore_comments(source: SourceFile) -> list[IgnoreComment]:
-    """Return the comments of a file that silence rules; what looks like one in a scalar is text.
+    """Return the comments of a file that silence rules; in a scalar, one is only text.
 
-    Of a text that is not YAML those before the fault are returned.
+    If the text is not YAML, those before the error are returned.
     """
     if not any(_MARK in line for line in source.lines):
         return []
@@ -67,14 +67,14 @@ def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
 
 
 def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:
-    """Return where scalars reach from and to, and where the text stops being YAML."""
+    """Return where scalars begin and end, and where the text stops being YAML."""
     found = []
     try:
         for token in yaml.scan('\n'.join(source.lines), Loader=_Loader):
             if isinstance(token, yaml.ScalarToken):
                 start = token.start_mark.line, token.start_mark.column
                 if token.style in ('|', '>'):
-                    # A comment may stand behind the indicator; the text begins in the next line.
+                    # A comment may follow the indicator; the text begins on the next line.
                     start = token.start_mark.line + 1, 0
                 found.append((start, (token.end_mark.line, token.end_mark.column)))
     except yaml.MarkedYAMLError as error:

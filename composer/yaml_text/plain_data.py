@@ -33,7 +33,7 @@ _MERGE_KEY = '<<'
 def construct_data(
     root: TreeNode | None, positions: SourceMap
 ) -> tuple[Any, tuple[Diagnostic, ...]]:
-    """Return the data of a tree and what was wrong with it; fill in its positions.
+    """Return the data of a tree and the findings; fill in its positions.
 
     Raises:
         CompositionError: Aliases expand to more than 300,000 values or 100 levels.

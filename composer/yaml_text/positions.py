@@ -35,11 +35,11 @@ class SourceMap:
     _indexed: int = field(default=0, init=False, repr=False)
 
     def key(self, path: DataPath) -> Span:
-        """Return the span of the key at `path`, or of the nearest thing around it."""
+        """Return the span of the key at `path`, or of the nearest key or value around it."""
         return self.keys.get(path) or self.value(path)
 
     def value(self, path: DataPath) -> Span:
-        """Return the span of the value at `path`, or of the nearest thing around it."""
+        """Return the span of the value at `path`, or of the nearest key or value around it."""
         while path not in self.values and path:
             path = path[:-1]
             if path in self.keys:
@@ -47,7 +47,7 @@ class SourceMap:
         return self.values.get(path) or Span(self.source, 1, 1, 0)
 
     def move(self, old: DataPath, new: DataPath) -> None:
-        """Let what was at `old`, and all below it, be found at `new`."""
+        """Move the positions at `old` and below it to `new`."""
         if self._indexed != len(self.keys) + len(self.values):
             self._index()
         depth = len(old)
@@ -65,7 +65,7 @@ class SourceMap:
         self._indexed = len(self.keys) + len(self.values)
 
     def _index(self) -> None:
-        """Note what lies directly below each path, so that moves pass over all else."""
+        """Note what lies directly below each path, which makes moves fast."""
         self._inner.clear()
         for path in dict.fromkeys([*self.keys, *self.values]):
             self._inner.setdefault(path[:-1], []).append(path)
@@ -85,7 +85,7 @@ class SourceMap:
         return self.branches(path[:-1])[path[-1]]
 
     def copy(self) -> SourceMap:
-        """Return a map that can be changed apart from this one."""
+        """Return an independent copy."""
         return SourceMap(self.source, dict(self.keys), dict(self.values))
 
     def sources(self) -> set[SourceFile]:
@@ -101,12 +101,12 @@ class SourceMap:
                 del spans[at]
 
     def replace(self, path: DataPath, other: SourceMap) -> None:
-        """Let what is at `path`, and all below it, be where another map says."""
+        """Replace the positions at `path` and below it with those of another map."""
         self.remove(path)
         self.graft(path, other.branch(path))
 
     def graft(self, path: DataPath, branch: Branch) -> None:
-        """Let the positions of a branch be found at `path` as well."""
+        """Add the positions of a branch at `path`."""
         self._indexed = -1
         self.keys.update((path + rest, span) for rest, span in branch.keys)
         self.values.update((path + rest, span) for rest, span in branch.values)

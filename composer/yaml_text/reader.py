@@ -21,7 +21,7 @@ def read_document(path: Path, name: str | None = None) -> Document:
     """Read a file.
 
     Args:
-        name: How the file is called in findings; by default as `path` is written.
+        name: The name of the file in findings; by default `path`.
     """
     name = name or str(path)
     content = read_content(path, name)
@@ -33,7 +33,7 @@ def read_document(path: Path, name: str | None = None) -> Document:
 
 
 def read_content(path: Path, name: str) -> bytes | Diagnostic:
-    """Return what is in a file, or why it cannot be read."""
+    """Return the content of a file, or why it cannot be read."""
     try:
         with path.open('rb') as file:
             return file.read(MAX_BYTES + 1)
@@ -43,7 +43,7 @@ def read_content(path: Path, name: str) -> bytes | Diagnostic:
 
 
 def decode_content(content: bytes, name: str) -> str | Diagnostic:
-    """Return the text of a file, or why it has none: it is UTF-8, and not too large."""
+    """Return the text of a file, or why it cannot be used: it must be UTF-8, and not too large."""
     if len(content) > MAX_BYTES:
         return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
     try:

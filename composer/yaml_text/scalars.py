@@ -34,7 +34,7 @@ _TAGGED_TYPES: dict[str, tuple[type, ...]] = {
 
 
 class ScalarError(ValueError):
-    """The text is no scalar of its tag, or a number beyond all bounds."""
+    """The text does not fit its tag, or is a number that is too long."""
 
 
 def parse_plain_scalar(text: str) -> Scalar:

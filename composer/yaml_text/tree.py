@@ -77,10 +77,10 @@ def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
 
 
 def compose_trees(text: str, source: SourceFile, *, alias_rule: str) -> list[TreeNode]:
-    """Return all documents of a text that takes no aliases.
+    """Return all documents of a text in which aliases are not allowed.
 
     Args:
-        alias_rule: The rule that aliases break.
+        alias_rule: The rule for findings about aliases.
 
     Raises:
         CompositionError: The text is not YAML, nests too deep, or holds an alias.
@@ -216,7 +216,7 @@ def _syntax_help(span: Span) -> str | None:
 
 
 def _character_fault(error: yaml.reader.ReaderError, text: str, source: SourceFile) -> Diagnostic:
-    # What the parser calls a position is one in bytes or in characters, whichever it reads.
+    # The position in the error counts bytes or characters, depending on the parser.
     found = yaml.reader.Reader.NON_PRINTABLE.search(text)
     before = f'{text[: found.start()]}^'.splitlines() if found else ['^']
     line, column = len(before), len(before[-1])

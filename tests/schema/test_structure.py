@@ -177,7 +177,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
         (
             '{subscriptions: {a: {type: a/msg/B, publish: b, with: {c: 1}}}}',
-            ('missing-key', "'with' needs 'behaviour', too", None),
+            ('missing-key', "'with' requires 'behaviour'", None),
         ),
         (
             '{timers: {a: {behaviour: b:c}}}',
