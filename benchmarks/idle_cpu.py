@@ -24,7 +24,7 @@ def measure(side: str, size: int, seconds: float) -> dict[str, float]:
 
 
 def _watch(program: Program, seconds: float) -> dict[str, float]:
-    time.sleep(_SETTLE_SEC)
+    time.sleep(min(_SETTLE_SEC, seconds))
     begin, before = time.monotonic(), program.cpu_sec()
     time.sleep(seconds)
     used = program.cpu_sec() - before

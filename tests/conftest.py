@@ -46,17 +46,27 @@ def other_domain_id():
 
 
 @pytest.fixture(scope='session')
-def built_interfaces(tmp_path_factory):
+def shared_cache(tmp_path_factory):
+    """Return a cache folder of the whole test run: each package is built once in it."""
+    folder = tmp_path_factory.getbasetemp()
+    if 'PYTEST_XDIST_WORKER' in os.environ:
+        folder = folder.parent
+    folder /= 'shared_cache'
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope='session')
+def built_interfaces(shared_cache):
     """Return a cache folder that has the packages of the shipped systems."""
-    folder = tmp_path_factory.mktemp('cache')
     for name in ('self_contained', 'fibonacci_client'):
         subprocess.run(
             [sys.executable, '-m', 'composer', 'interfaces', 'build', f'configs/{name}.yaml'],
             cwd=ROOT,
-            env=os.environ | {'XDG_CACHE_HOME': str(folder)},
+            env=os.environ | {'XDG_CACHE_HOME': str(shared_cache)},
             check=True,
         )
-    return folder
+    return shared_cache
 
 
 @pytest.fixture

@@ -202,7 +202,6 @@ class ClientSource(EventSource):
         if self._has_yielded:
             parts.scheduler.add_events(self, 1)
             return NOTHING
-        revision = self.revision
         try:
             handle = self.entity.handle
             with handle:
@@ -210,7 +209,7 @@ class ClientSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            parts.scheduler.set_empty(self, revision)
+            # It was the response to another client; one to this client may be behind it.
             return NOTHING
         try:
             future = self.entity.get_pending_request(header.request_id.sequence_number)

@@ -4,10 +4,18 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from benchmarks import processes
 from benchmarks.processes import MeasurementError, run_job
 from benchmarks.rows import ROWS, Job
 
 pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(autouse=True)
+def _own_domain(domain_id, monkeypatch):
+    """Measure in a ROS domain that no other test takes meanwhile."""
+    monkeypatch.setattr(processes, '_free_domain', lambda: domain_id)
+
 
 TINY = {
     'check': 1,

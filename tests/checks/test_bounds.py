@@ -8,7 +8,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system_text
 
 HEAD = 'version: 1\nnodes:\n  n:\n'
-COUNT = 3000
+COUNT = MAX_FINDINGS + 200
 
 
 def check(text):

@@ -34,12 +34,6 @@ def write_definitions(tmp_path: Path) -> WriteDefinitions:
     return write
 
 
-@pytest.fixture(scope='session')
-def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Keep what is built in a cache of the test run, so that each package is built once."""
-    return tmp_path_factory.mktemp('cache')
-
-
 def process_environment(cache: Path, **changes: str) -> dict[str, str]:
     """Make the environment of a process that finds Composer and uses a cache."""
     return {**os.environ, 'PYTHONPATH': str(ROOT), 'XDG_CACHE_HOME': str(cache), **changes}

@@ -1,5 +1,5 @@
 """The fixtures of the tests that build interface packages."""
 
-from building import run_python, shared_cache, write_definitions
+from building import run_python, write_definitions
 
-__all__ = ['run_python', 'shared_cache', 'write_definitions']
+__all__ = ['run_python', 'write_definitions']

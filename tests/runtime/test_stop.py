@@ -139,10 +139,15 @@ def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose):
 def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_alive(compose):
     text = """
         version: 1
-        executor: {shutdown_timeout: 0.1}
+        executor: {shutdown_timeout: 2.0}
         nodes: {stuck: {on_stop: 'parts:hold_interpreter'}}
     """
-    child = compose(text, CODE)
+    hurry = """
+from composer.runtime import forced_exit
+
+forced_exit._MARGIN_SEC = 0.5
+"""
+    child = compose(text, CODE + hurry)
     child.wait_until_ready()
 
     assert child.stop() == 1
