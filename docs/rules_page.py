@@ -22,7 +22,7 @@ def rules_page() -> Iterator[str]:
     families = load_families()
     for family in families:
         links = ', '.join(f'[{rule.name}](#{rule.name})' for rule in family.rules)
-        yield f'- **{family.name}**, {family.title}: {links}'
+        yield f'- **{family.name}** ({family.title}): {links}'
     for family in families:
         yield from _family(family)
 

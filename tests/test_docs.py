@@ -163,6 +163,25 @@ def test_the_links_of_a_page_lead_to_files_and_sections(path):
         assert not section or section in sections_of(page.read_text()), target
 
 
+def test_the_tree_of_contributing_has_every_room():
+    tree = (ROOT / 'CONTRIBUTING.md').read_text().partition('```')[2].partition('```')[0]
+    rooms = {
+        path.parent.name
+        for path in (ROOT / 'composer').rglob('__init__.py')
+        if not {'rules', 'templates'} & set(path.relative_to(ROOT).parts[1:-2])
+    }
+    listed = {line.split()[0].rstrip('/') for line in tree.splitlines() if line.strip()}
+    listed |= set(re.findall(r'(\w+)/ (?:reads|builds)', tree))
+    assert rooms - listed == set()
+
+
+@pytest.mark.parametrize('path', ['CONTRIBUTING.md', *PAGES])
+def test_the_modules_and_pages_that_a_page_names_are_there(path):
+    named = re.findall(r'`((?:\w+/)+\w+\.(?:py|md))`', (ROOT / path).read_text())
+    folders = (ROOT, ROOT / 'composer', ROOT / 'configs')
+    assert [name for name in named if not any((each / name).is_file() for each in folders)] == []
+
+
 def test_the_first_page_leads_to_all_others():
     text = (ROOT / 'README.md').read_text()
     assert [page for page in PAGES if page != 'README.md' and f']({page}' not in text] == []

@@ -85,7 +85,7 @@ def _check(
             message = f"there is no rule '{named.text}'"
             yield _warn(named, 'unknown-rule', message, help_text or advice)
         elif here and not load_rule(named.text).ignorable:
-            message = f"no comment silences '{named.text}': nothing can run until it is fixed"
+            message = f"'{named.text}' cannot be silenced: nothing can run until it is fixed"
             yield _warn(named, 'unused-ignore', message, 'fix the error and remove the comment')
         elif not here and unchecked is not None and load_rule(named.text).needs not in unchecked:
             message = f"there is no '{named.text}' in this line to ignore"

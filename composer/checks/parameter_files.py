@@ -269,7 +269,7 @@ def _find_fault(
     if wanted is None or (entry.value == [] and wanted.endswith('_array')):
         return None, None
     if wanted == 'byte_array':
-        return 'a parameter file has no bytes', "give them under 'parameters:' of the node"
+        return 'parameter files have no byte type', "give them under 'parameters:' of the node"
     if entry.type != wanted:
         got = with_article(entry.type) if entry.type else 'an empty list'
         fault = f'expected {with_article(wanted)}, and ROS takes this for {got}'

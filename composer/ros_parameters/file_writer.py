@@ -41,7 +41,7 @@ def _render_node(name: str, values: Mapping[str, tuple[str, Any]]) -> Iterator[s
 
 def _why_unwritable(type_name: str, value: Any) -> str | None:
     if type_name == 'byte_array':
-        return 'a parameter file has no bytes'
+        return 'parameter files have no byte type'
     return 'an empty list has no type in a parameter file' if value == [] else None
 
 

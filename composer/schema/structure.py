@@ -15,6 +15,7 @@ from composer.diagnostics import MAX_FINDINGS
 from composer.schema import schema_path
 from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain
+from composer.yaml_text.document import copy_data
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -51,7 +52,7 @@ def check_structure(document: Document) -> None:
     positions, data = document.positions, document.data or {}
     failed = [_entry_of(path) for path in document.dropped]
     if failed or not _schema().is_valid(data):
-        data = _copied(data)
+        data = copy_data(data)
     _remove_entries(data, failed)
     findings = _correct_keys(data, positions)
     incomplete = {path[:-1] for path in failed}
@@ -78,7 +79,7 @@ def correct_outer_keys(document: Document) -> None:
     """
     data = document.data or {}
     if not all(map(_is_known, _outer_keys(data))):
-        document.data = _copied(data)
+        document.data = copy_data(data)
         document.diagnostics += _correct_keys(document.data, document.positions, _is_outer)
 
 
@@ -180,13 +181,6 @@ def _find_violations(data: dict[str, Any]) -> list[Violation]:
         return []
     violations = (each for error in _validator().iter_errors(data) for each in explain(error))
     return list(islice(violations, MAX_FINDINGS))
-
-
-def _copied(data: Any) -> Any:
-    """Return a copy in which nothing is shared: aliases, and files included twice, share data."""
-    if isinstance(data, dict):
-        return {key: _copied(value) for key, value in data.items()}
-    return [_copied(item) for item in data] if isinstance(data, list) else data
 
 
 def _value_at(data: Any, path: Sequence[Key]) -> Any:

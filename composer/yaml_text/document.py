@@ -33,3 +33,10 @@ class Document:
     sampled: list[Span] = field(default_factory=list)
     sampled_paths: set[DataPath] = field(default_factory=set)
     notes: dict[DataPath, str] = field(default_factory=dict)
+
+
+def copy_data(data: Any) -> Any:
+    """Return a copy in which nothing is shared: aliases and a file included twice share data."""
+    if isinstance(data, dict):
+        return {key: copy_data(value) for key, value in data.items()}
+    return [copy_data(item) for item in data] if isinstance(data, list) else data

@@ -95,6 +95,20 @@ def test_a_namespace_that_all_share_hides_nobody_who_is_alone(check):
     assert found == [(2, 'bad-name'), (5, 'no-subscription')]
 
 
+@pytest.mark.parametrize('qos', ['nowhere', '{profile: nowhere, depth: 3}'])
+def test_a_qos_with_an_unknown_profile_matches_everything(check, qos):
+    talker = f"""
+  talker:
+    publishers: {{numbers: {{type: std_msgs/msg/Int32, qos: {qos}}}}}
+    timers: {{tick: {{period: 1, publish: numbers, message: {{data: 1}}}}}}
+  hearer:
+    publishers: {{copies: {{type: std_msgs/msg/Int32, external: true}}}}
+    subscriptions:
+      numbers: {{type: std_msgs/msg/Int32, publish: copies, qos: {{durability: transient_local}}}}
+"""
+    assert check(talker, installed=False) == [(4, 'unknown-qos-profile')]
+
+
 @pytest.mark.parametrize('value', ['-1', 'soon', '[1]'])
 def test_a_qos_with_a_fault_in_its_profile_matches_everything(check, value):
     before = f'qos: {{kept: {{deadline: {value}, depth: 3}}}}\n'

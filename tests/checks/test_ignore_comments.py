@@ -79,7 +79,7 @@ def test_what_stops_a_start_cannot_be_silenced(check):
         ('error', 'bad-value', 4),
         ('warning', 'unused-ignore', 4),
     ]
-    assert found[1][3] == "no comment silences 'bad-value': nothing can run until it is fixed"
+    assert found[1][3] == "'bad-value' cannot be silenced: nothing can run until it is fixed"
 
 
 def test_a_comment_in_a_text_is_none(check):

@@ -90,7 +90,7 @@ def test_what_no_node_declares_is_a_warning_at_its_key(check):
         'gains: [1, 2]': (
             'expected a double_array, and ROS takes this for an integer_array → write [1.0, 2.0]'
         ),
-        'octets: [1]': "a parameter file has no bytes → give them under 'parameters:' of the node",
+        'octets: [1]': "parameter files have no byte type → give them under 'parameters:' of the node",
         'count: 11': '11 is above the maximum 10',
         'count: 9223372036854775808': 'expected an integer, and ROS takes this for a double',
         'count: []': 'expected an integer, and ROS takes this for an empty list',

@@ -45,7 +45,7 @@ EXPECTED = r"""
         texts: ["5", "yes", "{{ x }}", "a \"b\"\n", "é\u0007"]
         sub.deep: 16
         # empty: an empty list has no type in a parameter file
-        # octets: a parameter file has no bytes
+        # octets: parameter files have no byte type
     /leg:
       ros__parameters:
         length: 2

@@ -2,6 +2,7 @@
 
 import pytest
 
+from composer.language.pipeline import load_system_text
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
 from composer.language.specs import QosSpec
 
@@ -85,3 +86,15 @@ def test_profiles_that_lead_back_to_themselves_are_told(length):
     with pytest.raises(QosError, match=r"^the QoS profile 'p0' leads back to itself$") as raised:
         resolve_qos(qos('p0', ('here',)), profiles)
     assert raised.value.spec.path == ('qos', f'p{length - 1}')
+
+
+def test_an_unknown_profile_that_entities_share_by_an_alias_is_one_finding():
+    publisher = '{type: std_msgs/msg/String, qos: nope}'
+    system = load_system_text(
+        f'version: 1\nnodes: {{a: {{publishers: {{x: &shared {publisher}, y: *shared}}}}}}\n'
+    )
+    assert [each.rule for each in system.diagnostics] == ['unknown-qos-profile']
+    assert [each.qos.profile for each in system.spec.nodes['a'].publishers.values()] == [
+        'default',
+        'default',
+    ]

@@ -86,7 +86,7 @@ def _explain_missing_module(
 ) -> Diagnostic:
     behaviour = binding.behaviour
     path = behaviour.module.replace('.', '/')
-    otherwise = f'write {path}.py beside the project, or install the package it is in'
+    otherwise = f'create {path}.py in the project, or install the package that has it'
     return context.at_value(
         behaviour.path,
         'unknown-behaviour',

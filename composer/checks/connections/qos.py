@@ -45,7 +45,9 @@ def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Polici
     found: dict[Policies, Endpoint] = {}
     for end in ends:
         spec = end.qos
-        if spec is None or any(_is_unknown(context, path) for path in _sources(context, spec)):
+        if spec is None or context.was_dropped((*end.path, 'qos')):
+            continue
+        if any(_is_unknown(context, path) for path in _sources(context, spec)):
             continue
         try:
             policies = resolve_qos(spec, context.spec.qos)

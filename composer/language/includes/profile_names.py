@@ -8,6 +8,7 @@ from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import BUILTIN_PROFILES
 from composer.spelling import suggest
+from composer.yaml_text.document import copy_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -73,13 +74,16 @@ def rename_profiles(own: dict[str, Any], profiles: dict[str, Any], label: str) -
 def drop_unknown_profiles(system: LoadedSystem) -> None:
     """Report the profiles that a file uses and does not declare, and leave out these uses.
 
-    Another file may declare one of the name, which is none of this file's.
+    A profile of the same name in another file does not count.
     """
-    declared = system.entries.get('qos', {})
+    known = {**system.entries.get('qos', {}), **BUILTIN_PROFILES}
+    if all(holder[key] in known for holder, key, _ in _uses(system.entries)):
+        return
+    system.data = copy_data(system.data)
     reported = set()
     for holder, key, path in list(_uses(system.entries)):
         name = holder[key]
-        if name in declared or name in BUILTIN_PROFILES:
+        if name in known:
             continue
         span = system.positions.value(path)
         if span not in reported:
@@ -88,7 +92,7 @@ def drop_unknown_profiles(system: LoadedSystem) -> None:
                 span,
                 'unknown-qos-profile',
                 f"there is no QoS profile '{name}'",
-                help=suggest(name, [*declared, *BUILTIN_PROFILES], 'the profiles are'),
+                help=suggest(name, known, 'the profiles are'),
             )
             system.diagnostics.append(finding)
         del holder[key]
