@@ -115,7 +115,7 @@ class _Constructor:
             self._fault(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
-            self._fault(node, 'bad-key', 'a key is a string, and this one is empty')
+            self._fault(node, 'bad-key', 'a key must be a string, and this one is empty')
             return None
         self._fault(
             node,

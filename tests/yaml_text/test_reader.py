@@ -351,7 +351,7 @@ def test_yaml_is_read_by_the_core_schema():
         ('a: !!map [b]', '1:4: error[bad-tag]: a !!map is not allowed here'),
         ('1: a', '1:1: error[bad-key]: a key must be a string, and 1 is not'),
         ('null: a', '1:1: error[bad-key]: a key must be a string, and null is not'),
-        ('?\n: a', '1:2: error[bad-key]: a key is a string, and this one is empty'),
+        ('?\n: a', '1:2: error[bad-key]: a key must be a string, and this one is empty'),
         ('[a]: b', '1:1: error[bad-key]: a key must be a string, not a list or a mapping'),
     ],
 )

@@ -253,7 +253,7 @@ class LiveNode:
         self.ros.destroy_node()
 
     def _health(self, owner: Owner) -> EntityHealth | None:
-        """Return the health of an entity in words, `None` if it is not measured."""
+        """Return the health of an entity, `None` if it is not measured."""
         board = self.system.health
         return None if board is None else board.entity(self.full_name, owner)
 

@@ -154,24 +154,29 @@ class Client:
 
     def send(self, order, heard=None):
         """Return the future of a goal handle."""
+        return self._run(lambda: self._send(order, heard))
+
+    def send_all(self, count):
+        """Send goals at once, in order, and return their handles."""
+        futures = self._run(lambda: [self._send(n, None) for n in range(count)])
+        return [self.accepted(future) for future in futures]
+
+    def _send(self, order, heard):
         hear = (
             None
             if heard is None
             else lambda message: heard.append(list(message.feedback.sequence))
         )
-        future = self._client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=hear)
-        self._peer._executor.wake()
-        return future
+        return self._client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=hear)
 
-    def send_all(self, count):
-        """Send goals at once, in order, and return their handles.
+    def _run(self, function):
+        """Call a function in the thread that spins, and return what it returns.
 
-        This is done in the thread that spins, which else may take an answer too early: rclpy
-        notes a request only after it has sent it.
+        Else that thread may take an answer too early: rclpy notes a goal after it has sent it.
         """
-        task = self._peer._executor.create_task(lambda: [self.send(n) for n in range(count)])
-        self._wait_for(task.done, 'the goals to be sent')
-        return [self.accepted(future) for future in task.result()]
+        task = self._peer._executor.create_task(function)
+        self._wait_for(task.done, 'a goal to be sent')
+        return task.result()
 
     def accepted(self, future):
         self._wait_for(future.done, 'the answer to a goal')

@@ -202,7 +202,7 @@ class Writer:
 
 
 # What rcl reads, and as something else than is written.
-STRICTER = ('belong to a part of it', 'names below it')
+STRICTER = ('as a part of it', 'names below it')
 
 
 def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
