@@ -31,7 +31,7 @@ def up(compose):
     return run
 
 
-class Foreigners:
+class ExternalPeers:
     """Plain rclpy peers, each in a process of its own."""
 
     def __init__(self, start_program):
@@ -40,7 +40,7 @@ class Foreigners:
     def serve(self, *arguments):
         server = self._start(arguments, stdin=subprocess.PIPE)
         lines = iter(server.stdout.readline, '')
-        assert 'ready\n' in lines, f'the foreign peer {arguments} did not start'
+        assert 'ready\n' in lines, f'the external peer {arguments} did not start'
 
     def ask(self, *arguments):
         """Return the result of a client."""
@@ -52,7 +52,7 @@ class Foreigners:
 
     def _start(self, arguments, **options):
         return self._start_program(
-            ROOT / 'tests' / 'foreign_peers.py',
+            ROOT / 'tests' / 'external_peers.py',
             *arguments,
             env=os.environ | {'PYTHONPATH': str(ROOT)},
             **options,
@@ -60,9 +60,9 @@ class Foreigners:
 
 
 @pytest.fixture
-def foreigners(domain_id, start_program):
+def peers(domain_id, start_program):
     """Return a way to start plain rclpy peers, which are gone when the test ends."""
-    return Foreigners(start_program)
+    return ExternalPeers(start_program)
 
 
 def said_by(child, node):
@@ -71,10 +71,10 @@ def said_by(child, node):
     return [line.removeprefix(prefix) for line in child.matching(prefix)]
 
 
-def test_add_two_ints_server_answers_a_foreign_client(up, foreigners):
+def test_add_two_ints_server_answers_an_external_client(up, peers):
     child = up('add_two_ints_server')
-    assert foreigners.ask('ask_for_sum', 'add_two_ints', 2, 3) == 5
-    assert foreigners.ask('ask_for_sum', 'add_two_ints', -7, 2**40) == 2**40 - 7
+    assert peers.ask('ask_for_sum', 'add_two_ints', 2, 3) == 5
+    assert peers.ask('ask_for_sum', 'add_two_ints', -7, 2**40) == 2**40 - 7
 
     assert child.stop() == 0
     # A log message of two lines has its prefix before the first alone.
@@ -89,10 +89,10 @@ def test_add_two_ints_server_answers_a_foreign_client(up, foreigners):
     ]
 
 
-def test_add_two_ints_client_waits_for_a_foreign_server_and_ends(up, foreigners):
+def test_add_two_ints_client_waits_for_an_external_server_and_ends(up, peers):
     child = up('add_two_ints_client', '5', '10')
     child.wait_for_line(f'[INFO] [minimal_client_async]: {WAITING}')
-    foreigners.serve('add_two_ints_server')
+    peers.serve('add_two_ints_server')
 
     assert child.wait() == 0
     said = said_by(child, 'minimal_client_async')
@@ -100,8 +100,8 @@ def test_add_two_ints_client_waits_for_a_foreign_server_and_ends(up, foreigners)
     assert set(said[:-1]) == {WAITING}
 
 
-def test_add_two_ints_client_takes_names_and_negative_numbers(up, foreigners):
-    foreigners.serve('add_two_ints_server')
+def test_add_two_ints_client_takes_names_and_negative_numbers(up, peers):
+    peers.serve('add_two_ints_server')
     child = up('add_two_ints_client', 'b:=-3', '-4')
 
     assert child.wait() == 0
@@ -109,9 +109,9 @@ def test_add_two_ints_client_takes_names_and_negative_numbers(up, foreigners):
     assert said[-1] == 'Result of add_two_ints: for -4 + -3 = -7'
 
 
-def test_fibonacci_server_gives_a_foreign_client_feedback_and_the_sequence(up, foreigners):
+def test_fibonacci_server_gives_an_external_client_feedback_and_the_sequence(up, peers):
     child = up('fibonacci_server')
-    outcome = foreigners.ask('send_goal', 3)
+    outcome = peers.ask('send_goal', 3)
 
     assert outcome == {
         'accepted': True,
@@ -127,62 +127,62 @@ def test_fibonacci_server_gives_a_foreign_client_feedback_and_the_sequence(up, f
     assert child.stop() == 0
 
 
-def test_fibonacci_server_stops_when_a_foreign_client_cancels(up, foreigners):
+def test_fibonacci_server_stops_when_an_external_client_cancels(up, peers):
     child = up('fibonacci_server')
-    outcome = foreigners.ask('send_goal', 40, 'cancel')
+    outcome = peers.ask('send_goal', 40, 'cancel')
 
     assert outcome['status'] == CANCELED
     assert len(outcome['feedback']) < 38
     assert child.stop() == 0
 
 
-def test_fibonacci_client_sends_order_10_to_a_foreign_server_and_ends(up, foreigners):
-    foreigners.serve('fibonacci_server')
+def test_fibonacci_client_sends_order_10_to_an_external_server_and_ends(up, peers):
+    peers.serve('fibonacci_server')
     child = up('fibonacci_client')
 
     assert child.wait() == 0
     sequence = [0, 1, 1, 2, 3, 5, 8, 13, 21, 34, 55]
     said = said_by(child, 'fibonacci_action_client')
     feedback = [f'Received feedback: {sequence[:n]}' for n in range(3, 12)]
-    # A foreign server need not wait for the goal's answer before its first feedback.
+    # An external server need not wait for the goal's answer before its first feedback.
     assert sorted(said[:-1]) == sorted(['Goal accepted :)', *feedback])
     assert [line for line in said if line in feedback] == feedback
     assert said[-1] == f'Result: {sequence}'
 
 
-def test_fibonacci_client_takes_an_order(up, foreigners):
-    foreigners.serve('fibonacci_server')
+def test_fibonacci_client_takes_an_order(up, peers):
+    peers.serve('fibonacci_server')
     child = up('fibonacci_client', 'order:=3')
 
     assert child.wait() == 0
     assert said_by(child, 'fibonacci_action_client')[-1] == 'Result: [0, 1, 1, 2]'
 
 
-def test_fibonacci_client_says_that_it_was_refused(up, foreigners):
-    foreigners.serve('fibonacci_server', 'refuse')
+def test_fibonacci_client_says_that_it_was_refused(up, peers):
+    peers.serve('fibonacci_server', 'refuse')
     child = up('fibonacci_client')
 
     assert child.wait() == 1
     assert said_by(child, 'fibonacci_action_client') == ['Goal rejected :(']
 
 
-def test_calculator_server_does_what_its_parameter_says(up, foreigners):
+def test_calculator_server_does_what_its_parameter_says(up, peers):
     child = up('calculator_server')
-    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 15
-    assert foreigners.ask('set_operation', 'subtract') == [True, '']
-    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 5
+    assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 15
+    assert peers.ask('set_operation', 'subtract') == [True, '']
+    assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 5
 
-    accepted, reason = foreigners.ask('set_operation', 'multiply')
+    accepted, reason = peers.ask('set_operation', 'multiply')
     assert not accepted
     assert 'add' in reason
     assert 'subtract' in reason
-    assert foreigners.ask('ask_for_sum', 'calculate', 10, 5) == 5
+    assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 5
     assert said_by(child, 'calculator_server') == ['10 + 5 = 15', '10 - 5 = 5', '10 - 5 = 5']
     assert child.stop() == 0
 
 
-def test_calculator_client_takes_a_foreign_server_as_it_is_or_sets_it(up, foreigners):
-    foreigners.serve('calculator_server')
+def test_calculator_client_takes_an_external_server_as_it_is_or_sets_it(up, peers):
+    peers.serve('calculator_server')
     results = []
     for words in (
         ['10', '5'],

@@ -1,4 +1,4 @@
-"""`LoadedSystem` → findings. The rules, a function each, in two tables."""
+"""A loaded system → findings: every check is a function in one of two tables."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ _MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the 
 
 
 def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> CheckContext | None:
-    """Return what the rules look at, or `None` if the file could not be read at all."""
+    """Return what checks are given, or `None` if the file could not be read at all."""
     if system.spec is None:
         return None
     interfaces = load_declared(system, installed)
@@ -161,7 +161,7 @@ def _by_line(spans: Iterable[Span]) -> SpansByLine:
 
 
 def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
-    """Return whether a finding is about a value that is not the real one."""
+    """Return whether a finding is about a sample, not a real value."""
     place = finding.span
     return place is not None and any(
         span.column <= place.column < span.column + span.length
@@ -170,7 +170,7 @@ def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
 
 
 def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:
-    """Yield each file with all that is wrong with it."""
+    """Yield each file with its findings."""
     catalogue = InterfaceCatalogue()
     for path in paths:
         yield path, check_system(load_system(path), catalogue)

@@ -1,4 +1,4 @@
-"""What the rules look at, and how they say what they found."""
+"""What checks are given, and how they report."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CheckContext:
-    """A system and what there is to hold it against.
+    """A system, and what its checks compare it with.
 
     Attributes:
         interfaces: The types of the system, and the errors in the packages that it declares.
@@ -48,11 +48,11 @@ class CheckContext:
         return self.interfaces.catalogue
 
     def was_dropped(self, path: DataPath) -> bool:
-        """Return whether an entry is missing only because its own fault was reported already."""
+        """Return whether an entry is missing because of an error that was reported already."""
         return path in self.system.dropped
 
     def has_real_type(self, entity: EndSpec) -> bool:
-        """Return whether the type of an entity is the one that is meant, as far as can be known.
+        """Return whether the type of an entity is known to be the one that is meant.
 
         It is none that stands in for a missing one, hangs on a sample, or does not exist.
         """

@@ -1,4 +1,4 @@
-"""Findings that a comment in their line silences, and comments that silence nothing."""
+"""Comments that silence findings of their line, and comments that silence nothing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _YAML = ('.yaml', '.yml')
 def apply_ignore_comments(
     findings: Iterable[Diagnostic], source: SourceFile, unchecked: Collection[Need] | None
 ) -> list[Diagnostic]:
-    """Return what is left of the findings, and what is wrong with the comments themselves.
+    """Return the findings that no comment silences, and the findings about the comments.
 
     Args:
         source: The file that was checked; findings in files that it includes count too.

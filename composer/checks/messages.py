@@ -1,4 +1,4 @@
-"""Constant messages against the fields of their type."""
+"""Check constant messages against the fields of their type."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def check_messages(context: CheckContext) -> Iterator[Diagnostic]:
-    """A timer's `message:` is a payload of the publisher that it goes to."""
+    """Check a timer's `message:` against the type of its publisher."""
     for node in context.spec.nodes.values():
         for timer in node.timers.values():
             path = (*timer.path, 'message')

@@ -1,4 +1,4 @@
-"""Names of nodes, namespaces, topics and parameters, by ROS's own rules."""
+"""Names of nodes, namespaces, topics and parameters follow ROS's rules."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LONGEST_OWN_SERVICES = {
 
 
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check every name that ROS will see."""
+    """Check every name that ROS gets."""
     yield from _check_namespaces(context)
     for node in context.spec.nodes.values():
         fault = find_node_name_fault(node.name)
@@ -66,7 +66,7 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
-    """No two nodes have one full name."""
+    """Check that no two nodes have the same full name."""
     first: dict[str, NodeSpec] = {}
     for node in context.spec.nodes.values():
         other = first.setdefault(node.full_name, node)
@@ -81,13 +81,13 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _are_misplaced(context: CheckContext, *nodes: NodeSpec) -> bool:
-    """Return whether the namespace of a node is not known, for its own fault."""
+    """Return whether the namespace of a node is unknown because of an error."""
     owners = (('defaults',), *(node.path for node in nodes))
     return any(context.was_dropped((*owner, 'namespace')) for owner in owners)
 
 
 def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
-    """Check that the names which the node's own services get are not too long."""
+    """Check the length of the names of a node's own services."""
     for key, service in _LONGEST_OWN_SERVICES.items():
         private = f'~/{service}'
         if getattr(node, key) and _find_full_name_fault(node, private):
@@ -122,7 +122,7 @@ def _check_ros_name(
 
 
 def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
-    """Return what becomes wrong with a name in its namespace: its length, say."""
+    """Return the error of a name in its namespace, such as its length."""
     if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
         return None
     full = expand_name(topic, node.name, node.namespace)
@@ -156,7 +156,7 @@ def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator
 
 
 def _find_rule_name_fault(name: str) -> str | None:
-    """Return why a name cannot stand in a rule, which takes less than topics do (rcl's lexer)."""
+    """Return why a rule cannot have a name; rcl's lexer takes fewer names than topics do."""
     if '{' in name:
         return 'it has no substitutions'
     if name == '~':

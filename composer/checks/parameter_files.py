@@ -1,4 +1,4 @@
-"""ROS's own parameter files against the nodes that use them.
+"""Check ROS parameter files against the nodes that use them.
 
 ROS ignores in silence what matches no node and what no node declares, and it ends a node when a
 value does not suit its declaration.
@@ -79,7 +79,7 @@ class _Library:
         self._knows_packages = bool(list_packages())
 
     def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
-        """Read the files of a node or process, and yield those that are there."""
+        """Read the files of a node or process, and yield those that exist."""
         for index, text in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
             try:
@@ -133,7 +133,7 @@ def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
 
 
 def _may_miss_users(context: CheckContext) -> bool:
-    """Return whether some node uses a file, or has a name, that is not known for its own fault."""
+    """Return whether a node's files or name are unknown because of an error."""
     lost = any(
         path in (('defaults',), ('defaults', 'namespace'))
         or path[:1] == ('include',)
@@ -203,7 +203,7 @@ def _explain_undeclared(entry: ParameterEntry, takers: list[_User]) -> Diagnosti
 def _find_overridden(
     path: str, entry: ParameterEntry, takers: Iterable[_User]
 ) -> Diagnostic | None:
-    """Return a finding if nobody takes a value, and what replaces it is no reason to expect so."""
+    """Return a finding if an unexpected value overrides this one for every node."""
     lost_to: ParameterEntry | None = None
     for user in takers:
         winner = user.overrides.get(entry.name)
@@ -222,7 +222,7 @@ def _find_overridden(
 
 
 def _is_expected(user: _User, path: str, entry: ParameterEntry, winner: ParameterEntry) -> bool:
-    """Return whether people mean a value to win: that of a later file, or of a special name."""
+    """Return whether a value is meant to win, as one of a later file or a more special name."""
     later = user.files[user.files.index(path) + 1 :]
     if winner.value_span.source.name in later:
         return True
@@ -238,7 +238,7 @@ def _help_for_overridden(entry: ParameterEntry, winner: ParameterEntry) -> str:
 
 
 def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Diagnostic]:
-    """Yield what the declarations refuse, once for nodes that share declaration and value."""
+    """Yield the values that declarations refuse, once for nodes that share both."""
     seen: set[tuple[int, str]] = set()
     for user in users:
         if user.node is None or not user.is_run:
@@ -261,7 +261,7 @@ def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Dia
 def _find_fault(
     declared: ParameterSpec | None, entry: ParameterEntry
 ) -> tuple[str | None, str | None]:
-    """Return why a node would refuse a value, and what to do about it."""
+    """Return why a node would refuse a value, and a help text."""
     if declared is None:
         wanted: str | None = 'bool' if entry.name in OF_EVERY_NODE else None
     else:

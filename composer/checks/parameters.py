@@ -1,4 +1,4 @@
-"""Declarations of parameters: types, ranges, choices and the values that they start with."""
+"""Declarations of parameters: types, ranges, choices and defaults."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:
-    """Return why a value of the right type would be refused, or `None` if it would be taken."""
+    """Return why a value of the right type would be refused, or `None`."""
     if parameter.choices is not None and value not in parameter.choices:
         return f'{value!r} is not one of its choices: {", ".join(map(str, parameter.choices))}'
     if parameter.type not in _NUMERIC:

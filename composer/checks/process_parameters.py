@@ -1,4 +1,4 @@
-"""Parameters of processes: what rcl would refuse, or read as something else, when they start.
+"""Parameters of processes: values that rcl refuses or reads as something else.
 
 Source: `parse_value` and `parse_key` in rcl (`rcl_yaml_param_parser/src/parse.c`).
 """
@@ -26,7 +26,7 @@ _NO_NULL = 'there is no value, and ROS has no null'
 
 
 def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
-    """Names and values are such that ROS takes them."""
+    """Check that ROS takes the names and values."""
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
         yield from _check_mapping(context, process.parameters, path, '', {})
@@ -54,7 +54,7 @@ def _check_mapping(
 
 
 def _find_faults(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Yield what is wrong with a value; of items of a list with their index."""
+    """Yield the errors of a value; those of list items with their index."""
     if value is None:
         yield (), _NO_NULL
     elif isinstance(value, dict):

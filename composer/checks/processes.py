@@ -24,13 +24,13 @@ _MAX_DOMAIN = 232
 
 
 def check_processes(context: CheckContext) -> Iterator[Diagnostic]:
-    """Names in processes follow ROS's rules."""
+    """Check that names in processes follow ROS's rules."""
     for process in context.spec.processes.values():
         yield from _check_process_names(context, process)
 
 
 def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
-    """The packages and executables of processes are installed.
+    """Check that the packages and executables of processes are installed.
 
     Those that are left out by their `when` need not be: a driver is where its device is.
     """
@@ -74,7 +74,7 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
 
 
 def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
-    """The variables that ROS reads have values that it takes."""
+    """Check the values of the variables that ROS reads."""
     environment = context.spec.environment
     domain = environment.get('ROS_DOMAIN_ID')
     if domain is not None and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
@@ -95,7 +95,7 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def installed_middlewares() -> list[str]:
-    """Return the RMW implementations that ROS can load; none where there is no ROS."""
+    """Return the RMW implementations that ROS can load; none without ROS."""
     folders = [prefix / _RMW_INDEX for prefix in ament_prefixes()]
     names = {entry.name for folder in folders if folder.is_dir() for entry in folder.iterdir()}
     return sorted(names.difference(_NO_RMW))

@@ -1,4 +1,4 @@
-"""What names something else: publishers, QoS profiles, interface types."""
+"""References: publishers, QoS profiles and interface types that an entry names."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _KIND_NOUNS = {'msg': 'message', 'srv': 'service', 'action': 'action'}
 
 
 def check_publish(context: CheckContext) -> Iterator[Diagnostic]:
-    """`publish:` names a publisher of the same node; a relay's types are the same on both ends."""
+    """Check that `publish:` names a publisher of the node, of the same type for a relay."""
     for node in context.spec.nodes.values():
         for entity in node.triggers:
             if entity.publish is not None:
@@ -63,7 +63,7 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
 
 
 def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
-    """Every profile leads to a built-in one."""
+    """Check that every profile starts from a built-in one."""
     profiles = context.spec.qos
     for name, profile in profiles.items():
         if name in BUILTIN_PROFILES:
@@ -93,7 +93,7 @@ def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]
 
 
 def check_types(context: CheckContext) -> Iterator[Diagnostic]:
-    """Every interface type is one of an installed package, or of one that the file brings."""
+    """Check that every interface type is in an installed package or in one of the file's."""
     catalogue = context.catalogue
     if not catalogue.available:
         return

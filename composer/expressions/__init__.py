@@ -5,6 +5,10 @@ Importing jinja2 takes as long as a small check: only files that have expression
 
 from __future__ import annotations
 
+# The sections whose entries may be repeated, and how many they may have unless a file says more.
+SECTIONS = ('nodes', 'include', 'processes')
+MAX_ENTRIES = 10_000
+
 # The words that an expression does not read as names.
 _RESERVED = frozenset(
     ('and', 'else', 'if', 'in', 'is', 'not', 'or', 'self', 'true', 'false', 'none')

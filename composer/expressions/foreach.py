@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.expressions import is_variable_name
+from composer.expressions import MAX_ENTRIES, SECTIONS, is_variable_name
 from composer.expressions.templates import TemplateEvaluator
 
 if TYPE_CHECKING:
@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import Branch, DataPath, Key
-
-# The sections whose entries may be repeated, and how many they may have unless a file says more.
-SECTIONS = ('nodes', 'include', 'processes')
-MAX_ENTRIES = 10_000
 
 _FOREACH = 'foreach'
 _WHEN = 'when'

@@ -139,7 +139,7 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
 
 
 def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Yield what is wrong with a declaration beyond the schema, each with the keys to its place.
+    """Yield the errors of a declaration that the schema does not find, with their keys.
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
@@ -198,7 +198,7 @@ def parse_arguments(
 
 
 def describe_arguments(declared: Mapping[str, ArgumentSpec]) -> str:
-    """Return what a file declares, as the help of an error."""
+    """Return the arguments that a file declares, as the help of an error."""
     if not declared:
         return 'the file declares no arguments'
     return 'the file declares\n' + '\n'.join(f'    {argument}' for argument in declared.values())
@@ -229,7 +229,7 @@ def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
 
 
 def _parse_text(text: str, type_name: str) -> Any:
-    """Return the value that YAML reads in a text; the text itself if that is nothing."""
+    """Return a text as a YAML scalar; the text itself if it is none."""
     try:
         value = parse_plain_scalar(text)
     except ScalarError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
+from composer.expressions import SECTIONS
 from composer.language.arguments import (
     find_declaration_errors,
     parse_declarations,
@@ -67,7 +68,7 @@ def _has_expressions(positions: SourceMap) -> bool:
 
 
 def _has_conditions(data: Mapping[str, Any]) -> bool:
-    sections = (data.get(section) for section in ('nodes', 'include', 'processes'))
+    sections = (data.get(section) for section in SECTIONS)
     return any(
         isinstance(entry, dict) and ('foreach' in entry or 'when' in entry)
         for section in sections

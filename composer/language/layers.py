@@ -1,4 +1,4 @@
-"""Several files as one: each changes what those before it say.
+"""Layers: several files as one, each of which changes the files before it.
 
 Mappings are merged entry by entry, all else is replaced, and `null` removes, but for `warn_after`,
 where it is a value. What a layer means to change and is not there is a finding.
@@ -26,7 +26,7 @@ _FREE = ('message', 'state', 'with')
 
 
 def merge_documents(documents: Sequence[Document]) -> Document:
-    """Return the documents as one; each value keeps the position of where it was written."""
+    """Return the documents as one; each value keeps its position."""
     merged, *layers = documents
     for layer in layers:
         merged = _merge(merged, layer)
@@ -76,7 +76,7 @@ class _Merging:
         return merged
 
     def _without_removals(self, value: Any, path: DataPath) -> Any:
-        """Return what is new without the nulls, which remove nothing here."""
+        """Return a new value without nulls, which have nothing to remove."""
         if not isinstance(value, dict) or path[-1] in _FREE:
             return value
         kept = {}
@@ -100,13 +100,13 @@ class _Merging:
 
 
 def _only_changes_a_node(path: DataPath, value: Any) -> bool:
-    """Return whether a value is for a node that others declare: it has nothing to do by itself."""
+    """Return whether a value only changes a node, and gives it nothing to do."""
     is_node = len(path) == _NODE and path[0] == 'nodes'
     return is_node and isinstance(value, dict) and 0 < len(value) == len(value.keys() & _CHANGES)
 
 
 def is_null_a_value(path: DataPath) -> bool:
-    """Return whether `null` at a path says something, and does not remove what is there."""
+    """Return whether `null` at a path is a value, and removes nothing."""
     return path[-1] == 'warn_after' and (
         path[:-1] == ('defaults',)
         or (path[0] == 'nodes' and (len(path) == _IN_NODE or _is_in_entity(path)))

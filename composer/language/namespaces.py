@@ -1,4 +1,4 @@
-"""Namespaces in namespaces, and the names of nodes in them, as files write them."""
+"""Joining namespaces, and the names of nodes in them, as files write them."""
 
 from __future__ import annotations
 

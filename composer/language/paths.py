@@ -43,7 +43,7 @@ def resolve_path(text: str, folder: Path) -> Path:
 
 
 def list_neighbours(path: Path) -> list[str]:
-    """Return the names of the YAML files in the folder of a file that is not there."""
+    """Return the names of the YAML files in the folder of a missing file."""
     try:
         names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
     except OSError:

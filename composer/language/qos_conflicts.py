@@ -1,4 +1,4 @@
-"""Which QoS of a publisher and of a subscription can never match.
+"""Conflicts between the QoS of a publisher and of a subscription.
 
 The rules are those of DDS for requested against offered policies, as rmw documents them
 (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Quality-of-Service-Settings.html) and
@@ -84,7 +84,7 @@ def find_qos_conflicts(
 
 
 def _nanoseconds(value: PolicyValue) -> float:
-    """Return a duration as the middleware gets it, to which 0 is no limit."""
+    """Return a duration for the middleware, where 0 means no limit."""
     if isinstance(value, str):
         return float('inf')
     return round(value * NANOSECONDS) or float('inf')

@@ -57,7 +57,7 @@ def apply_set_values(document: Document, set_values: Sequence[str]) -> Document:
 
 
 def _resolve(text: str, data: dict[str, Any]) -> DataPath:
-    """Return the path that a text names; keys may hold dots themselves.
+    """Return the path that a text names; keys may contain dots.
 
     Raises:
         UsageError: Some part of it does not exist, and is no key of the language either.
@@ -102,7 +102,7 @@ def _help_for(path: list[str], inside: Any) -> str | None:
 
 
 def _has_given_names(path: list[str]) -> bool:
-    """Return whether what is inside has names that the file itself gives."""
+    """Return whether the keys at a path are names that the file gives."""
     match path:
         case [section]:
             return section in _NAMED

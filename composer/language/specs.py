@@ -1,4 +1,4 @@
-"""A system as the file declares it: frozen records, one per thing of the language.
+"""A system as its file declares it: a frozen record for each part of the language.
 
 Every record carries the path of its data, under which a `SourceMap` knows where it was written.
 `warn_after_sec` is how long a behaviour may run before it is reported, `None` for ever.
@@ -344,7 +344,7 @@ class NodeSpec:
 
     @property
     def key(self) -> str:
-        """What the file calls it: its name, or its full name."""
+        """Its key in the file: its name, or its full name."""
         return str(self.path[-1])
 
     @property
@@ -398,7 +398,7 @@ class SystemSpec:
 
     @property
     def longest_stop_sec(self) -> float:
-        """What callbacks, and the processes after them, get to end when the system stops."""
+        """The longest time that callbacks, and then processes, get to end at the stop."""
         own = self.shutdown_timeout_sec
         given = [process.stop_timeout_sec for process in self.processes.values()]
         return own + max((own if each is None else each for each in given), default=0.0)

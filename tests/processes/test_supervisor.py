@@ -562,7 +562,7 @@ def test_a_behaviour_that_forks_keeps_nothing_from_ending(compose, stubborn):
     assert stubborn.left() == {}
 
 
-FOREIGN_NODE = """#!{python}
+EXTERNAL_NODE = """#!{python}
 import sys
 import rclpy
 from rclpy.parameter import Parameter
@@ -586,7 +586,7 @@ def package(tmp_path, monkeypatch):
         (prefix / folder).mkdir(parents=True)
     (prefix / 'share/ament_index/resource_index/packages/vendor').touch()
     program = prefix / 'lib/vendor/driver'
-    program.write_text(FOREIGN_NODE.format(python=sys.executable))
+    program.write_text(EXTERNAL_NODE.format(python=sys.executable))
     program.chmod(0o755)
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
     return prefix / 'share/vendor'

@@ -172,7 +172,7 @@ def test_names_are_those_that_the_node_would_use(compose, peer):
     child.wait_until_ready()
 
 
-FOREIGN = """
+DRIVER = """
 import sys, rclpy
 from std_msgs.msg import String
 rclpy.init()
@@ -184,7 +184,7 @@ rclpy.spin(node)
 
 
 def test_nodes_and_processes_wait_for_each_other(compose):
-    (compose.folder / 'driver.py').write_text(FOREIGN)
+    (compose.folder / 'driver.py').write_text(DRIVER)
     python = sys.executable
     text = f"""
         version: 1

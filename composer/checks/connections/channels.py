@@ -1,4 +1,4 @@
-"""Topics, services and actions: one type, and one server."""
+"""Check that a topic, service or action has one type, and one server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def check_channel_types(context: CheckContext) -> Iterator[Diagnostic]:
-    """All ends of a channel have one type; Fast DDS refuses a second one in the same process."""
+    """Check that all ends have one type; Fast DDS refuses a second one in a process."""
     for channel in context.topology.channels.values():
         # Of a type that there is not, that has been said.
         ends = [end for end in channel.ends if context.has_real_type(end.entity)]
@@ -43,7 +43,7 @@ def _explain_types(
 
 
 def check_servers(context: CheckContext) -> Iterator[Diagnostic]:
-    """A service or action has one server; it is undefined which one answers otherwise."""
+    """Check that there is one server; which of several answers is undefined."""
     for channel in context.topology.channels.values():
         if channel.kind == 'topic':
             continue

@@ -14,7 +14,7 @@ Node = TypeVar('Node', bound='Hashable')
 
 
 def find_cycles(edges: Edges[Node]) -> Iterator[list[Node]]:
-    """Yield one shortest cycle, from its first node on, for each knot of a graph.
+    """Yield one shortest cycle, from its first node on, for each component of a graph.
 
     A knot is a strongly connected component: however many cycles it has, to cut one is the first
     thing to do.
@@ -28,7 +28,7 @@ def find_cycles(edges: Edges[Node]) -> Iterator[list[Node]]:
 
 
 def find_knots(edges: Edges[Node]) -> list[set[Node]]:
-    """Return the strongly connected components that have a cycle (Tarjan, without recursion)."""
+    """Return the strongly connected components with a cycle (Tarjan, without recursion)."""
     index: dict[Node, int] = {}
     low: dict[Node, int] = {}
     stack: dict[Node, None] = {}
@@ -64,7 +64,7 @@ def find_knots(edges: Edges[Node]) -> list[set[Node]]:
 def find_way(
     edges: Edges[Node], start: Node, goals: Collection[Node], within: Collection[object]
 ) -> list[Node] | None:
-    """Return a shortest way of at least one edge from `start` to any goal, both ends included."""
+    """Return a shortest path of at least one edge from `start` to any goal, with both ends."""
     came_from: dict[Node, Node] = {}
     pending = deque([start])
     while pending:

@@ -1,4 +1,4 @@
-"""Deadlocks: behaviours that wait for what cannot run before they have ended.
+"""Deadlocks: behaviours that wait for something that can run only after them.
 
 A callback of a mutually exclusive group keeps the whole group until it returns; a coroutine keeps
 it until it ends, also while it awaits (rclpy's executors and Composer's). Composer's `node.call`
@@ -68,7 +68,7 @@ class _Wait:
 
 
 def check_deadlocks(context: CheckContext) -> Iterator[Diagnostic]:
-    """No behaviour waits for a service that needs what the behaviour keeps."""
+    """Check that no behaviour waits for a service that is blocked by the behaviour itself."""
     waits = list(_find_waits(context))
     yield from _check_hooks(context, waits)
     yield from _check_groups(context, waits)
@@ -115,7 +115,7 @@ def _group_of(node: NodeSpec, name: str | None) -> Group | None:
 
 
 def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
-    """Services answer from the end of their node's `on_start` until its `on_stop`."""
+    """Check calls in hooks: services answer only between `on_start` and `on_stop`."""
     order = {name: index for index, name in enumerate(context.spec.nodes)}
     for wait in waits:
         hook, server = wait.binding.owner, wait.server.node
@@ -147,7 +147,7 @@ def _starts_later(order: dict[str, int], wait: _Wait) -> bool:
 
 
 def _check_groups(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
-    """No chain of calls comes back to the group that its first behaviour keeps."""
+    """Check that no chain of calls returns to the group that its first behaviour blocks."""
     first_of: dict[DataPath, _Wait] = {}
     calls: dict[DataPath, list[DataPath]] = {}
     for wait in waits:
@@ -174,7 +174,7 @@ def _check_groups(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnos
 def _with_groups(
     waits: list[_Wait], calls: dict[DataPath, list[DataPath]]
 ) -> dict[Hashable, list[Hashable]]:
-    """Return the calls, with ways through groups: from a server to all that wait in its group.
+    """Return the calls, with the edges from a server to all that wait in its group.
 
     Only what lies on a cycle of these can be a deadlock.
     """

@@ -34,7 +34,7 @@ class _Relay:
 
 
 def check_loops(context: CheckContext) -> Iterator[Diagnostic]:
-    """No message runs in a circle for ever.
+    """Check that no message runs in a circle for ever.
 
     Relays without a behaviour pass on every message: an error. Behaviours of which every path
     returns a payload do so as well, and a closed loop of control may be meant: a warning. A

@@ -1,4 +1,4 @@
-"""QoS: publishers and subscriptions, clients and servers, that can never match."""
+"""Check the QoS of publishers and subscriptions, clients and servers for matches."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Policies = tuple[tuple[str, Any], ...]
 
 
 def check_qos_pairs(context: CheckContext) -> Iterator[Diagnostic]:
-    """Every subscription can hear every publisher of its topic, and so with services.
+    """Check that the QoS of all ends of a topic or service can match.
 
     What has the same QoS is looked at once: one finding for each pair of different ones.
     """
@@ -41,7 +41,7 @@ def _check_channel(context: CheckContext, channel: Channel) -> Iterator[Diagnost
 
 
 def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Policies, Endpoint]:
-    """Return the first end of each QoS; what has none, or only a sample, is left out."""
+    """Return the first end of each QoS; those without a known QoS are left out."""
     found: dict[Policies, Endpoint] = {}
     for end in ends:
         spec = end.qos
@@ -58,7 +58,7 @@ def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Polici
 
 
 def _sources(context: CheckContext, spec: QosSpec) -> Iterator[DataPath]:
-    """Yield the paths of all that has a say in a QoS: its own, and those of its profiles."""
+    """Yield the paths that a QoS depends on: its own, and those of its profiles."""
     yield spec.path
     profiles = context.spec.qos
     seen: set[str] = set()
@@ -69,7 +69,7 @@ def _sources(context: CheckContext, spec: QosSpec) -> Iterator[DataPath]:
 
 
 def _is_unknown(context: CheckContext, path: DataPath) -> bool:
-    """Return whether a QoS is not the real one: part of it was wrong, or hangs on a sample."""
+    """Return whether part of a QoS was wrong, or depends on a sample."""
     known = context.system
     if not path or not (known.dropped or known.sampled):
         return False

@@ -69,7 +69,7 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic, service or action, and who meets there.
+    """A topic, service or action, and its ends.
 
     Attributes:
         providers: Its publishers, or its servers.
@@ -172,7 +172,7 @@ def _is_no_name(*names: str) -> bool:
 
 
 def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
-    """Return the name of a topic, service or action of a node or process as others see it."""
+    """Return the full name of a topic, service or action of a node or process."""
     namespace = node.namespace or '/'
     full = expand_name(name, node.name, namespace)
     if not node.remap or kind not in _SCHEMES:
@@ -221,7 +221,7 @@ class _UncertainNames:
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
     def has(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
-        """Return whether an entity may have another name than it seems."""
+        """Return whether the name of an entity is not known for certain."""
         if kind in _SCHEMES and node.path[-1] in self._misruled:
             return True
         if not self._paths:
@@ -245,7 +245,7 @@ _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
 
 
 def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
-    """Return what ends may be missing without the data at a path."""
+    """Return the ends that may be missing because the data at a path are."""
     section = str(path[_DEPTH_OF_SECTIONS]) if len(path) > _DEPTH_OF_SECTIONS else ''
     if section in _WITHOUT_CHANNELS and path[0] == 'nodes':
         return set()
@@ -256,5 +256,5 @@ def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
 
 
 def _moves_node(path: DataPath) -> bool:
-    """Return whether what is at a path has a say in all names of its node."""
+    """Return whether the value at a path changes all names of its node."""
     return len(path) <= _DEPTH_OF_SECTIONS or path[_DEPTH_OF_SECTIONS] in ('namespace', 'remap')

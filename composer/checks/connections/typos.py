@@ -33,14 +33,14 @@ _MOST_COMPARED = 2_000
 
 
 def check_typos(context: CheckContext) -> Iterator[Diagnostic]:
-    """What is nowhere in the system is not a misspelt name of something that is."""
+    """Check names that match nothing in the system for likely typos."""
     yield from _check_conditions(context)
     yield from _check_rules(context)
     yield from _check_groups(context)
 
 
 def find_typo(word: str, options: Iterable[str]) -> str | None:
-    """Return the option that a word is a misspelling of, and not a name in its own right.
+    """Return the option that a word is most likely a misspelling of.
 
     One part of it, between slashes and underscores, has a typo; a long one may have two. Other
     numbers are no typos.
@@ -90,7 +90,7 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _present(context: CheckContext) -> dict[str, set[str]]:
-    """Return the full names of what there is to wait for, left out or not, by its kind."""
+    """Return the full names of all that can be waited for, by kind, left out or not."""
     system = context.system
     specs = [context.spec, *([system.unused] if system.unused else [])]
     present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
@@ -111,14 +111,14 @@ def _full_name(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
 
 
 def _as_written(name: str, full: str, namespace: str) -> str:
-    """Return a full name as it would be written in the place of a name."""
+    """Return a full name in the form in which a name is written."""
     inside = namespace.rstrip('/') + '/'
     is_relative = name[:1] not in ('/', '~') and full.startswith(inside)
     return full.removeprefix(inside) if is_relative else full
 
 
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check remapping rules; one of an include is for all that is in it."""
+    """Check remapping rules; a rule of an include applies to all that is in it."""
     matching: set[Span] = set()
     typos: dict[Span, Diagnostic] = {}
     for node in context.spec.nodes.values():

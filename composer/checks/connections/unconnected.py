@@ -35,7 +35,7 @@ _MOST_COMPARED = 5_000
 
 
 def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
-    """Everyone who needs another end has one, or says that it is elsewhere."""
+    """Check that every end has another end, or is marked as external."""
     if context.spec.processes:
         # Nobody knows what programs publish, hear and serve.
         return
@@ -80,7 +80,7 @@ def _explain(
 
 
 class _Partners:
-    """Whom those without another end may have meant: names with an end of the right type."""
+    """Names with an end of the right type, which an end without a match may have meant."""
 
     def __init__(self, topology: Topology) -> None:
         # Names are compared without their namespaces, in which all names look alike.

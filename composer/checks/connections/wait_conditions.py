@@ -1,4 +1,4 @@
-"""What is waited for: it can come, and nobody waits for itself."""
+"""Check `wait_for`: every condition can come true, and nothing waits for itself."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
-    """What is waited for can come: processes are declared, and nobody waits for itself."""
+    """Check that conditions can come true, and that nothing waits for itself."""
     processes = context.spec.processes
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
@@ -43,14 +43,14 @@ def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def waiters(spec: SystemSpec) -> Iterable[NodeSpec | ProcessSpec]:
-    """Return all who may wait for something."""
+    """Return all nodes and processes; each may wait for something."""
     return (*spec.nodes.values(), *spec.processes.values())
 
 
 def _check_name(
     context: CheckContext, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
 ) -> Iterator[Diagnostic]:
-    """Check that there may be something of the name that is waited for."""
+    """Check that the name of a condition is one that ROS allows."""
     kind, name = condition.kind, condition.name
     fault: str | None = None
     if kind == 'node':
@@ -66,7 +66,7 @@ def _check_name(
 
 
 def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
-    """Yield one finding for each round of nodes and processes that wait for each other."""
+    """Yield one finding for each cycle of nodes and processes that wait for each other."""
     providers = _Providers(context)
     edges = {
         waiter.path: [
@@ -99,7 +99,7 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 class _Providers:
-    """Which nodes and processes of a system bring what is waited for."""
+    """The nodes and processes that provide what others wait for."""
 
     def __init__(self, context: CheckContext) -> None:
         self._spec = context.spec
@@ -116,7 +116,7 @@ class _Providers:
     def of(
         self, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
     ) -> list[tuple[str | int, ...]]:
-        """Return the paths of all who bring what a condition asks for, if it is only one."""
+        """Return the path of the only provider of a condition; nothing if there are several."""
         kind = condition.kind
         if kind == 'process':
             process = self._spec.processes.get(condition.name)

@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import diagnostic_at
+from composer.expressions import MAX_ENTRIES, SECTIONS
 from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.arguments import GiveValues
     from composer.yaml_text.document import Document
-
-_SECTIONS = ('nodes', 'include', 'processes')
-# How many entries a section of all files may have, unless a file says more.
-_MAX_ENTRIES = 10_000
 
 
 class Includer:
@@ -46,7 +43,7 @@ class Includer:
         self._system = system
         self._load_file = load_file
         self._documents: dict[Path, Document] = {}
-        self._limit = system.entries.get('max_nodes', _MAX_ENTRIES)
+        self._limit = system.entries.get('max_nodes', MAX_ENTRIES)
         self._inclusions = 0
         # Entries and includes that were read although they are left out.
         self._left_out = 0
@@ -79,7 +76,7 @@ class Includer:
                 part.leave_out_all()
             merger.add(Inclusion(part, entry, entry.find_namespace()))
             if aside:
-                self._left_out += 1 + sum(len(part.entries.get(each, ())) for each in _SECTIONS)
+                self._left_out += 1 + sum(len(part.entries.get(each, ())) for each in SECTIONS)
             elif self._is_too_large(entry):
                 break
 
@@ -88,7 +85,7 @@ class Includer:
         if self._inclusions > self._limit:
             return True
         self._inclusions += 1
-        counts = {each: _count_used(entry.system, each, self._limit) for each in _SECTIONS}
+        counts = {each: _count_used(entry.system, each, self._limit) for each in SECTIONS}
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
         if counts[section] <= self._limit:

@@ -41,7 +41,7 @@ def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
 
 
 class RunOptions(TypedDict):
-    """What all that calls behaviours has: an entity's own value, or its node's."""
+    """Options of an entity with behaviours: its own, or those of its node."""
 
     on_error: OnError
     warn_after_sec: float | None
@@ -173,7 +173,7 @@ def _parse_action_client(_: Data, name: str, data: str | Data, path: DataPath) -
 
 
 def _full(data: str | Data) -> Data:
-    """Return an entity as a mapping, of which the type alone may be written."""
+    """Return an entity as a mapping; it may be written as its type alone."""
     return {'type': data} if isinstance(data, str) else data
 
 

@@ -1,4 +1,4 @@
-"""Processes, and what they and nodes wait for: plain data that satisfy the schema → specs."""
+"""Processes and `wait_for` as data that satisfy the schema → specs."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _CONDITION_KINDS: tuple[ConditionKind, ...] = ('topic', 'service', 'action', 'no
 
 
 def takes_ros_arguments(data: dict[str, Any]) -> bool:
-    """Return whether a process is a program of ROS; a command may be no such thing."""
+    """Return whether a process takes ROS arguments; a plain command may not."""
     return any(key in data for key in _ROS_KEYS)
 
 
 def with_defaults(process: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
-    """Return a process with what the defaults of its file say, apart from the namespace."""
+    """Return a process with the defaults of its file, except the namespace."""
     if not takes_ros_arguments(process):
         return process
     full = dict(process)
@@ -53,7 +53,7 @@ def with_defaults(process: dict[str, Any], defaults: dict[str, Any]) -> dict[str
 def with_waits(
     entry: dict[str, Any], processes: Mapping[str, str], namespace: str = ''
 ) -> dict[str, Any]:
-    """Return a node or process that waits for the same, by other names.
+    """Return a node or process with the names in its `wait_for` changed.
 
     Args:
         processes: New names of processes.

@@ -1,4 +1,4 @@
-"""Plain data that satisfy the schema → specs. Nothing is checked here that the schema checks."""
+"""A system as data that satisfy the schema → its spec."""
 
 from __future__ import annotations
 

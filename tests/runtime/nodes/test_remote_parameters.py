@@ -72,7 +72,7 @@ def test_parameters_of_a_node_of_this_process_are_set_and_read(compose, of, name
     assert child.stop() == 0
 
 
-def test_parameters_of_a_foreign_node_are_set_and_read(compose, peer):
+def test_parameters_of_an_external_node_are_set_and_read(compose, peer):
     peer.node.declare_parameter('limit', 3)
     arguments = '{of: /peer, values: {limit: 4}}'
     child = compose(asking('change', arguments, server=''), CODE)

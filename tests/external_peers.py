@@ -1,4 +1,4 @@
-"""Plain rclpy servers and clients of the shipped systems, one a process: `foreign_peers.py ROLE`.
+"""Plain rclpy servers and clients of the shipped systems, one a process: `external_peers.py ROLE`.
 
 A server says `ready` and serves until its standard input closes; a client prints its result as
 JSON and ends. Both have their types from packages that this process provides for itself.
@@ -146,7 +146,7 @@ CLIENTS = {'ask_for_sum': ask_for_sum, 'set_operation': set_operation, 'send_goa
 if __name__ == '__main__':
     role, *arguments = sys.argv[1:]
     rclpy.init()
-    node = rclpy.create_node('calculator_server' if 'calc' in role else 'foreign_peer')
+    node = rclpy.create_node('calculator_server' if 'calc' in role else 'external_peer')
     if role in SERVERS:
         SERVERS[role](*arguments)
     else:
