@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import threading
+from collections import defaultdict
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
-from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
@@ -85,7 +85,7 @@ class LiveNode:
     ros: ComposedRosNode
     behaviour_node: Node
     errors: ErrorReporter
-    entities: dict[str, dict[str, Any]]
+    entities: defaultdict[str, dict[str, Any]]
     waits: Waits
     background: CallbackGroup
     gate: Gate
@@ -267,7 +267,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
     ros = ComposedRosNode(spec, system.context, system.ros_arguments)
     reserve(ros, 'the node', 'destroy_node')
-    entities: dict[str, dict[str, Any]] = {kind.section: {} for kind in ENTITY_KINDS}
+    entities: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
     gate = Gate()
     waits = Waits(system.executor, system.stop)
