@@ -104,7 +104,7 @@ def message_overhead(type_name: str = 'std_msgs/msg/Int32') -> dict[str, float]:
     """
     message_class, answer = ANSWERS[type_name]
     system = _start_composed(type_name, answer)
-    context, executor = system._services.context, system._executor  # noqa: SLF001
+    context, executor = system._handle.context, system._executor  # noqa: SLF001
     plain = _create_plain(context, message_class, answer)
     driving = rclpy.create_node('driver', context=context)
     driver = _Driver(driving, message_class)
