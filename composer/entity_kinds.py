@@ -1,7 +1,7 @@
 """The kinds of entity that a node has: one row for each, with the facts that all rooms share.
 
-A new kind is a row here, a record and a parser in `language`, a creator in `runtime/entities`, and
-its part of the schema; everything else follows from its row.
+A new kind is a row here, a record in `language/specs.py`, a parser in `language/parsing`, a file
+and a row in `runtime/entities`, and its part of the schema; all else follows from its row.
 """
 
 from __future__ import annotations
@@ -53,6 +53,10 @@ class EntityKind:
         provides: Whether it is the end that publishes or serves.
         has_qos: Whether it has the key `qos`.
         publishes: Whether it has the key `publish`, for what its behaviour returns.
+        has_group: Whether it has the key `group`; the behaviours of others run in no group.
+        is_timed: Whether an rclpy timer calls its behaviour.
+        missed: What it can miss if callbacks take too long, as attributes of the executor's
+            `MissedCounts`, by their names in diagnostics.
         behaviours: The keys that name its behaviours.
         unused: What to say of one that no behaviour uses; `None` if behaviours do not use them.
         unmatched: The rule, and what to say of the channel, if there is no other end; `None` if
@@ -67,6 +71,9 @@ class EntityKind:
     provides: bool = False
     has_qos: bool = False
     publishes: bool = False
+    has_group: bool = False
+    is_timed: bool = False
+    missed: Mapping[str, str] = field(default_factory=dict)
     behaviours: tuple[BehaviourKey, ...] = ()
     unused: str | None = None
     unmatched: tuple[str, str] | None = None
@@ -99,6 +106,8 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         'topic',
         has_qos=True,
         publishes=True,
+        has_group=True,
+        missed={'queue overruns': 'overruns'},
         behaviours=(BehaviourKey('behaviour', ('node', 'message'), given='', returned=PUBLISHED),),
         unmatched=('no-publisher', "nothing in this system publishes '{}'"),
         stand_in={'type': 'unknown/msg/Unknown', 'behaviour': _BEHAVIOUR},
@@ -107,6 +116,9 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         'timers',
         'timer',
         publishes=True,
+        has_group=True,
+        is_timed=True,
+        missed={'late ticks': 'late_ticks', 'skipped ticks': 'skipped_ticks'},
         behaviours=(
             BehaviourKey(
                 'behaviour', ('node',), returned=PUBLISHED, yielded=PUBLISHED, may_yield=True
@@ -120,6 +132,7 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         'service',
         provides=True,
         has_qos=True,
+        has_group=True,
         behaviours=(
             BehaviourKey('behaviour', ('node', 'request'), given='Request', returned='Response'),
         ),
@@ -178,5 +191,12 @@ KIND_OF_NOUN: dict[str, EntityKind] = {kind.noun: kind for kind in ENTITY_KINDS}
 CHANNEL_KINDS: tuple[EntityKind, ...] = tuple(kind for kind in ENTITY_KINDS if kind.channel)
 # Those that behaviours use by name.
 USED_KINDS: tuple[EntityKind, ...] = tuple(kind for kind in ENTITY_KINDS if kind.unused)
+# The keys that give a node something to do.
+WORK_KEYS = frozenset(
+    (
+        *(kind.section for kind in ENTITY_KINDS if kind.section != 'parameters'),
+        *(each.key for each in NODE_BEHAVIOURS),
+    )
+)
 # Every key of an entity that names a behaviour.
 BEHAVIOUR_KEYS = frozenset(each.key for kind in ENTITY_KINDS for each in kind.behaviours)

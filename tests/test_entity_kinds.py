@@ -38,6 +38,7 @@ def test_an_entity_has_the_keys_that_its_kind_has(kind):
     assert (kind.channel or 'type') in keys or kind.channel is None
     assert ('qos' in keys) == kind.has_qos
     assert ('publish' in keys) == kind.publishes
+    assert ('group' in keys) == kind.has_group
     behaviours = keys & {'behaviour', 'accept', 'feedback', 'result'}
     assert behaviours == {each.key for each in kind.behaviours}
     assert ('external' in keys) == (kind.unmatched is not None)

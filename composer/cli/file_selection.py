@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic
+from composer.entity_kinds import WORK_KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -27,11 +28,8 @@ _SIMILAR = 0.8
 _TOP_KEY = re.compile(r'^(["\']?)([A-Za-z]\w*)\1\s*:(?=\s|$)', re.MULTILINE)
 _FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes)["\']?\s*:')
 _LIST = re.compile(r'\s*(#[^\n]*\n\s*)*(-\s|\[)')
-_ENTITIES = re.compile(
-    r'^\s+(publishers|subscriptions|timers|services|service_clients|actions|action_clients'
-    r'|on_start|on_stop|on_parameters)\s*:',
-    re.MULTILINE,
-)
+# Other keys, such as `parameters`, stand in other people's files, too.
+_ENTITIES = re.compile(rf'^\s+({"|".join(sorted(WORK_KEYS))})\s*:', re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.entity_kinds import ENTITY_KINDS, NODE_BEHAVIOURS
+from composer.entity_kinds import WORK_KEYS
 from composer.language.specs import NodeSpec
 from composer.spelling import suggest
 from composer.yaml_text.document import Document
@@ -117,11 +117,8 @@ _NODE = 2
 _IN_NODE = 3
 _IN_ENTITY = 5
 _OF_THE_USER = ('parameters', 'remap', 'state')
-# The keys that give a node something to do, and those that say how it runs.
-_WORK = {kind.section for kind in ENTITY_KINDS if kind.section != 'parameters'} | {
-    each.key for each in NODE_BEHAVIOURS
-}
-_CHANGES = {each.name for each in fields(NodeSpec)} - _WORK | {'warn_after', 'when', 'foreach'}
+# The keys that say how a node runs, and give it nothing to do.
+_CHANGES = {each.name for each in fields(NodeSpec)} - WORK_KEYS | {'warn_after', 'when', 'foreach'}
 
 
 def _is_in_entity(path: DataPath) -> bool:

@@ -76,7 +76,7 @@ class NodeStarter:
         """Let the behaviours of nodes that have started be called."""
         for node in nodes:
             node.gate.open()
-            for timer in node.entities['timers'].values():
+            for timer in node.timers():
                 with suppress(InvalidHandle):
                     # `on_start` may have destroyed it.
                     timer.reset()

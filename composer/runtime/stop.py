@@ -122,7 +122,7 @@ def _has_work_left(node: LiveNode) -> bool:
 
 
 def _cancel_timers(node: LiveNode) -> None:
-    for timer in node.entities['timers'].values():
+    for timer in node.timers():
         with suppress(InvalidHandle):
             # A behaviour may have destroyed it.
             timer.cancel()

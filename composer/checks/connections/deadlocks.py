@@ -84,7 +84,6 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     if not servers:
         return
     for node in context.spec.nodes.values():
-        groups = _groups_by_path(node)
         for binding in node_bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
@@ -96,18 +95,16 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
             for name in sorted(names):
                 if (node.name, name) in servers:
                     channel, client = servers[node.name, name]
-                    group = groups.get(binding.behaviour.path)
+                    group = _group_in(node, binding)
                     server = channel.providers[0]
                     yield _Wait(node, binding, group, channel.name, client, server)
 
 
-def _groups_by_path(node: NodeSpec) -> dict[DataPath, Group]:
-    """Return the mutually exclusive group of each behaviour that runs in one."""
-    groups = {
-        (*entity.path, 'behaviour'): _group_of(node, entity.group)
-        for entity in (*node.triggers, *node.services.values())
-    }
-    return {path: group for path, group in groups.items() if group}
+def _group_in(node: NodeSpec, binding: Binding) -> Group | None:
+    """Return the mutually exclusive group that a behaviour runs in, if there is one."""
+    if binding.kind is None or not binding.kind.has_group:
+        return None
+    return _group_of(node, getattr(binding.entity, 'group', None))
 
 
 def _group_of(node: NodeSpec, name: str | None) -> Group | None:

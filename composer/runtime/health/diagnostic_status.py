@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from composer.entity_kinds import KIND_OF_NOUN
+
 if TYPE_CHECKING:
     from composer.runtime.behaviours.running_calls import Owner
     from composer.runtime.health.statistics import EntityReport
@@ -27,7 +29,8 @@ class StatusWriter:
     """
 
     def __init__(self, node: str, owner: Owner, system: str) -> None:
-        self._kind = owner.kind
+        kind = KIND_OF_NOUN.get(owner.kind)
+        self._missed = kind.missed if kind else {}
         self._values: dict[str, KeyValue] = {}
         task = str(owner).replace("'", '')
         self._status = DiagnosticStatus(name=f'{node}: {task}', hardware_id=system)
@@ -44,11 +47,8 @@ class StatusWriter:
             self._set('callback time mean (ms)', f'{times.mean_ns() / 1e6:.4f}')
             self._set('callback time p99 (ms)', f'{times.percentile_ns(_P99) / 1e6:.4f}')
             self._set('callback time max (ms)', f'{times.most_ns / 1e6:.4f}')
-        if self._kind == 'subscription':
-            self._set('queue overruns', str(report.all_missed.overruns))
-        if self._kind == 'timer':
-            self._set('late ticks', str(report.all_missed.late_ticks))
-            self._set('skipped ticks', str(report.all_missed.skipped_ticks))
+        for label, attribute in self._missed.items():
+            self._set(label, str(getattr(report.all_missed, attribute)))
         return status
 
     def _summarize(self, report: EntityReport) -> tuple[bytes, str]:

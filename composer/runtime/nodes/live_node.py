@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
+from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
@@ -32,7 +33,7 @@ from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.task import Future
@@ -238,6 +239,12 @@ class LiveNode:
         health = self._health(owner)
         if health is not None:
             health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
+
+    def timers(self) -> Iterator[Any]:
+        """Yield the rclpy timers that call behaviours."""
+        for kind in ENTITY_KINDS:
+            if kind.is_timed:
+                yield from self.entities.get(kind.section, {}).values()
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
