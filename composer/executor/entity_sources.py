@@ -177,21 +177,32 @@ class SubscriptionSource(EventSource):
         return result if result is not None and self._is_async(callback) else None
 
 
+# A larger number of events is not known, and begins at `UNKNOWN_COUNT`.
+_MOST_COUNTED = UNKNOWN_COUNT // 2
+# So many takes without a response mean that there is none, where the number is not known.
+_MOST_MISSES = 32
+
+
 class ClientSource(EventSource):
     """A service client.
 
     Whoever spins until the response is there stops then. So what came with it or before it runs
     first, once: rclpy executes tasks and messages before responses.
+
+    To take a response to another client of the service looks as if there was none: one to this
+    client may be behind it.
     """
 
     rank = 2
     watch = staticmethod(c_bindings.watch_client)
-    __slots__ = ('_has_yielded',)
+    __slots__ = ('_has_yielded', '_misses')
 
     def open(self, shared: EventFd | None = None) -> None:
         """See the base class."""
         self._has_yielded = False
-        super().open(shared)
+        self._misses = 0
+        # What came before is announced at once; the number must be known, see `run`.
+        self._listen(shared)
 
     def run(self) -> Any:
         """See the base class."""
@@ -202,6 +213,7 @@ class ClientSource(EventSource):
         if self._has_yielded:
             parts.scheduler.add_events(self, 1)
             return NOTHING
+        revision = self.revision
         try:
             handle = self.entity.handle
             with handle:
@@ -209,8 +221,12 @@ class ClientSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            # It was the response to another client; one to this client may be behind it.
+            self._misses += 1
+            if self.pending > _MOST_COUNTED and self._misses > _MOST_MISSES:
+                self._misses = 0
+                parts.scheduler.set_empty(self, revision)
             return NOTHING
+        self._misses = 0
         try:
             future = self.entity.get_pending_request(header.request_id.sequence_number)
         except KeyError:
