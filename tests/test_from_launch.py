@@ -18,6 +18,9 @@ PAGE = ROOT / 'docs' / 'from_launch.md'
 
 # Stands in for programs of ROS packages that are not installed.
 PROGRAM = f"""#!{sys.executable}
+import signal
+# What interrupts the imports ends the program, too: as an exception it may be lost in them.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 import rclpy
 rclpy.init()
 node = rclpy.create_node('program')

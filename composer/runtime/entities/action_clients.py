@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
     from composer.language.specs import ActionClientSpec, BehaviourSpec
+    from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -48,8 +49,9 @@ class ActionClient:
         self._requests = Requests(
             node.waits, self._client.server_is_ready, self._unavailable, self._unanswered
         )
-        self._feedback = _Behaviour(node, Owner(kind, name, 'feedback'), spec.feedback)
-        self._result = _Behaviour(node, Owner(kind, name, 'result'), spec.result)
+        self._behaviours = _Behaviours(
+            node, {Owner(kind, name, key): getattr(spec, key) for key in ('feedback', 'result')}
+        )
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -83,7 +85,7 @@ class ActionClient:
 
     def _take_feedback(self, goal: Goal, message: Any) -> None:
         goal.feedback_queue.put(message.feedback)
-        self._feedback.put(message.feedback)
+        self._behaviours.put('feedback', message.feedback)
 
     def _take_result(self, goal: Goal, future: Future) -> None:
         goal.feedback_queue.put(None)
@@ -92,7 +94,7 @@ class ActionClient:
                 self._node.behaviour_node.logger.warning(
                     f"the goal of '{self._name}' was {goal.status}"
                 )
-            self._result.put(response.result)
+            self._behaviours.put('result', response.result)
 
 
 class _Client(RosActionClient):
@@ -153,37 +155,45 @@ class _Client(RosActionClient):
         await super().execute(taken_data)
 
 
-class _Behaviour:
-    """Calls a behaviour for each item, as one of the node's own callbacks.
+class _Behaviours:
+    """Calls a behaviour for each item, in order, as one of the node's own callbacks.
 
     What the middleware brings comes in a thread of its own; a guard condition takes it over into
-    the node's callback group, so that the behaviour never runs beside the node's others.
+    the node's callback group, so that the behaviours never run beside the node's others. There is
+    one for all of them: of two, the one triggered last may come first.
     """
 
-    def __init__(self, node: LiveNode, owner: Owner, behaviour: BehaviourSpec | None) -> None:
-        self._items: deque[Any] = deque()
-        self._guard: Any = None
-        if behaviour is None:
-            return
-        self._call = node.call(
-            owner,
-            behaviour.path,
-            node.bind(behaviour, own_state=False),
-            may_begin=node.gate.allows_events,
-        )
-        drain = self._drain_async if self._call.is_async else self._drain
-        self._guard = node.ros.create_guard_condition(drain, callback_group=node.group(None))
+    def __init__(self, node: LiveNode, behaviours: dict[Owner, BehaviourSpec | None]) -> None:
+        self._items: deque[tuple[BehaviourCall, Any]] = deque()
+        self._calls = {
+            owner.key: node.call(
+                owner,
+                spec.path,
+                node.bind(spec, own_state=False),
+                may_begin=node.gate.allows_events,
+            )
+            for owner, spec in behaviours.items()
+            if spec is not None
+        }
+        if self._calls:
+            are_async = any(call.is_async for call in self._calls.values())
+            drain = self._drain_async if are_async else self._drain
+            self._guard = node.ros.create_guard_condition(drain, callback_group=node.group(None))
 
-    def put(self, item: Any) -> None:
-        """Let the behaviour be called with an item."""
-        if self._guard is not None:
-            self._items.append(item)
+    def put(self, key: str, item: Any) -> None:
+        """Let the behaviour under a key, if there is one, be called with an item."""
+        if call := self._calls.get(key):
+            self._items.append((call, item))
             self._guard.trigger()
 
     def _drain(self) -> None:
         while self._items:
-            self._call.run(self._items.popleft())
+            call, item = self._items.popleft()
+            call.run(item)
 
     async def _drain_async(self) -> None:
         while self._items:
-            await self._call.run(self._items.popleft())
+            call, item = self._items.popleft()
+            result = call.run(item)
+            if call.is_async:
+                await result
