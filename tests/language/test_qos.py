@@ -98,3 +98,9 @@ def test_an_unknown_profile_that_entities_share_by_an_alias_is_one_finding():
         'default',
         'default',
     ]
+
+
+def test_an_unknown_profile_of_a_service_is_a_finding():
+    service = '{type: std_srvs/srv/Empty, behaviour: a:b, qos: nope}'
+    system = load_system_text(f'version: 1\nnodes: {{a: {{services: {{x: {service}}}}}}}\n')
+    assert [each.message for each in system.diagnostics] == ["there is no QoS profile 'nope'"]
