@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections import Counter
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -62,6 +63,8 @@ if kind == 'mute':
 stay()
 """
 KINDS = ('plain', 'family', 'daemon', 'nameless', 'deaf', 'asleep', 'mute')
+# What the processes of a kind call themselves, where it has several.
+PROCESSES_OF = {'family': ['family'] * 3, 'nameless': ['parent of nameless', 'plain']}
 
 
 class Stubborn:
@@ -152,8 +155,10 @@ def compose_stubborn(compose, stubborn, kinds=KINDS, **keys):
         patience = {'stop': {'timeout': 1.0}} if kind == 'deaf' else {}
         processes |= stubborn.process(kind, **patience)
     child = compose(system(processes, **keys))
-    for kind in kinds:
-        child.wait_for_line('plain is there' if kind == 'nameless' else f'{kind} is there')
+    # Python loses a SIGINT now and then while it starts: all of their processes have to be there.
+    awaited = Counter(line for kind in kinds for line in PROCESSES_OF.get(kind, [kind]))
+    for name, times in awaited.items():
+        child.wait_for_line(f'] {name} is there', times=times)
     child.wait_until_ready()
     assert len(stubborn.left()) >= len(kinds)
     return child
