@@ -61,7 +61,7 @@ class EntityKind:
         unused: What to say of one that no behaviour uses; `None` if behaviours do not use them.
         unmatched: The rule, and what to say of the channel, if there is no other end; `None` if
             none is needed.
-        stand_in: The values with which the rest of a faulty entry is read if these keys are
+        stand_in: The values with which the rest of an invalid entry is read if these keys are
             missing.
     """
 

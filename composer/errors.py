@@ -1,4 +1,4 @@
-"""The exceptions of Composer: what stops the work. Faults of input are data, see `diagnostics`."""
+"""The exceptions of Composer: what stops the work. Errors in input are data, see `diagnostics`."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def with_article(noun: str) -> str:
     return f'an {noun}' if noun[0] in 'aeiou' else f'a {noun}'
 
 
-def find_node_name_fault(name: str) -> str | None:
+def find_node_name_problem(name: str) -> str | None:
     """Return why `name` cannot name a node, or `None` if it can."""
     if not name:
         return 'a node name is not empty'
@@ -42,7 +42,7 @@ def find_node_name_fault(name: str) -> str | None:
     return None
 
 
-def find_namespace_fault(namespace: str) -> str | None:
+def find_namespace_problem(namespace: str) -> str | None:
     """Return why `namespace` (absolute or relative) cannot be one, or `None` if it can."""
     full = namespace if namespace.startswith('/') else f'/{namespace}'
     if full == '/':
@@ -51,10 +51,10 @@ def find_namespace_fault(namespace: str) -> str | None:
         return 'a namespace has only letters, digits, underscores and slashes'
     if full.endswith('/'):
         return 'a namespace does not end with a slash'
-    return _find_token_fault('a namespace', full, MAX_NAMESPACE)
+    return _find_token_problem('a namespace', full, MAX_NAMESPACE)
 
 
-def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
+def find_topic_name_problem(name: str, kind: str = 'topic') -> str | None:
     """Return why `name` cannot name a topic, service or action, or `None` if it can.
 
     Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions, as in `{node}`.
@@ -76,10 +76,10 @@ def find_topic_name_fault(name: str, kind: str = 'topic') -> str | None:
             return (
                 f"'{{{substitution}}}' is no substitution of ROS: {{node}}, {{ns}}, {{namespace}}"
             )
-    return _find_token_fault(what, plain.removeprefix('~'), MAX_TOPIC_NAME)
+    return _find_token_problem(what, plain.removeprefix('~'), MAX_TOPIC_NAME)
 
 
-def find_parameter_name_fault(name: str) -> str | None:
+def find_parameter_name_problem(name: str) -> str | None:
     """Return why `name` cannot name a parameter, or `None` if it can."""
     if not name:
         return 'a parameter name is not empty'
@@ -132,7 +132,7 @@ def remap_name(
     return name
 
 
-def _find_token_fault(what: str, full: str, limit: int) -> str | None:
+def _find_token_problem(what: str, full: str, limit: int) -> str | None:
     if '//' in full:
         return f'{what} has no two slashes in a row'
     if any(token[:1].isdigit() for token in full.split('/')):

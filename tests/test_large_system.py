@@ -1,4 +1,4 @@
-"""A system of twelve files, three includes deep: shown, run, and with a fault in the deepest."""
+"""A system of twelve files, three includes deep: shown, run, and with a finding in the deepest."""
 
 import re
 from itertools import count
@@ -213,7 +213,7 @@ def test_layers_and_settings_are_named(system, shown):
     assert re.search(rf'log_level: fatal +# {re.escape(SET)}\n', output)
 
 
-def test_a_fault_in_the_deepest_file_is_said_there_with_all_includes(system, capsys):
+def test_a_finding_in_the_deepest_file_is_said_there_with_all_includes(system, capsys):
     motor = system / 'motor.yaml'
     motor.write_text(motor.read_text().replace('log_level: info', 'log_level: inof', 1))
     assert run(['check', 'robot.yaml']) == 1

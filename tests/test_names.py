@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from composer.names import (
     expand_name,
     expand_namespace,
-    find_namespace_fault,
-    find_node_name_fault,
-    find_parameter_name_fault,
-    find_topic_name_fault,
+    find_namespace_problem,
+    find_node_name_problem,
+    find_parameter_name_problem,
+    find_topic_name_problem,
     remap_name,
 )
 
@@ -43,7 +43,8 @@ def is_topic_of_ros(name, namespace):
 
 def is_topic_here(name, namespace):
     return not (
-        find_topic_name_fault(name) or find_topic_name_fault(expand_name(name, NODE, namespace))
+        find_topic_name_problem(name)
+        or find_topic_name_problem(expand_name(name, NODE, namespace))
     )
 
 
@@ -97,7 +98,7 @@ def test_any_topic_is_named_as_rclpy_has_it(name, namespace):
 def test_any_node_is_named_as_rclpy_has_it(name):
     from rclpy.validate_node_name import validate_node_name
 
-    assert (find_node_name_fault(name) is None) == is_valid_of_ros(validate_node_name, name)
+    assert (find_node_name_problem(name) is None) == is_valid_of_ros(validate_node_name, name)
 
 
 @pytest.mark.ros
@@ -109,7 +110,7 @@ def test_any_node_is_named_as_rclpy_has_it(name):
 def test_any_namespace_is_as_rclpy_has_it(name):
     from rclpy.validate_namespace import validate_namespace
 
-    assert (find_namespace_fault(name) is None) == is_valid_of_ros(validate_namespace, name)
+    assert (find_namespace_problem(name) is None) == is_valid_of_ros(validate_namespace, name)
 
 
 RULES = [
@@ -159,7 +160,7 @@ def test_names_are_remapped_as_rclpy_has_it(rules, namespace, context):
 
 
 @pytest.mark.parametrize(
-    ('name', 'fault'),
+    ('name', 'finding'),
     [
         ('', 'a topic name is not empty'),
         ('a b', "a topic name has only letters, digits, underscores, slashes, and '~/' first"),
@@ -172,17 +173,17 @@ def test_names_are_remapped_as_rclpy_has_it(rules, namespace, context):
         ('a' * 248, 'a topic name has at most 247 characters'),
     ],
 )
-def test_a_wrong_topic_says_what_is_wrong(name, fault):
-    assert find_topic_name_fault(name) == fault
+def test_a_wrong_topic_says_what_is_wrong(name, finding):
+    assert find_topic_name_problem(name) == finding
 
 
 def test_the_kind_of_name_is_said():
-    assert find_topic_name_fault('', 'service') == 'a service name is not empty'
-    assert find_topic_name_fault('', 'action') == 'an action name is not empty'
+    assert find_topic_name_problem('', 'service') == 'a service name is not empty'
+    assert find_topic_name_problem('', 'action') == 'an action name is not empty'
 
 
 @pytest.mark.parametrize(
-    ('name', 'fault'),
+    ('name', 'finding'),
     [
         ('', 'a node name is not empty'),
         ('a/b', 'a node name has only letters, digits and underscores'),
@@ -191,12 +192,12 @@ def test_the_kind_of_name_is_said():
         ('a' * 256, 'a node name has at most 255 characters'),
     ],
 )
-def test_a_wrong_node_says_what_is_wrong(name, fault):
-    assert find_node_name_fault(name) == fault
+def test_a_wrong_node_says_what_is_wrong(name, finding):
+    assert find_node_name_problem(name) == finding
 
 
 @pytest.mark.parametrize(
-    ('name', 'fault'),
+    ('name', 'finding'),
     [
         ('a-b', 'a namespace has only letters, digits, underscores and slashes'),
         ('/a/', 'a namespace does not end with a slash'),
@@ -205,17 +206,17 @@ def test_a_wrong_node_says_what_is_wrong(name, fault):
         ('a' * 245, 'a namespace has at most 245 characters'),
     ],
 )
-def test_a_wrong_namespace_says_what_is_wrong(name, fault):
-    assert find_namespace_fault(name) == fault
+def test_a_wrong_namespace_says_what_is_wrong(name, finding):
+    assert find_namespace_problem(name) == finding
 
 
 @pytest.mark.parametrize('name', ['', '/', 'a', '/a', 'a/b', '_1'])
 def test_a_namespace_may_be_relative(name):
-    assert find_namespace_fault(name) is None
+    assert find_namespace_problem(name) is None
 
 
 @pytest.mark.parametrize(
-    ('name', 'fault'),
+    ('name', 'finding'),
     [
         ('speed', None),
         ('wheels.front.radius', None),
@@ -227,8 +228,8 @@ def test_a_namespace_may_be_relative(name):
         ('a b', 'a parameter name has no spaces'),
     ],
 )
-def test_parameters_have_names_in_parts(name, fault):
-    assert find_parameter_name_fault(name) == fault
+def test_parameters_have_names_in_parts(name, finding):
+    assert find_parameter_name_problem(name) == finding
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def apply_ignore_comments(
     comments = _read_comments(found, source)
     return [
         *(finding for finding in found if not _is_silenced(finding, comments)),
-        *(fault for comment in comments for fault in _check(comment, found, unchecked)),
+        *(finding for comment in comments for finding in _check(comment, found, unchecked)),
     ]
 
 

@@ -9,10 +9,10 @@ from composer.language.specs import NodeSpec
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
-    find_namespace_fault,
-    find_node_name_fault,
-    find_parameter_name_fault,
-    find_topic_name_fault,
+    find_namespace_problem,
+    find_node_name_problem,
+    find_parameter_name_problem,
+    find_topic_name_problem,
     with_article,
 )
 
@@ -38,31 +38,31 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS gets."""
     yield from _check_namespaces(context)
     for node in context.spec.nodes.values():
-        fault = find_node_name_fault(node.name)
-        if fault:
-            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {fault}")
+        problem = find_node_name_problem(node.name)
+        if problem:
+            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {problem}")
         else:
             yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
         for parameter in node.parameters.values():
-            fault = find_parameter_name_fault(parameter.name)
-            if fault:
-                yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {fault}")
+            problem = find_parameter_name_problem(parameter.name)
+            if problem:
+                yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {problem}")
         yield from check_rules(context, node)
 
 
 def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
     reported: set[DataPath] = set()
     for node in context.spec.nodes.values():
-        fault = find_namespace_fault(node.namespace)
+        problem = find_namespace_problem(node.namespace)
         own = (*node.path, 'namespace')
         path = own if own in context.system.positions.values else ('defaults', 'namespace')
         if str(node.path[-1]).startswith('/'):
             path = node.path
-        if fault and path not in reported:
+        if problem and path not in reported:
             reported.add(path)
             say = context.at_key if path == node.path else context.at_value
-            yield say(path, _RULE, f"'{node.namespace}': {fault}")
+            yield say(path, _RULE, f"'{node.namespace}': {problem}")
 
 
 def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
@@ -90,7 +90,7 @@ def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagn
     """Check the length of the names of a node's own services."""
     for key, service in _LONGEST_OWN_SERVICES.items():
         private = f'~/{service}'
-        if getattr(node, key) and _find_full_name_fault(node, private):
+        if getattr(node, key) and _find_full_name_problem(node, private):
             length = len(expand_name(private, node.name, node.namespace))
             message = (
                 f"the node's service '{private}' has {length} characters in full, "
@@ -109,10 +109,10 @@ def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnost
 def _check_ros_name(
     context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
 ) -> Iterator[Diagnostic]:
-    fault = find_topic_name_fault(name, kind) or _find_full_name_fault(node, name, kind)
-    if not fault:
+    problem = find_topic_name_problem(name, kind) or _find_full_name_problem(node, name, kind)
+    if not problem:
         return
-    message = f"'{name}' cannot name {with_article(kind)}: {fault}"
+    message = f"'{name}' cannot name {with_article(kind)}: {problem}"
     path = (*entity, kind)
     if path in context.system.positions.values:
         yield context.at_value(path, _RULE, message)
@@ -121,15 +121,15 @@ def _check_ros_name(
         yield context.at_key(entity, _RULE, message, help=help_text)
 
 
-def _find_full_name_fault(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
+def _find_full_name_problem(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
     """Return the error of a name in its namespace, such as its length."""
-    if find_node_name_fault(node.name) or find_namespace_fault(node.namespace):
+    if find_node_name_problem(node.name) or find_namespace_problem(node.namespace):
         return None
     full = expand_name(topic, node.name, node.namespace)
     # An action's name is the beginning of those of its topics and services.
     longest = f'{full}/_action/cancel_goal' if kind == 'action' else full
-    fault = find_topic_name_fault(longest)
-    return fault and f"in full it is '{longest}', and {fault}"
+    problem = find_topic_name_problem(longest)
+    return problem and f"in full it is '{longest}', and {problem}"
 
 
 def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator[Diagnostic]:
@@ -148,17 +148,17 @@ def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator
             yield context.at_key(path, 'bad-remap', message, help='rostopic:// or rosservice://')
             continue
         for name, at in ((bare, context.at_key), (target, context.at_value)):
-            fault = _find_rule_name_fault(name)
-            if fault is None and isinstance(node, NodeSpec):
-                fault = _find_full_name_fault(node, name)
-            if fault:
-                yield at(path, _RULE, f"'{name}' cannot be used in a remapping rule: {fault}")
+            problem = _find_rule_name_problem(name)
+            if problem is None and isinstance(node, NodeSpec):
+                problem = _find_full_name_problem(node, name)
+            if problem:
+                yield at(path, _RULE, f"'{name}' cannot be used in a remapping rule: {problem}")
 
 
-def _find_rule_name_fault(name: str) -> str | None:
+def _find_rule_name_problem(name: str) -> str | None:
     """Return why a rule cannot have a name; rcl's lexer takes fewer names than topics do."""
     if '{' in name:
         return 'it has no substitutions'
     if name == '~':
         return "'~' needs a slash after it"
-    return find_topic_name_fault(name)
+    return find_topic_name_problem(name)

@@ -15,7 +15,7 @@ from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
-from composer.names import find_namespace_fault, find_node_name_fault, join_names, with_article
+from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
@@ -92,8 +92,8 @@ class _Library:
                 continue
             if path not in self.files:
                 self.files[path] = read_parameter_file(Path(path))
-                self.findings += [each for each in self.files[path].faults if each.span]
-            unreadable = [each for each in self.files[path].faults if each.span is None]
+                self.findings += [each for each in self.files[path].findings if each.span]
+            unreadable = [each for each in self.files[path].findings if each.span is None]
             self.findings += [
                 self._context.at_value(
                     at,
@@ -141,7 +141,7 @@ def _may_miss_users(context: CheckContext) -> bool:
         for path in context.system.dropped
     )
     return lost or any(
-        find_node_name_fault(node.name) or find_namespace_fault(node.namespace)
+        find_node_name_problem(node.name) or find_namespace_problem(node.namespace)
         for node in context.spec.nodes.values()
     )
 
@@ -244,21 +244,21 @@ def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Dia
         if user.node is None or not user.is_run:
             continue
         for name, entry in user.overrides.items():
-            fault, help_text = _find_fault(user.node.parameters.get(name), entry)
-            if fault is None or (id(entry), fault) in seen:
+            problem, help_text = _find_problem(user.node.parameters.get(name), entry)
+            if problem is None or (id(entry), problem) in seen:
                 continue
-            seen.add((id(entry), fault))
+            seen.add((id(entry), problem))
             declared = user.node.parameters.get(name)
             yield diagnostic_at(
                 entry.value_span,
                 'refused-parameter',
-                f"parameter '{name}' of node '{user.full_name}': {fault}",
+                f"parameter '{name}' of node '{user.full_name}': {problem}",
                 help=help_text,
                 related=[context.related(declared.path, 'declared here')] if declared else [],
             )
 
 
-def _find_fault(
+def _find_problem(
     declared: ParameterSpec | None, entry: ParameterEntry
 ) -> tuple[str | None, str | None]:
     """Return why a node would refuse a value, and a help text."""
@@ -272,8 +272,8 @@ def _find_fault(
         return 'parameter files have no byte type', "give them under 'parameters:' of the node"
     if entry.type != wanted:
         got = with_article(entry.type) if entry.type else 'an empty list'
-        fault = f'expected {with_article(wanted)}, and ROS takes this for {got}'
-        return fault, _help_for(wanted, entry)
+        problem = f'expected {with_article(wanted)}, and ROS takes this for {got}'
+        return problem, _help_for(wanted, entry)
     if declared is None:
         return None, None
     return find_refusal(declared, entry.value), find_nearest_choice(declared, entry.value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.ros_parameters.parameter_types import find_type_fault, find_type_faults
+from composer.ros_parameters.parameter_types import find_type_problem, find_type_problems
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -67,10 +67,10 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
         )
         return
     value = parameter.value
-    faults = [] if value is None else list(find_type_faults(value, parameter.type))
-    for item, fault in faults:
-        yield context.at_value((*path, *item), _RULE, f"parameter '{parameter.name}': {fault}")
-    if faults:
+    problems = [] if value is None else list(find_type_problems(value, parameter.type))
+    for item, problem in problems:
+        yield context.at_value((*path, *item), _RULE, f"parameter '{parameter.name}': {problem}")
+    if problems:
         return
     limits = list(_check_limits(context, parameter))
     yield from limits
@@ -105,8 +105,8 @@ def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[D
         if parameter.type not in _NUMERIC:
             message = f"'{key}' is for integers and doubles, and this is a {parameter.type}"
             yield context.at_key(path, _RULE, message)
-        elif fault := find_type_fault(limit, parameter.type):
-            yield context.at_value(path, _RULE, f"'{key}': {fault}")
+        elif problem := find_type_problem(limit, parameter.type):
+            yield context.at_value(path, _RULE, f"'{key}': {problem}")
     low, high = parameter.minimum, parameter.maximum
     if low is not None and high is not None and low > high:
         path = (*parameter.path, 'maximum')
@@ -125,19 +125,19 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
         message = f'choices are for integers, doubles and strings, and this is a {parameter.type}'
         yield context.at_key(path, _RULE, message)
         return
-    faults = {
-        index: fault
+    problems = {
+        index: problem
         for index, choice in enumerate(parameter.choices)
-        if (fault := find_type_fault(choice, parameter.type))
+        if (problem := find_type_problem(choice, parameter.type))
     }
-    if len(faults) == len(parameter.choices) and parameter.value is not None:
+    if len(problems) == len(parameter.choices) and parameter.value is not None:
         # None is of the type of the value, so it is the value that is odd.
         refusal = find_refusal(parameter, parameter.value)
         at = (*parameter.path, 'default')
         yield context.at_value(at, _RULE, f"parameter '{parameter.name}': {refusal}")
         return
-    for index, fault in faults.items():
-        yield context.at_value((*path, index), _RULE, f'choice {index}: {fault}')
+    for index, problem in problems.items():
+        yield context.at_value((*path, index), _RULE, f'choice {index}: {problem}')
 
 
 def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:

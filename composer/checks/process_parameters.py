@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.names import find_parameter_name_fault, with_article
+from composer.names import find_parameter_name_problem, with_article
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
-    find_type_fault,
+    find_type_problem,
     infer_parameter_type,
 )
 
@@ -41,19 +41,19 @@ def _check_mapping(
 ) -> Iterator[Diagnostic]:
     for key, value in values.items():
         at, name = (*path, key), f'{prefix}{key}'
-        if fault := find_parameter_name_fault(name):
-            yield context.at_key(at, 'bad-name', f"'{name}': {fault}")
+        if problem := find_parameter_name_problem(name):
+            yield context.at_key(at, 'bad-name', f"'{name}': {problem}")
         elif isinstance(value, dict) and value:
             yield from _check_mapping(context, value, at, f'{name}.', seen)
         elif name in seen:
             yield context.at_key(at, _RULE, f"the parameter '{name}' is given twice")
         else:
             seen[name] = at
-            for place, message in _find_faults(value):
+            for place, message in _find_problems(value):
                 yield context.at_value((*at, *place), _RULE, f"parameter '{name}': {message}")
 
 
-def _find_faults(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:
+def _find_problems(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:
     """Yield the errors of a value; those of list items with their index."""
     if value is None:
         yield (), _NO_NULL
@@ -61,12 +61,12 @@ def _find_faults(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:
         yield (), 'the mapping is empty, and ROS misreads what follows one'
     elif isinstance(value, list):
         # Integers among doubles become doubles.
-        yield from _find_list_faults(convert_parameter_value(value, infer_parameter_type(value)))
+        yield from _find_list_problems(convert_parameter_value(value, infer_parameter_type(value)))
     else:
-        yield from _find_scalar_faults(value, ())
+        yield from _find_scalar_problems(value, ())
 
 
-def _find_list_faults(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]:
+def _find_list_problems(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]:
     for index, item in enumerate(items):
         if item is None:
             yield (index,), f'item {index}: {_NO_NULL}'
@@ -78,16 +78,16 @@ def _find_list_faults(items: list[Any]) -> Iterator[tuple[tuple[int, ...], str]]
             own, first = (with_article(str(each)) for each in types)
             yield (index,), f'item {index}: a list has one type, and this is {own}, not {first}'
         else:
-            yield from _find_scalar_faults(item, (index,))
+            yield from _find_scalar_problems(item, (index,))
             continue
         # One is enough: what follows may be right or wrong for the same reason.
         return
 
 
-def _find_scalar_faults(
+def _find_scalar_problems(
     value: Any, place: tuple[int, ...]
 ) -> Iterator[tuple[tuple[int, ...], str]]:
     type_name = str(infer_parameter_type(value))
-    fault = find_type_fault(value, type_name)
-    if fault:
-        yield place, fault
+    problem = find_type_problem(value, type_name)
+    if problem:
+        yield place, problem

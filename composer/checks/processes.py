@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from composer.ament import ament_prefixes, list_executables, list_packages
 from composer.checks.names import check_rules
-from composer.names import find_namespace_fault, find_node_name_fault
+from composer.names import find_namespace_problem, find_node_name_problem
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -40,13 +40,13 @@ def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
     path = process.path
-    fault = find_node_name_fault(process.node_name) if process.node_name is not None else None
-    if fault:
-        message = f"'{process.node_name}' cannot name a node: {fault}"
+    problem = find_node_name_problem(process.node_name) if process.node_name is not None else None
+    if problem:
+        message = f"'{process.node_name}' cannot name a node: {problem}"
         yield context.at_value((*path, 'name'), 'bad-name', message)
-    fault = find_namespace_fault(process.namespace) if process.namespace else None
-    if fault:
-        message = f"'{process.namespace}': {fault}"
+    problem = find_namespace_problem(process.namespace) if process.namespace else None
+    if problem:
+        message = f"'{process.namespace}': {problem}"
         yield context.at_value((*path, 'namespace'), 'bad-name', message)
     yield from check_rules(context, process)
 

@@ -23,7 +23,7 @@ _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
 
 
 def differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
-    """Return the policies that differ from the profile `default`; none if the QoS is faulty.
+    """Return the policies that differ from the profile `default`; none if the QoS is invalid.
 
     Topics and services have the same defaults (`rmw/qos_profiles.h`).
 

@@ -10,7 +10,7 @@ from composer.errors import UsageError
 from composer.expressions import is_variable_name
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
-    find_type_fault,
+    find_type_problem,
     infer_parameter_type,
 )
 from composer.spelling import suggest
@@ -149,18 +149,18 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
-        if value is not None and (fault := _find_value_fault(value, argument.type)):
-            yield keys, fault
+        if value is not None and (problem := _find_value_problem(value, argument.type)):
+            yield keys, problem
     if default is not None and choices and default not in choices:
         yield ('default',), f'the default {default!r} is not one of the choices'
 
 
-def _find_value_fault(value: Any, type_name: str) -> str | None:
+def _find_value_problem(value: Any, type_name: str) -> str | None:
     if isinstance(value, list | dict):
         return None  # the schema says so
     if isinstance(value, str) and '{{' in value:
         return 'a declaration cannot hold an expression'
-    return find_type_fault(value, type_name)
+    return find_type_problem(value, type_name)
 
 
 def parse_arguments(
@@ -175,25 +175,25 @@ def parse_arguments(
         UsageError: An argument is unknown, given twice, missing, or of the wrong type; all of
             these that there are.
     """
-    faults: list[str] = []
+    problems: list[str] = []
     given: dict[str, str] = {}
-    for name, text in _assign_words(declared, words, faults):
+    for name, text in _assign_words(declared, words, problems):
         if name not in declared:
             advice = suggest(name, declared)
             hint = f' ({advice})' if advice else ''
-            faults.append(f"there is no argument '{name}'{hint}")
+            problems.append(f"there is no argument '{name}'{hint}")
         elif name in given:
-            faults.append(f"'{name}' is given twice: {given[name]!r} and {text!r}")
+            problems.append(f"'{name}' is given twice: {given[name]!r} and {text!r}")
         else:
             given[name] = text
     values = {name: argument.default for name, argument in declared.items()}
     for name, argument in declared.items():
         if name in given:
-            values[name] = _parse_value(argument, given[name], faults)
+            values[name] = _parse_value(argument, given[name], problems)
         elif argument.default is None:
-            faults.append(f"'{name}' is missing")
-    if faults:
-        raise UsageError('; '.join(faults), help=describe_arguments(declared))
+            problems.append(f"'{name}' is missing")
+    if problems:
+        raise UsageError('; '.join(problems), help=describe_arguments(declared))
     return values, list(given)
 
 
@@ -205,7 +205,7 @@ def describe_arguments(declared: Mapping[str, ArgumentSpec]) -> str:
 
 
 def _assign_words(
-    declared: Mapping[str, ArgumentSpec], words: Sequence[str], faults: list[str]
+    declared: Mapping[str, ArgumentSpec], words: Sequence[str], problems: list[str]
 ) -> Iterator[tuple[str, str]]:
     positions = iter(declared)
     for word in words:
@@ -215,16 +215,16 @@ def _assign_words(
         elif (position := next(positions, None)) is not None:
             yield position, word
         else:
-            faults.append(f"'{word}' is one argument too many")
+            problems.append(f"'{word}' is one argument too many")
 
 
-def _parse_value(argument: ArgumentSpec, text: str, faults: list[str]) -> Any:
+def _parse_value(argument: ArgumentSpec, text: str, problems: list[str]) -> Any:
     value: Any = text if argument.type == 'string' else _parse_text(text, argument.type)
-    fault = find_type_fault(value, argument.type)
-    if fault:
-        faults.append(f"'{argument.name}': {fault}")
+    problem = find_type_problem(value, argument.type)
+    if problem:
+        problems.append(f"'{argument.name}': {problem}")
     elif argument.choices and value not in argument.choices:
-        faults.append(f"'{argument.name}': {text!r} is not one of {_listed(argument.choices)}")
+        problems.append(f"'{argument.name}': {text!r} is not one of {_listed(argument.choices)}")
     return value
 
 

@@ -81,7 +81,7 @@ def _check_declarations(
     declared: Mapping[str, ArgumentSpec], positions: SourceMap
 ) -> Iterable[Diagnostic]:
     for name, argument in declared.items():
-        for key, fault in find_declaration_errors(argument):
+        for key, problem in find_declaration_errors(argument):
             path = ('args', name, *key)
             span = positions.value(path) if key else positions.key(path)
-            yield diagnostic_at(span, 'bad-argument-declaration', fault)
+            yield diagnostic_at(span, 'bad-argument-declaration', problem)

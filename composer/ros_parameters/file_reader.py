@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
-from composer.ros_parameters.node_patterns import find_pattern_fault
+from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader
 from composer.spelling import suggest
@@ -72,7 +72,7 @@ class ParameterFile:
 
     patterns: tuple[tuple[str, Span], ...] = ()
     entries: tuple[ParameterEntry, ...] = ()
-    faults: tuple[Diagnostic, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
 
 
 def read_parameter_file(path: Path, name: str | None = None) -> ParameterFile:
@@ -85,7 +85,7 @@ def read_parameter_file(path: Path, name: str | None = None) -> ParameterFile:
     content = read_content(path, name)
     text = content if isinstance(content, Diagnostic) else decode_content(content, name)
     if isinstance(text, Diagnostic):
-        return ParameterFile(faults=(text,))
+        return ParameterFile(findings=(text,))
     return parse_parameter_file(text, name)
 
 
@@ -95,13 +95,13 @@ def parse_parameter_file(text: str, name: str) -> ParameterFile:
     try:
         trees = compose_trees(text, source, alias_rule=RULE)
     except CompositionError as error:
-        return ParameterFile(faults=(_explain_typo(error.diagnostic),))
+        return ParameterFile(findings=(_explain_typo(error.diagnostic),))
     reader = _Reader()
     # ROS reads several documents as if they were one.
     for tree in trees:
         reader.read_nodes(tree, '')
     reader.check_double_names()
-    return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.faults))
+    return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.findings))
 
 
 class _Reader:
@@ -110,8 +110,8 @@ class _Reader:
     def __init__(self) -> None:
         self.patterns: list[tuple[str, Span]] = []
         self.entries: list[ParameterEntry] = []
-        self.faults: list[Diagnostic] = []
-        self._values = ValueReader(self.faults)
+        self.findings: list[Diagnostic] = []
+        self._values = ValueReader(self.findings)
         # Mappings of names that were entered since the last value.
         self._opened = 0
 
@@ -138,7 +138,7 @@ class _Reader:
                 continue
             ends = is_last and (not prefix or index + 1 == len(node.pairs))
             if '/' in key and prefix and not ends:
-                self._fault(
+                self._report(
                     key_node.span,
                     f"ROS puts the names after '{key}' into another namespace",
                     'write names with slashes at the top of the file, or as the last of a mapping',
@@ -147,7 +147,7 @@ class _Reader:
                 self._refuse_value(value_node, key)
                 continue
             if advice := suggest(key, [PARAMETERS_KEY]):
-                self._fault(
+                self._report(
                     key_node.span,
                     f"'{key}' is not a key of parameter files",
                     advice,
@@ -167,19 +167,19 @@ class _Reader:
         key = self._key(key_node)
         if key != PARAMETERS_KEY:
             message = f"ROS reads '{key}' as '{PARAMETERS_KEY}'"
-            self._fault(key_node.span, message, f"write '{PARAMETERS_KEY}'")
+            self._report(key_node.span, message, f"write '{PARAMETERS_KEY}'")
         if place is None:
             message = f"'{PARAMETERS_KEY}' belongs below the name of a node"
-            self._fault(key_node.span, message, _SHAPE_HELP)
-        elif fault := find_pattern_fault(pattern):
-            self._fault(place, f"'{pattern}': {fault}")
+            self._report(key_node.span, message, _SHAPE_HELP)
+        elif problem := find_pattern_problem(pattern):
+            self._report(place, f"'{pattern}': {problem}")
         elif not is_last_key:
             message = f"ROS misreads the names that follow '{PARAMETERS_KEY}'"
-            self._fault(key_node.span, message, 'write it last, or each node at the top')
+            self._report(key_node.span, message, 'write it last, or each node at the top')
         elif not isinstance(node, MappingNode):
             message = f"'{PARAMETERS_KEY}' must be a mapping of parameters"
             help_text = _help_for(node) or 'write {} if there are none'
-            self._fault(node.span, message, help_text)
+            self._report(node.span, message, help_text)
         else:
             self.patterns.append((pattern, place))
             self._read_parameters(node, pattern, place, (), is_last=True)
@@ -202,7 +202,7 @@ class _Reader:
                 self._check_names(key_node, key, value_node)
                 ends = is_last and (not outer or index + 1 == len(node.pairs))
                 if '.' in key and outer and not ends:
-                    self._fault(
+                    self._report(
                         key_node.span,
                         f"ROS reads what follows '{key}' as a part of it",
                         'write nested keys instead of the dot',
@@ -238,37 +238,37 @@ class _Reader:
         for entry in self.entries:
             if (entry.pattern, entry.name) in mappings:
                 message = f"'{entry.name}' has both a value and names below it"
-                self._fault(entry.key_span, message, 'ROS loses one of them: rename it')
+                self._report(entry.key_span, message, 'ROS loses one of them: rename it')
 
     def _check_names(self, key_node: TreeNode, key: str, node: MappingNode) -> None:
         if not node.pairs:
-            self._fault(
+            self._report(
                 key_node.span,
                 f"'{key}' is an empty mapping, and ROS misreads what follows it",
                 'remove it',
             )
         elif key.startswith(PARAMETERS_KEY):
             message = f"'{PARAMETERS_KEY}' is inside another '{PARAMETERS_KEY}'"
-            self._fault(key_node.span, message, 'put it below the name of a node')
+            self._report(key_node.span, message, 'put it below the name of a node')
 
     def _key(self, node: TreeNode) -> str | None:
         if isinstance(node, ScalarNode) and node.text:
             return node.text.split('\0')[0]
         is_empty = isinstance(node, ScalarNode)
         what = 'and this one is empty' if is_empty else 'not a list or a mapping'
-        self._fault(node.span, f'a key must be a string, {what}')
+        self._report(node.span, f'a key must be a string, {what}')
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:
         if advice := suggest(key, [PARAMETERS_KEY]):
             message = f"'{key}' is not a key of parameter files"
-            self._fault(node.span, message, advice)
+            self._report(node.span, message, advice)
             return
         help_text = _help_for(node) or _SHAPE_HELP
-        self._fault(node.span, f"this value has no '{PARAMETERS_KEY}' above it", help_text)
+        self._report(node.span, f"this value has no '{PARAMETERS_KEY}' above it", help_text)
 
-    def _fault(self, span: Span, message: str, help_text: str | None = None) -> None:
-        self.faults.append(diagnostic_at(span, RULE, message, help=help_text))
+    def _report(self, span: Span, message: str, help_text: str | None = None) -> None:
+        self.findings.append(diagnostic_at(span, RULE, message, help=help_text))
 
 
 def _join(prefix: str, key: str) -> str:

@@ -8,12 +8,12 @@ rclpy (`rclpy/src/rclpy/node.cpp`).
 
 from __future__ import annotations
 
-from composer.names import find_namespace_fault, find_node_name_fault
+from composer.names import find_namespace_problem, find_node_name_problem
 
 _ONE, _ANY = '*', '**'
 
 
-def find_pattern_fault(pattern: str) -> str | None:
+def find_pattern_problem(pattern: str) -> str | None:
     """Return why rcl refuses a file with such a name of nodes, or `None` if it does not."""
     if pattern in ('/**', '/*'):
         return None
@@ -21,13 +21,13 @@ def find_pattern_fault(pattern: str) -> str | None:
     for part in namespace.removeprefix('/').split('/') if namespace.strip('/') else ():
         if not part:
             return 'a name has no two slashes in a row'
-        fault = None if part in (_ONE, _ANY) else find_namespace_fault(f'/{part}')
-        if fault:
-            return _add_wildcards(fault, part)
+        problem = None if part in (_ONE, _ANY) else find_namespace_problem(f'/{part}')
+        if problem:
+            return _add_wildcards(problem, part)
     if namespace and not namespace.strip('/'):
         return 'a name has no two slashes in a row'
-    fault = None if name in (_ONE, _ANY) else find_node_name_fault(name)
-    return _add_wildcards(fault, name) if fault else None
+    problem = None if name in (_ONE, _ANY) else find_node_name_problem(name)
+    return _add_wildcards(problem, name) if problem else None
 
 
 def matches_pattern(pattern: str, full_name: str) -> bool:
@@ -50,5 +50,5 @@ def matches_pattern(pattern: str, full_name: str) -> bool:
     return len(names) in reached
 
 
-def _add_wildcards(fault: str, part: str) -> str:
-    return f"{fault}; '*' and '**' must be alone between slashes" if '*' in part else fault
+def _add_wildcards(problem: str, part: str) -> str:
+    return f"{problem}; '*' and '**' must be alone between slashes" if '*' in part else problem

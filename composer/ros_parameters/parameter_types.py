@@ -47,39 +47,39 @@ def convert_parameter_value(value: Any, type_name: str | None) -> Any:
     return value
 
 
-def find_type_fault(value: Any, type_name: str) -> str | None:
+def find_type_problem(value: Any, type_name: str) -> str | None:
     """Return why a value is not of a parameter type, or `None` if it is."""
-    return next((fault for _, fault in find_type_faults(value, type_name)), None)
+    return next((problem for _, problem in find_type_problems(value, type_name)), None)
 
 
-def find_type_faults(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ...], str]]:
+def find_type_problems(value: Any, type_name: str) -> Iterator[tuple[tuple[int, ...], str]]:
     """Yield why a value is not of a parameter type; for an item, with its index."""
     item_type = type_name.removesuffix('_array')
     if item_type == type_name:
-        if fault := _find_scalar_fault(value, type_name):
-            yield (), fault
+        if problem := _find_scalar_problem(value, type_name):
+            yield (), problem
     elif not isinstance(value, list):
         yield (), f'expected a list of {item_type} values, got {value!r}'
     else:
         for index, item in enumerate(value):
-            if fault := _find_item_fault(item, item_type):
-                yield (index,), f'item {index}: {fault}'
+            if problem := _find_item_problem(item, item_type):
+                yield (index,), f'item {index}: {problem}'
 
 
-def _find_item_fault(item: Any, item_type: str) -> str | None:
-    fault = _find_scalar_fault(item, 'integer' if item_type == 'byte' else item_type)
-    if fault is None and item_type == 'byte' and not 0 <= item <= _BYTE_MAX:
+def _find_item_problem(item: Any, item_type: str) -> str | None:
+    problem = _find_scalar_problem(item, 'integer' if item_type == 'byte' else item_type)
+    if problem is None and item_type == 'byte' and not 0 <= item <= _BYTE_MAX:
         return f'expected a byte (0 to {_BYTE_MAX}), got {item}'
-    return fault
+    return problem
 
 
-def _find_scalar_fault(value: Any, type_name: str) -> str | None:
+def _find_scalar_problem(value: Any, type_name: str) -> str | None:
     if _SCALARS.get(type(convert_parameter_value(value, type_name))) != type_name:
         return f'expected {with_article(type_name)}, got {value!r}'
-    return _find_width_fault(value, type_name)
+    return _find_width_problem(value, type_name)
 
 
-def _find_width_fault(value: Any, type_name: str) -> str | None:
+def _find_width_problem(value: Any, type_name: str) -> str | None:
     if type_name == 'integer' and not INT64_MIN <= value <= INT64_MAX:
         return f'{value} does not fit in 64 bits'
     return None

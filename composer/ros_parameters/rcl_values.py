@@ -52,26 +52,26 @@ _MAX_LENGTH = 1000
 
 def parse_override(text: str) -> tuple[Any, str | None] | None:
     """Return the value after `:=` on a command line, and its type; `None` if rcl refuses it."""
-    faults: list[Diagnostic] = []
+    findings: list[Diagnostic] = []
     try:
         trees = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
     except CompositionError:
         return None
     if len(trees) != 1 or isinstance(trees[0], MappingNode):
         return None
-    value = ValueReader(faults).read(trees[0])
-    return None if faults else (value, infer_parameter_type(value))
+    value = ValueReader(findings).read(trees[0])
+    return None if findings else (value, infer_parameter_type(value))
 
 
 class ValueReader:
     """Reads values.
 
     Args:
-        faults: Findings are added to it.
+        findings: Findings are added to it.
     """
 
-    def __init__(self, faults: list[Diagnostic]) -> None:
-        self._faults = faults
+    def __init__(self, findings: list[Diagnostic]) -> None:
+        self._findings = findings
 
     def read(self, node: TreeNode, key: str = '') -> Any:
         """Return a value, `None` if rcl refuses it.
@@ -84,10 +84,10 @@ class ValueReader:
                 return read_scalar(node)
             where = f"'{key}' has no value" if key else 'there is no value'
             help_text = "write '' for an empty string; ROS has no null"
-            self._fault(node.span, where, help_text)
+            self._report(node.span, where, help_text)
             return None
         if isinstance(node, MappingNode):
-            self._fault(node.span, 'a list of parameters cannot contain mappings')
+            self._report(node.span, 'a list of parameters cannot contain mappings')
             return None
         return self._read_list(node)
 
@@ -95,7 +95,7 @@ class ValueReader:
         values: list[Any] = []
         for item in node.items:
             if isinstance(item, SequenceNode):
-                self._fault(
+                self._report(
                     item.span, 'a list of parameters cannot contain lists', 'write one flat list'
                 )
                 return None
@@ -104,7 +104,7 @@ class ValueReader:
                 return None
             if values and type(value) is not type(values[0]):
                 first, other = (infer_parameter_type(each) for each in (values[0], value))
-                self._fault(
+                self._report(
                     item.span,
                     f'all items of a list have one type: this is {with_article(str(other))}, '
                     f'the first is {with_article(str(first))}',
@@ -114,8 +114,8 @@ class ValueReader:
             values.append(value)
         return values
 
-    def _fault(self, span: Span, message: str, help_text: str | None = None) -> None:
-        self._faults.append(diagnostic_at(span, RULE, message, help=help_text))
+    def _report(self, span: Span, message: str, help_text: str | None = None) -> None:
+        self._findings.append(diagnostic_at(span, RULE, message, help=help_text))
 
 
 def _help_for_mixture(first: Any, other: Any) -> str | None:

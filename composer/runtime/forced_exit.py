@@ -1,6 +1,6 @@
 """Ends the process at once: by Python, or without it where no Python code runs any more.
 
-A call into C that keeps the interpreter's lock (of `ctypes.PyDLL`, or of a faulty extension)
+A call into C that keeps the interpreter's lock (of `ctypes.PyDLL`, or of a broken extension)
 stops every thread of Python, also the one that handles signals. Then only a thread of
 `faulthandler`, written in C, and the kernel's default actions for signals still work.
 """

@@ -40,12 +40,12 @@ def construct_data(
     """
     constructor = _Constructor(positions)
     data = None if root is None else constructor.construct(root, ())
-    return data, tuple(constructor.faults)
+    return data, tuple(constructor.findings)
 
 
 class _Constructor:
     def __init__(self, positions: SourceMap) -> None:
-        self.faults: list[Diagnostic] = []
+        self.findings: list[Diagnostic] = []
         self._keys = positions.keys
         self._values = positions.values
         self._count = 0
@@ -60,7 +60,7 @@ class _Constructor:
             self._stop(node.span, 'too-deep', f'aliases nest more than {MAX_DEPTH} levels deep')
         wanted = TAG_MAP if isinstance(node, MappingNode) else TAG_SEQ
         if node.tag not in (None, wanted):
-            self._fault(node, 'bad-tag', f'a {short_tag(node.tag or "")} is not allowed here')
+            self._report(node, 'bad-tag', f'a {short_tag(node.tag or "")} is not allowed here')
         if isinstance(node, SequenceNode):
             return [self.construct(item, (*path, index)) for index, item in enumerate(node.items)]
         return self._mapping(node, path)
@@ -77,7 +77,7 @@ class _Constructor:
                 return parse_tagged_scalar(node.text, node.tag)
             return parse_plain_scalar(node.text) if node.plain else node.text
         except ScalarError as error:
-            self._fault(node, 'bad-scalar', str(error))
+            self._report(node, 'bad-scalar', str(error))
             return node.text
 
     def _mapping(self, node: MappingNode, path: DataPath) -> dict[str, Any]:
@@ -112,12 +112,12 @@ class _Constructor:
             template = isinstance(node, MappingNode)
             quoting = 'put an expression in quotes: "{{ name }}"' if template else None
             message = 'a key must be a string, not a list or a mapping'
-            self._fault(node, 'bad-key', message, help=quoting)
+            self._report(node, 'bad-key', message, help=quoting)
             return None
         if not node.text:
-            self._fault(node, 'bad-key', 'a key must be a string, and this one is empty')
+            self._report(node, 'bad-key', 'a key must be a string, and this one is empty')
             return None
-        self._fault(
+        self._report(
             node,
             'bad-key',
             f'a key must be a string, and {node.text} is not',
@@ -127,7 +127,7 @@ class _Constructor:
 
     def _duplicate(self, key: str, node: TreeNode, span: Span) -> None:
         first = Related('first used here', span)
-        self.faults.append(
+        self.findings.append(
             diagnostic_at(
                 node.span,
                 'duplicate-key',
@@ -147,7 +147,7 @@ class _Constructor:
         parts = node.items if isinstance(node, SequenceNode) else [node]
         for part in parts:
             if not isinstance(part, MappingNode):
-                self._fault(
+                self._report(
                     part, 'bad-merge', 'the merge key << takes a mapping, or a list of them'
                 )
                 continue
@@ -161,8 +161,8 @@ class _Constructor:
             data.update(self._mapping(merged, path))
         self._merging -= 1
 
-    def _fault(self, node: TreeNode, rule: str, message: str, help: str | None = None) -> None:  # noqa: A002
-        self.faults.append(diagnostic_at(node.span, rule, message, help=help))
+    def _report(self, node: TreeNode, rule: str, message: str, help: str | None = None) -> None:  # noqa: A002
+        self.findings.append(diagnostic_at(node.span, rule, message, help=help))
 
     def _stop(self, span: Span, rule: str, message: str) -> None:
         raise CompositionError(diagnostic_at(span, rule, message))

@@ -65,11 +65,11 @@ def parse_document(content: bytes, name: str) -> Document:
     positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
     try:
         tree = compose_tree(text, positions.source)
-        data, faults = construct_data(tree, positions)
+        data, findings = construct_data(tree, positions)
     except CompositionError as error:
         return Document(None, positions, [error.diagnostic])
     if isinstance(data, dict):
-        return Document(data, positions, [*faults])
+        return Document(data, positions, [*findings])
     if tree is None:
         return _without_data(
             _unreadable(name, 'the file is empty', help="begin with 'version: 1'")
@@ -81,7 +81,7 @@ def parse_document(content: bytes, name: str) -> Document:
         tree.span,
         help="begin with 'version: 1'",
     )
-    return Document(None, positions, [*faults, top])
+    return Document(None, positions, [*findings, top])
 
 
 def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:  # noqa: A002

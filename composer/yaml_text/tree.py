@@ -93,9 +93,9 @@ def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> list[TreeN
         for event in yaml.parse(text, Loader=_Loader):
             builder.take(event)
     except yaml.MarkedYAMLError as error:
-        raise CompositionError(_syntax_fault(error, source)) from error
+        raise CompositionError(_syntax_problem(error, source)) from error
     except yaml.reader.ReaderError as error:
-        raise CompositionError(_character_fault(error, text, source)) from error
+        raise CompositionError(_character_problem(error, text, source)) from error
     except yaml.YAMLError as error:
         raise CompositionError(
             diagnostic_at(Span(source, 1, 1, 0), 'yaml-syntax', f'this is not YAML: {error}')
@@ -192,7 +192,7 @@ class _TreeBuilder:
         raise CompositionError(diagnostic_at(self._span(event), rule, message))
 
 
-def _syntax_fault(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
+def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
     mark = error.problem_mark or error.context_mark
     span = Span(source, mark.line + 1, mark.column + 1) if mark else Span(source, 1, 1, 0)
     problem = error.problem or error.context or 'it cannot be parsed'
@@ -215,7 +215,9 @@ def _syntax_help(span: Span) -> str | None:
     return None
 
 
-def _character_fault(error: yaml.reader.ReaderError, text: str, source: SourceFile) -> Diagnostic:
+def _character_problem(
+    error: yaml.reader.ReaderError, text: str, source: SourceFile
+) -> Diagnostic:
     # The position in the error counts bytes or characters, depending on the parser.
     found = yaml.reader.Reader.NON_PRINTABLE.search(text)
     before = f'{text[: found.start()]}^'.splitlines() if found else ['^']

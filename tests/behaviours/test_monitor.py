@@ -59,7 +59,7 @@ def test_topics_of_one_node_are_watched_apart(behaviour_node, set_time):
     assert (next(scans), next(images)) == (False, True)
 
 
-def test_diagnostics_tell_rate_age_and_fault(behaviour_node, set_time):
+def test_diagnostics_tell_rate_age_and_finding(behaviour_node, set_time):
     watched = Watched(behaviour_node, set_time, diagnose, minimum_rate=5.0, maximum_age=2.0)
     watched.tick()
     told = []

@@ -1,4 +1,4 @@
-"""Of one fault one thing is said, and not what follows from it."""
+"""Of one finding one thing is said, and not what follows from it."""
 
 import pytest
 
@@ -37,7 +37,7 @@ def spoil(text, before, after):
         ('{chatter: std_msgs/msg/String}', '{chatter: std_msgs/msg/Strin}', 'unknown-type'),
     ],
 )
-def test_a_fault_is_said_alone(check, before, after, rule):
+def test_a_finding_is_said_alone(check, before, after, rule):
     found = check(spoil(SYSTEM, before, after), CODE)
     assert [each for _, each in found] == [rule]
 
@@ -110,7 +110,7 @@ def test_a_qos_with_an_unknown_profile_matches_everything(check, qos):
 
 
 @pytest.mark.parametrize('value', ['-1', 'soon', '[1]'])
-def test_a_qos_with_a_fault_in_its_profile_matches_everything(check, value):
+def test_a_qos_with_a_finding_in_its_profile_matches_everything(check, value):
     before = f'qos: {{kept: {{deadline: {value}, depth: 3}}}}\n'
     nodes = spoil(SYSTEM, '{chatter: std_msgs/msg/String}', '{chatter: {type: std_msgs/msg/String, qos: kept}}')  # fmt: skip
     nodes = spoil(nodes, 'behaviour: parts', 'qos: {deadline: 1}, behaviour: parts')
@@ -125,7 +125,7 @@ def test_packages_of_interfaces_that_cannot_be_read_are_not_missed(check, interf
     assert check(nodes, CODE, before=f'interfaces: {interfaces}\n') == [(2, 'wrong-type')]
 
 
-def test_a_process_with_a_fault_is_there(check):
+def test_a_process_with_a_finding_is_there(check):
     nodes = """
   n:
     wait_for: {process: driver}
@@ -135,7 +135,7 @@ processes:
     assert [rule for _, rule in check(nodes)] == ['out-of-range']
 
 
-def test_a_module_that_is_not_python_is_one_fault(check):
+def test_a_module_that_is_not_python_is_one_finding(check):
     nodes = """
   n:
     timers:

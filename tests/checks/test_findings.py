@@ -25,7 +25,7 @@ CASES = sorted(path.stem for path in INVALID.glob('*.yaml'))
 NEED_INTERFACES = {
     'field-range',
     'field-type',
-    'many_faults',
+    'many_findings',
     'unknown-field',
     'unknown-type',
 }
@@ -60,14 +60,14 @@ def test_everything_that_is_wrong_is_said_in_one_run(case, monkeypatch):
     assert render(case, monkeypatch) == expected
 
 
-@pytest.mark.parametrize('case', sorted(set(CASES) - {'many_faults'}))
+@pytest.mark.parametrize('case', sorted(set(CASES) - {'many_findings'}))
 def test_a_case_shows_the_rule_that_it_is_named_after(case):
     text = (INVALID / f'{case}.txt').read_text()
     assert re.search(rf': (error|warning)\[{case}\]: ', text)
 
 
-def test_many_different_faults_are_found_at_once():
-    text = (INVALID / 'many_faults.txt').read_text()
+def test_many_different_findings_are_found_at_once():
+    text = (INVALID / 'many_findings.txt').read_text()
     assert len(set(re.findall(r'error\[([\w-]+)\]', text))) >= 10
     assert len(re.findall(r'error\[', text)) >= 15
 
@@ -78,7 +78,7 @@ def test_nothing_is_said_of_a_valid_file(path):
     assert [render_finding(finding) for finding in findings] == []
 
 
-@pytest.mark.parametrize('case', sorted(NEED_INTERFACES - {'many_faults'}))
+@pytest.mark.parametrize('case', sorted(NEED_INTERFACES - {'many_findings'}))
 def test_without_ros_types_are_taken_as_they_are(case, monkeypatch):
     nothing_installed = InterfaceCatalogue(prefixes=[])
     assert render(case, monkeypatch, nothing_installed) == '\n'

@@ -113,7 +113,7 @@ def test_a_comment_about_a_type_that_is_there_is_unused(check):
     assert [finding[1:3] for finding in check(text)] == [('unused-ignore', 5)]
 
 
-def test_while_faults_hide_others_no_comment_is_called_unused(check):
+def test_while_findings_hide_others_no_comment_is_called_unused(check):
     found = check(
         '    log_levl: info\n    on_start: driving:start  # composer: ignore[bad-name]\n'
     )

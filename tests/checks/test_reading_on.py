@@ -55,7 +55,7 @@ FOUND = {
 
 
 @pytest.mark.ros
-def test_a_fault_hides_no_other(tmp_path):
+def test_a_finding_hides_no_other(tmp_path):
     path = tmp_path / 'rover.yaml'
     path.write_text(TEXT)
     found = {}

@@ -24,7 +24,7 @@ WARNED = 'version: 1\nnodes: {}  # composer: ignore[bad-name]\n'
 def run(capsys, tmp_path, monkeypatch):
     """Return exit code, standard output and standard error of a check in an own folder."""
     monkeypatch.chdir(tmp_path)
-    for name, text in (('right', RIGHT), ('faulty', FAULTY), ('warned', WARNED)):
+    for name, text in (('right', RIGHT), ('invalid', FAULTY), ('warned', WARNED)):
         (tmp_path / f'{name}.yaml').write_text(text)
 
     def run(*arguments):
@@ -43,10 +43,10 @@ def feed(monkeypatch, content):
 
 
 def test_all_errors_of_all_files_are_found_in_one_run(run):
-    code, out, err = run('faulty.yaml', 'right.yaml', 'missing.yaml', '*.yml', 'nowhere*')
+    code, out, err = run('invalid.yaml', 'right.yaml', 'missing.yaml', '*.yml', 'nowhere*')
     assert code == 1
-    assert 'faulty.yaml:2:9: error[bad-name]: ' in out
-    assert 'faulty.yaml:2:26: error[bad-value]: ' in out
+    assert 'invalid.yaml:2:9: error[bad-name]: ' in out
+    assert 'invalid.yaml:2:26: error[bad-value]: ' in out
     assert 'missing.yaml: error[unreadable-file]: ' in out
     assert '*.yml: error[nothing-to-check]: no file matches this pattern' in out
     assert 'right.yaml: ok, 1 node\n' in out
@@ -57,7 +57,7 @@ def test_a_folder_is_searched(run):
     code, out, _ = run('.', '-q')
     assert code == 1
     assert {line.partition(':')[0] for line in out.splitlines() if 'error[' in line} == {
-        'faulty.yaml'
+        'invalid.yaml'
     }
 
 
@@ -96,7 +96,7 @@ def test_other_files_can_be_skipped(run, tmp_path):
 
 def test_quiet_says_what_is_wrong_and_nothing_else(run):
     assert run('right.yaml', '--quiet') == (0, '', '')
-    code, out, err = run('faulty.yaml', 'right.yaml', '-q')
+    code, out, err = run('invalid.yaml', 'right.yaml', '-q')
     assert (code, err) == (1, '')
     assert out.count('error[') == 2
     assert 'ok' not in out
@@ -104,16 +104,16 @@ def test_quiet_says_what_is_wrong_and_nothing_else(run):
 
 @pytest.mark.parametrize('name', ['json', 'sarif', 'junit', 'github', 'text'])
 def test_a_report_goes_to_standard_output(run, name):
-    code, out, err = run('faulty.yaml', '--format', name)
+    code, out, err = run('invalid.yaml', '--format', name)
     assert code == 1
     assert 'bad-name' in out
     assert err == '2 errors in 1 file\n'
 
 
 def test_a_report_goes_to_a_file_and_text_to_the_terminal(run, tmp_path):
-    code, out, err = run('faulty.yaml', '--format', 'junit', '--output', 'report.xml')
+    code, out, err = run('invalid.yaml', '--format', 'junit', '--output', 'report.xml')
     assert (code, err) == (1, '2 errors in 1 file\n')
-    assert out.startswith('faulty.yaml:2:9: error[bad-name]: ')
+    assert out.startswith('invalid.yaml:2:9: error[bad-name]: ')
     assert ET.parse(tmp_path / 'report.xml').getroot().get('failures') == '1'
 
 
@@ -126,8 +126,8 @@ def test_a_report_that_cannot_be_written_is_an_error(run):
 
 
 def test_paths_of_reports_are_relative_to_the_working_folder(run, tmp_path):
-    _, out, _ = run(tmp_path / 'faulty.yaml', '--format', 'json')
-    assert {finding['file'] for finding in json.loads(out)['findings']} == {'faulty.yaml'}
+    _, out, _ = run(tmp_path / 'invalid.yaml', '--format', 'json')
+    assert {finding['file'] for finding in json.loads(out)['findings']} == {'invalid.yaml'}
 
 
 def test_a_machine_reads_what_was_not_checked(run, monkeypatch, tmp_path):
@@ -143,7 +143,7 @@ def in_a_terminal(folder, **variables):
     """Return what a check writes to a terminal."""
     master, slave = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, '-m', 'composer', 'check', 'faulty.yaml'],
+        [sys.executable, '-m', 'composer', 'check', 'invalid.yaml'],
         cwd=folder,
         env=os.environ | {'PYTHONPATH': str(ROOT), 'TERM': 'xterm', **variables},
         stdout=slave,
@@ -186,29 +186,29 @@ def test_warnings_count_when_that_is_asked_for(run):
 
 
 def test_errors_and_warnings_are_counted_apart(run):
-    _, _, err = run('warned.yaml', 'faulty.yaml')
+    _, _, err = run('warned.yaml', 'invalid.yaml')
     assert err == '2 errors and 1 warning in 2 files\n'
 
 
 def test_ignored_rules_are_left_out(run):
-    code, out, err = run('faulty.yaml', '--ignore', 'bad-name')
+    code, out, err = run('invalid.yaml', '--ignore', 'bad-name')
     assert (code, err) == (1, '1 error in 1 file\n')
     assert 'bad-name' not in out
     ignored = ('--ignore', 'bad-name', '--ignore', 'bad-value')
-    assert run('faulty.yaml', *ignored) == (0, 'faulty.yaml: ok, 1 node\n', '')
+    assert run('invalid.yaml', *ignored) == (0, 'invalid.yaml: ok, 1 node\n', '')
 
 
 def test_an_expectation_passes_if_exactly_these_rules_fire(run):
     expected = ('--expect', 'bad-name', '--expect', 'bad-value')
-    code, out, err = run('faulty.yaml', *expected)
+    code, out, err = run('invalid.yaml', *expected)
     assert code == 0
     assert out.count('error[') == 2
     assert err == '2 errors in 1 file\nas expected: bad-name, bad-value\n'
-    assert run('faulty.yaml', '-q', *expected)[2] == ''
+    assert run('invalid.yaml', '-q', *expected)[2] == ''
 
 
 def test_an_expectation_fails_if_other_rules_fire(run):
-    code, _, err = run('faulty.yaml', '--expect', 'bad-name', '--expect', 'bad-key')
+    code, _, err = run('invalid.yaml', '--expect', 'bad-name', '--expect', 'bad-key')
     assert code == 1
     assert err.splitlines()[1:] == [
         "expected 'bad-key', which found nothing",
@@ -220,10 +220,10 @@ def test_an_expectation_fails_if_other_rules_fire(run):
 
 @pytest.mark.parametrize('option', ['--ignore', '--expect'])
 def test_an_unknown_rule_is_wrong_usage(run, option):
-    code, out, err = run('faulty.yaml', option, 'bad-nam')
+    code, out, err = run('invalid.yaml', option, 'bad-nam')
     assert (code, out) == (2, '')
     assert "there is no rule 'bad-nam'\n  help: did you mean 'bad-name'?" in err
-    code, out, err = run('faulty.yaml', option, 'qqqqqq')
+    code, out, err = run('invalid.yaml', option, 'qqqqqq')
     assert code == 2
     assert "there is no rule 'qqqqqq'\n  help: 'composer explain' lists them" in err
 

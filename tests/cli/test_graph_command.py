@@ -60,7 +60,7 @@ def test_a_format_that_is_named_wins(robot):
     assert json.loads((robot / 'robot.dot').read_text())['name'] == 'robot'
 
 
-def test_a_faulty_file_is_drawn(robot, capsys):
+def test_a_invalid_file_is_drawn(robot, capsys):
     (robot / 'robot.yaml').write_text('version: 1\nnodes: {n: {log_levl: debug}}\n')
     assert run(['graph', 'robot.yaml']) == 0
     assert "error: unknown key 'log_levl'" in capsys.readouterr().out.replace('<br/>', ' ')

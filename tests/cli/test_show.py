@@ -96,7 +96,7 @@ def test_it_lists_the_arguments(robot, capsys):
     )
 
 
-def test_a_faulty_file_is_not_shown(robot, capsys):
+def test_a_invalid_file_is_not_shown(robot, capsys):
     (robot / 'robot.yaml').write_text('version: 1\nnodes: {n: {log_levl: debug}}\n')
     assert run(['show', 'robot.yaml']) == 1
     captured = capsys.readouterr()

@@ -245,7 +245,7 @@ def test_what_is_wrong_with_a_behaviour_marks_its_node(draw):
     assert marked(describe_picture(draw(text))) == {'node:/a': ['unknown-behaviour']}
 
 
-def test_a_faulty_part_does_not_keep_the_rest_from_being_drawn(draw):
+def test_a_invalid_part_does_not_keep_the_rest_from_being_drawn(draw):
     document = describe_picture(draw(UNMATCHED.replace('rate: 1', 'rat: 1', 1)))
     assert 'unknown-key' in marked(document)['node:/talker']
     assert len(document['edges']) == 4

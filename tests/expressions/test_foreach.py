@@ -208,6 +208,6 @@ nodes:
     assert names(system) == ['wheel_0', 'wheel_1']
 
 
-def test_arguments_that_are_no_mapping_are_one_fault():
+def test_arguments_that_are_no_mapping_are_one_finding():
     system = load('args: [a, b]\nnodes: {n: {log_level: "{{ a }}", on_error: "{{ b }}"}}\n')
     assert [each.rule for each in system.diagnostics] == ['wrong-type']

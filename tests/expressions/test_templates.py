@@ -1,4 +1,4 @@
-"""Expressions inside scalars: what they may be, what they give, and where their faults are."""
+"""Expressions inside scalars: what they may be, what they give, and where their findings are."""
 
 import json
 import random
@@ -32,7 +32,7 @@ def value(scalar):
     return loaded.spec.nodes['n'].state['x']
 
 
-def faults(state):
+def findings(state):
     return [
         (each.rule, each.message, f'{each.span.line}:{each.span.column}', each.span.text)
         for each in load(state).diagnostics
@@ -110,7 +110,7 @@ def test_what_lies_below_a_filled_key_keeps_its_place():
 
 
 def test_a_filled_key_that_is_there_already_is_a_duplicate():
-    ((rule, message, place, text),) = faults('{rover: 1, "{{ name }}": 2}')
+    ((rule, message, place, text),) = findings('{rover: 1, "{{ name }}": 2}')
     assert (rule, message) == ('duplicate-key', "the key 'rover' appears twice in one mapping")
     assert (place, text) == ('7:18', '"{{ name }}"')
 
@@ -131,9 +131,9 @@ def test_a_filled_key_that_is_there_already_is_a_duplicate():
 )
 def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
     if name is None:
-        assert [each[0] for each in faults(state)] == ['bad-key']
+        assert [each[0] for each in findings(state)] == ['bad-key']
         return
-    assert faults(state) == [('undefined-name', f"'{name}' is not defined", place, name)]
+    assert findings(state) == [('undefined-name', f"'{name}' is not defined", place, name)]
 
 
 def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
@@ -160,7 +160,7 @@ def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
     ],
 )
 def test_ways_out_of_the_sandbox_are_closed(expression):
-    ((rule, message, *_),) = faults(f'x: "{{{{ {expression} }}}}"')
+    ((rule, message, *_),) = findings(f'x: "{{{{ {expression} }}}}"')
     assert rule == 'bad-expression'
     assert 'unsafe' in message or 'has no attribute' in message or 'undefined' in message
 
@@ -169,7 +169,7 @@ def test_ways_out_of_the_sandbox_are_closed(expression):
     'name', ['self', 'lipsum(1)', 'cycler(1).next()', 'dict(a=1)', 'open', 'undefined']
 )
 def test_nothing_is_in_scope_that_is_not_promised(name):
-    assert [each[0] for each in faults(f'x: "{{{{ {name} }}}}"')] != []
+    assert [each[0] for each in findings(f'x: "{{{{ {name} }}}}"')] != []
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_nothing_is_in_scope_that_is_not_promised(name):
     ],
 )
 def test_an_expression_that_fails_says_why(expression, message):
-    ((rule, found, place, _),) = faults(
+    ((rule, found, place, _),) = findings(
         f"x: '{{{{ {expression.replace(chr(39), chr(39) * 2)} }}}}'"
     )
     assert (rule, place) == ('bad-expression', '7:10')
@@ -202,8 +202,8 @@ def test_an_expression_that_fails_says_why(expression, message):
 @pytest.mark.parametrize(
     'text', ['{{', 'a {{ b', '{{ "', '{{ (', '{{ count }', '{{{ count }}', '{{ }} }}']
 )
-def test_an_expression_without_an_end_or_a_beginning_is_a_fault_not_a_crash(text):
-    assert [each[0] for each in faults(f"x: '{text}'")] == ['bad-expression']
+def test_an_expression_without_an_end_or_a_beginning_is_a_finding_not_a_crash(text):
+    assert [each[0] for each in findings(f"x: '{text}'")] == ['bad-expression']
 
 
 def test_no_odd_text_is_a_crash():
@@ -216,7 +216,7 @@ def test_no_odd_text_is_a_crash():
         assert {each.rule for each in loaded.diagnostics} <= {'bad-expression', 'undefined-name'}
 
 
-def test_what_could_not_be_evaluated_is_left_out_and_causes_no_more_faults():
+def test_what_could_not_be_evaluated_is_left_out_and_causes_no_more_findings():
     text = (
         'version: 1\nnodes: {n: {log_level: "{{ a }}", publishers: {p: "{{ b }}"}, '
         'parameters: {q: {default: [1, "{{ c }}"], type: integer_array}}, '
@@ -316,9 +316,9 @@ def test_editors_and_composer_agree_that_declarations_hold_no_expressions():
 
 @pytest.mark.parametrize('expression', ['range(conut)', 'range(2, conut)', 'env(conut)'])
 def test_an_undefined_name_in_a_call_is_one(expression):
-    (fault,) = load(f'x: "{{{{ {expression} }}}}"').diagnostics
-    assert (fault.rule, fault.message) == ('undefined-name', "'conut' is not defined")
-    assert fault.help == "did you mean 'count'?"
+    (finding,) = load(f'x: "{{{{ {expression} }}}}"').diagnostics
+    assert (finding.rule, finding.message) == ('undefined-name', "'conut' is not defined")
+    assert finding.help == "did you mean 'count'?"
 
 
 @pytest.mark.parametrize(
@@ -330,5 +330,5 @@ def test_an_undefined_name_in_a_call_is_one(expression):
     ],
 )
 def test_a_filter_or_test_that_is_not_there_comes_with_the_nearest(expression, message):
-    ((rule, said, *_),) = faults(f'x: "{{{{ {expression} }}}}"')
+    ((rule, said, *_),) = findings(f'x: "{{{{ {expression} }}}}"')
     assert (rule, said) == ('bad-expression', message)

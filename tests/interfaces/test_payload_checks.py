@@ -1,4 +1,4 @@
-"""Faults in plain data, found without ROS: the descriptions are written out here."""
+"""Findings in plain data, found without ROS: the descriptions are written out here."""
 
 import pytest
 
@@ -41,7 +41,7 @@ def catalogue() -> InterfaceCatalogue:
     return catalogue
 
 
-def test_right_data_has_no_faults(catalogue: InterfaceCatalogue) -> None:
+def test_right_data_has_no_findings(catalogue: InterfaceCatalogue) -> None:
     data = {
         'name': 'a thing',
         'path': [{'x': 1}, {'y': 2.5}, {}],
@@ -54,7 +54,7 @@ def test_right_data_has_no_faults(catalogue: InterfaceCatalogue) -> None:
     assert list(check_payload(EMPTY, {}, catalogue)) == []
 
 
-def test_every_fault_is_found_at_its_place_in_the_data(catalogue: InterfaceCatalogue) -> None:
+def test_every_finding_is_found_at_its_place_in_the_data(catalogue: InterfaceCatalogue) -> None:
     data = {
         'name': 5,
         'path': {'points': [{'x': 'far'}, 3, {'z': 1, 'y': True}]},
@@ -145,7 +145,7 @@ def test_bare_values_lie_where_the_message_does(catalogue: InterfaceCatalogue) -
     ]
 
 
-def test_what_is_no_list_is_one_fault(catalogue: InterfaceCatalogue) -> None:
+def test_what_is_no_list_is_one_finding(catalogue: InterfaceCatalogue) -> None:
     assert list(check_payload(THING, {'limits': 3}, catalogue)) == [
         FieldFinding(
             ('limits',),
@@ -156,7 +156,7 @@ def test_what_is_no_list_is_one_fault(catalogue: InterfaceCatalogue) -> None:
     ]
 
 
-def test_a_message_that_is_none_is_a_fault_of_the_message(catalogue: InterfaceCatalogue) -> None:
+def test_a_message_that_is_none_is_a_finding_of_the_message(catalogue: InterfaceCatalogue) -> None:
     assert list(check_payload(VECTOR, None, catalogue)) == [
         FieldFinding(
             (),

@@ -91,7 +91,7 @@ def scalars(field_type: FieldType, *, slips: bool) -> st.SearchStrategy[Any]:
     return st.text(letters, max_size=5 if bound is None else bound // 4)
 
 
-def conversion_fault(name: str, data: object) -> str | None:
+def conversion_problem(name: str, data: object) -> str | None:
     try:
         converter_for(import_interface(name)).convert(data)
     except PayloadError as error:
@@ -139,9 +139,9 @@ def test_both_give_the_same_verdict_in_the_same_words(name: str) -> None:
     @QUICK
     @given(messages(name, slips=True))
     def agree(data: object) -> None:
-        faults = list(check_payload(description, data, CATALOGUE))
-        first = faults[0].message if faults else None
-        assert conversion_fault(name, data) == first
+        findings = list(check_payload(description, data, CATALOGUE))
+        first = findings[0].message if findings else None
+        assert conversion_problem(name, data) == first
         verdicts.add(first is None)
 
     agree()

@@ -122,7 +122,7 @@ def test_a_file_without_arguments_says_so():
 
 
 @pytest.mark.parametrize(
-    ('declaration', 'fault'),
+    ('declaration', 'finding'),
     [
         ('a: {type: [x]}', ('bad-value', '2:18')),
         ('a: {type: int}', ('bad-value', '2:18')),
@@ -138,12 +138,12 @@ def test_a_file_without_arguments_says_so():
         ('true_: 1, "true": 2', ('bad-argument-declaration', '2:18')),
     ],
 )
-def test_a_wrong_declaration_is_said_before_any_word_is_held_against_it(declaration, fault):
+def test_a_wrong_declaration_is_said_before_any_word_is_held_against_it(declaration, finding):
     text = f'version: 1\nargs: {{{declaration}}}\nnodes: {{}}\n'
     for words in (None, [], ['a:=x', 'b:=3']):
         findings = load_system_text(text, words=words).diagnostics
         assert [(each.rule, f'{each.span.line}:{each.span.column}') for each in findings] == [
-            fault
+            finding
         ]
 
 

@@ -151,7 +151,7 @@ def test_paths_are_relative_to_the_file_that_includes(write, tmp_path):
     assert full_names(system) == ['//leaf']
 
 
-def test_a_fault_in_the_deepest_file_comes_with_the_chain_of_includes(write):
+def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
     path = write(
         leaf='version: 1\nnodes: {leaf: {log_levl: debug}}',
         mid=robot('{file: leaf.yaml}'),
@@ -446,7 +446,7 @@ def test_values_that_hang_on_arguments_are_samples_where_an_include_is_left_out(
 
 
 @pytest.mark.ros
-def test_what_is_left_out_hides_no_fault_of_what_is_used(write):
+def test_what_is_left_out_hides_no_finding_of_what_is_used(write):
     part = """
     version: 1
     args: {kind: {type: string}}

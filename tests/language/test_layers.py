@@ -116,7 +116,7 @@ def test_a_later_layer_wins_over_an_earlier_one(write):
     assert load(write(base=BASE, **layers)).spec.nodes['talker'].log_level == 'error'
 
 
-def test_a_fault_in_a_layer_is_said_at_the_layer(write):
+def test_a_finding_in_a_layer_is_said_at_the_layer(write):
     (finding,) = load(write(base=BASE, site='nodes: {talker: {log_levl: debug}}')).diagnostics
     assert str(finding.span) == 'site.yaml:1:18'
 
@@ -194,7 +194,7 @@ def test_a_setting_that_leads_nowhere_is_refused(write, setting, message, help_t
     assert caught.value.help == help_text
 
 
-def test_a_fault_in_a_setting_is_said_at_the_setting(write):
+def test_a_finding_in_a_setting_is_said_at_the_setting(write):
     (finding,) = load(write(base=BASE), 'nodes.talker.log_level=loud').diagnostics
     assert finding.span.source.name == '--set nodes.talker.log_level=loud'
     assert finding.span.text == 'loud'

@@ -5,7 +5,7 @@ import textwrap
 import pytest
 
 from composer.ros_parameters.file_reader import parse_parameter_file
-from composer.ros_parameters.node_patterns import find_pattern_fault, matches_pattern
+from composer.ros_parameters.node_patterns import find_pattern_problem, matches_pattern
 from composer.ros_parameters.overrides import find_overrides, parse_command_line
 from composer.ros_parameters.rcl_values import parse_override
 
@@ -16,7 +16,7 @@ def parse(text):
 
 def values_of(*texts, node='/robot/arm'):
     files = [parse(text) for text in texts]
-    assert [fault for file in files for fault in file.faults] == []
+    assert [finding for file in files for finding in file.findings] == []
     return {name: entry.value for name, entry in find_overrides(files, node).items()}
 
 
@@ -70,8 +70,8 @@ def test_several_documents_are_read_as_one():
 @pytest.mark.parametrize('document', ['', '~', 'a', '[1]'])
 def test_a_document_that_is_no_mapping_is_refused(document):
     file = parse_parameter_file(f'/**: {{ros__parameters: {{a: 1}}}}\n--- {document}\n', 'p.yaml')
-    (fault,) = file.faults
-    assert fault.message == "this value has no 'ros__parameters' above it"
+    (finding,) = file.findings
+    assert finding.message == "this value has no 'ros__parameters' above it"
 
 
 def test_a_value_knows_its_place():
@@ -86,7 +86,7 @@ def test_a_value_knows_its_place():
 @pytest.mark.parametrize('text', ['', '# nothing\n', '/**: {}\n', '/**: {ros__parameters: {}}\n'])
 def test_a_file_may_hold_nothing(text):
     file = parse_parameter_file(text, 'p.yaml')
-    assert (file.entries, file.faults) == ((), ())
+    assert (file.entries, file.findings) == ((), ())
 
 
 FAULTS = {
@@ -136,9 +136,9 @@ FAULTS = {
 
 @pytest.mark.parametrize(('text', 'said'), FAULTS.items())
 def test_what_ros_refuses_or_misreads_is_a_finding(text, said):
-    (fault,) = parse_parameter_file(text, 'p.yaml').faults
-    assert f'{fault.span.line}:{fault.span.column} {fault.message}' == said
-    assert fault.rule == 'bad-parameter-file'
+    (finding,) = parse_parameter_file(text, 'p.yaml').findings
+    assert f'{finding.span.line}:{finding.span.column} {finding.message}' == said
+    assert finding.rule == 'bad-parameter-file'
 
 
 @pytest.mark.parametrize(
@@ -150,13 +150,13 @@ def test_what_ros_refuses_or_misreads_is_a_finding(text, said):
     ],
 )
 def test_an_assignment_of_the_command_line_is_explained(text):
-    (fault,) = parse_parameter_file(text, 'p.yaml').faults
-    assert fault.help == "write 'speed: 1.5', ':=' is for command lines"
+    (finding,) = parse_parameter_file(text, 'p.yaml').findings
+    assert finding.help == "write 'speed: 1.5', ':=' is for command lines"
 
 
 def test_what_is_no_yaml_is_a_finding_in_its_line():
-    (fault,) = parse_parameter_file('/**:\n  ros__parameters: {a: [1\n', 'p.yaml').faults
-    assert (fault.rule, fault.file) == ('yaml-syntax', 'p.yaml')
+    (finding,) = parse_parameter_file('/**:\n  ros__parameters: {a: [1\n', 'p.yaml').findings
+    assert (finding.rule, finding.file) == ('yaml-syntax', 'p.yaml')
 
 
 PATTERNS = {
@@ -183,13 +183,13 @@ PATTERNS = {
 
 @pytest.mark.parametrize(('pattern', 'matches'), PATTERNS.items())
 def test_wildcards_match_as_they_do_in_ros(pattern, matches):
-    assert find_pattern_fault(pattern) is None
+    assert find_pattern_problem(pattern) is None
     assert matches_pattern(pattern, '/robot/arm') is matches
 
 
 @pytest.mark.parametrize('pattern', ['/', '//', '/a//b', '/a/', '/a b', '/1a', '/a*/b', '/a/***'])
 def test_what_names_no_node_is_refused(pattern):
-    assert find_pattern_fault(pattern) is not None
+    assert find_pattern_problem(pattern) is not None
 
 
 def test_many_wildcards_are_matched_in_no_time():

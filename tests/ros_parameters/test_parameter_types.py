@@ -5,8 +5,8 @@ import pytest
 from composer.ros_parameters.parameter_types import (
     PARAMETER_TYPES,
     convert_parameter_value,
-    find_type_fault,
-    find_type_faults,
+    find_type_problem,
+    find_type_problems,
     infer_parameter_type,
 )
 
@@ -86,13 +86,13 @@ def test_integers_become_doubles_where_doubles_are_wanted(value, type_name, conv
         (['a'], 'string_array'),
     ],
 )
-def test_a_value_of_its_type_has_no_fault(value, type_name):
-    assert find_type_fault(value, type_name) is None
-    assert list(find_type_faults(value, type_name)) == []
+def test_a_value_of_its_type_has_no_finding(value, type_name):
+    assert find_type_problem(value, type_name) is None
+    assert list(find_type_problems(value, type_name)) == []
 
 
 @pytest.mark.parametrize(
-    ('value', 'type_name', 'fault'),
+    ('value', 'type_name', 'finding'),
     [
         (1, 'bool', 'expected a bool, got 1'),
         (True, 'integer', 'expected an integer, got True'),
@@ -112,12 +112,12 @@ def test_a_value_of_its_type_has_no_fault(value, type_name):
         ([None], 'string_array', 'item 0: expected a string, got None'),
     ],
 )
-def test_a_value_of_another_type_says_what_was_expected(value, type_name, fault):
-    assert find_type_fault(value, type_name) == fault
+def test_a_value_of_another_type_says_what_was_expected(value, type_name, finding):
+    assert find_type_problem(value, type_name) == finding
 
 
 def test_every_item_of_another_type_is_told():
-    assert list(find_type_faults([1, 'a', 2.5, 3], 'integer_array')) == [
+    assert list(find_type_problems([1, 'a', 2.5, 3], 'integer_array')) == [
         ((1,), "item 1: expected an integer, got 'a'"),
         ((2,), 'item 2: expected an integer, got 2.5'),
     ]

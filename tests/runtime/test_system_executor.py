@@ -119,7 +119,7 @@ def test_a_call_later_comes_and_a_cancelled_one_does_not(system_executor, wait_f
     assert called == ['kept']
 
 
-def test_a_fault_is_logged_once_and_dispatching_goes_on(system_executor, node, wait_for):
+def test_a_finding_is_logged_once_and_dispatching_goes_on(system_executor, node, wait_for):
     ticks = []
 
     def fail():
@@ -129,12 +129,12 @@ def test_a_fault_is_logged_once_and_dispatching_goes_on(system_executor, node, w
     failing = node.create_timer(0.01, fail)
     node.create_timer(0.01, lambda: ticks.append(1))
 
-    wait_for(lambda: len(ticks) > 5, 'ticks after the fault')
+    wait_for(lambda: len(ticks) > 5, 'ticks after the finding')
     assert len(system_executor.logged) == 1
     assert system_executor.logged[0].endswith('ValueError')
 
 
-def test_a_missing_response_is_no_fault(system_executor):
+def test_a_missing_response_is_no_finding(system_executor):
     def give_none():
         reason = 'its behaviour raised'
         raise NoResponseError(reason)

@@ -135,13 +135,13 @@ def test_the_compiled_schema_agrees_with_the_validator(data):
     compiler = SchemaCompiler(PLAIN['$defs'])
     validator = Draft202012Validator(PLAIN)
     assert compiler.compile(PLAIN)(data) == validator.is_valid(data)
-    # With what is right passed over, the same faults come out.
-    assert {fault_of(each) for each in create_validator(PLAIN, compiler).iter_errors(data)} == {
-        fault_of(each) for each in validator.iter_errors(data)
+    # With what is right passed over, the same findings come out.
+    assert {problem_of(each) for each in create_validator(PLAIN, compiler).iter_errors(data)} == {
+        problem_of(each) for each in validator.iter_errors(data)
     }
 
 
-def fault_of(error):
+def problem_of(error):
     return tuple(error.absolute_path), error.validator, error.message
 
 

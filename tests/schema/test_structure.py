@@ -11,7 +11,7 @@ from composer.schema import schema_path
 HEAD = 'version: 1\n'
 
 
-def faults(text):
+def findings(text):
     """Return rule, message, place and help of all that is wrong with the structure of a text."""
     return [
         (finding.rule, finding.message, f'{finding.span.line}:{finding.span.column}', finding.help)
@@ -19,9 +19,9 @@ def faults(text):
     ]
 
 
-def node_faults(text):
-    """Return the faults of a node with this content, without their places."""
-    return [fault[:2] + fault[3:] for fault in faults(f'{HEAD}nodes: {{rover: {text}}}')]
+def node_findings(text):
+    """Return the findings of a node with this content, without their places."""
+    return [finding[:2] + finding[3:] for finding in findings(f'{HEAD}nodes: {{rover: {text}}}')]
 
 
 def test_the_schema_is_one():
@@ -49,12 +49,12 @@ def test_the_schema_describes_every_key():
     assert undescribed == []
 
 
-def test_a_right_file_has_no_faults():
-    assert faults(HEAD + 'nodes: {rover: {}}\nx-any: [thing]\n') == []
+def test_a_right_file_has_no_findings():
+    assert findings(HEAD + 'nodes: {rover: {}}\nx-any: [thing]\n') == []
 
 
 @pytest.mark.parametrize(
-    ('text', 'fault'),
+    ('text', 'finding'),
     [
         ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', None)),
         (
@@ -125,8 +125,8 @@ def test_a_right_file_has_no_faults():
         ),
     ],
 )
-def test_a_fault_of_the_file_is_named_and_placed(text, fault):
-    assert faults(text) == [fault]
+def test_a_finding_of_the_file_is_named_and_placed(text, finding):
+    assert findings(text) == [finding]
 
 
 ONE_OF_LEVELS = 'expected one of debug, info, warn, error, fatal; got '
@@ -134,7 +134,7 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
 
 
 @pytest.mark.parametrize(
-    ('text', 'fault'),
+    ('text', 'finding'),
     [
         (
             '{tmers: {}}',
@@ -284,30 +284,30 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
     ],
 )
-def test_a_fault_of_a_node_is_named(text, fault):
-    ((rule, message, help_text),) = node_faults(text)
+def test_a_finding_of_a_node_is_named(text, finding):
+    ((rule, message, help_text),) = node_findings(text)
     if "unknown key 'x-own'" in message:
         help_text = None  # it lists the keys
-    assert (rule, message, help_text) == fault
+    assert (rule, message, help_text) == finding
 
 
 def test_a_missing_key_is_placed_at_the_entry_that_lacks_it():
     text = HEAD + 'nodes:\n  rover:\n    publishers:\n      scan: {topic: x}\n'
-    assert faults(text) == [
+    assert findings(text) == [
         ('missing-key', "the key 'type' is missing in publisher 'scan'", '5:7', None)
     ]
 
 
-def test_a_fault_in_a_merged_mapping_is_placed_where_it_is_written():
+def test_a_finding_in_a_merged_mapping_is_placed_where_it_is_written():
     text = (
         HEAD + 'x-slow: &slow {period: slow}\n'
         'nodes: {rover: {timers: {tick: {<<: *slow, behaviour: a:b}}}}\n'
     )
-    assert faults(text) == [('wrong-type', "expected a number, got 'slow'", '2:24', None)]
+    assert findings(text) == [('wrong-type', "expected a number, got 'slow'", '2:24', None)]
 
 
 def test_long_values_are_shown_short():
-    ((_, message, _),) = node_faults(f'{{use_sim_time: {"x" * 500}}}')
+    ((_, message, _),) = node_findings(f'{{use_sim_time: {"x" * 500}}}')
     assert message == f"expected true or false, got '{'x' * 38}…"
 
 
@@ -328,7 +328,14 @@ def test_a_misspelt_key_is_read_as_the_right_one():
 
 def test_what_lies_below_a_misspelt_key_keeps_its_place():
     text = HEAD + 'nods:\n  rover:\n    timer:\n      tick: {perod: fast, behavior: a.b}\n'
-    assert [fault[2] for fault in faults(text)] == ['2:1', '4:5', '5:14', '5:27', '5:21', '5:37']
+    assert [finding[2] for finding in findings(text)] == [
+        '2:1',
+        '4:5',
+        '5:14',
+        '5:27',
+        '5:21',
+        '5:37',
+    ]
 
 
 def test_a_misspelt_key_beside_the_right_one_is_reported_and_left_out():
@@ -341,7 +348,7 @@ def test_a_misspelt_key_beside_the_right_one_is_reported_and_left_out():
 
 def test_two_spellings_of_one_key_are_both_reported():
     text = HEAD + 'nodes: {rover: {timer: {}, timrs: {}}}'
-    assert [fault[1] for fault in faults(text)] == [
+    assert [finding[1] for finding in findings(text)] == [
         "unknown key 'timer' in node 'rover'",
         "unknown key 'timrs' in node 'rover'",
     ]
@@ -368,13 +375,13 @@ def test_what_is_wrong_is_left_out_and_the_rest_is_read():
     }
 
 
-def test_all_faults_are_found_in_one_run():
+def test_all_findings_are_found_in_one_run():
     text = (
         HEAD
         + 'nodes:\n'
         + ''.join(f'  n{i}: {{log_level: {i}, tmers: {{}}}}\n' for i in range(50))
     )
-    assert len(faults(text)) == 100
+    assert len(findings(text)) == 100
 
 
 @pytest.mark.parametrize(
@@ -390,7 +397,7 @@ def test_all_faults_are_found_in_one_run():
     ],
 )
 def test_a_type_in_the_form_of_other_places_is_understood(text, meant):
-    ((_, _, help_text),) = node_faults(f'{{publishers: {{a: "{text}"}}}}')
+    ((_, _, help_text),) = node_findings(f'{{publishers: {{a: "{text}"}}}}')
     assert help_text == (meant and f"did you mean '{meant}'?")
 
 
@@ -407,13 +414,13 @@ def test_a_type_in_the_form_of_other_places_is_understood(text, meant):
     ],
 )
 def test_a_behaviour_in_another_form_is_understood(text, meant):
-    ((_, _, help_text),) = node_faults(f'{{on_start: {{behaviour: "{text}"}}}}')
+    ((_, _, help_text),) = node_findings(f'{{on_start: {{behaviour: "{text}"}}}}')
     assert help_text == (meant and f"did you mean '{meant}'?")
 
 
-def test_a_fault_in_an_item_of_a_list_is_left_out_alone():
+def test_a_finding_in_an_item_of_a_list_is_left_out_alone():
     text = '{wait_for: [{topic: a, timeout: 0}, {node: [b]}, {service: c, tiemout: 1}]}'
-    assert [rule for rule, *_ in node_faults(text)] == [
+    assert [rule for rule, *_ in node_findings(text)] == [
         'unknown-key',
         'out-of-range',
         'wrong-type',
@@ -423,7 +430,7 @@ def test_a_fault_in_an_item_of_a_list_is_left_out_alone():
     assert [each.kind for each in conditions] == ['topic', 'topic', 'service']
 
 
-def test_misspelt_keys_that_count_before_the_schema_are_one_fault_each():
+def test_misspelt_keys_that_count_before_the_schema_are_one_finding_each():
     text = """
 arg: {count: {defualt: 2}}
 nodes:

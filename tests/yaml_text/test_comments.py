@@ -60,7 +60,7 @@ def test_what_is_no_comment_silences_nothing(text):
     assert read(text) == []
 
 
-def test_of_a_text_that_is_not_yaml_the_comments_before_the_fault_are_read():
+def test_of_a_text_that_is_not_yaml_the_comments_before_the_finding_are_read():
     text = 'a: 1  # composer: ignore[one]\nb: "\nc: 2  # composer: ignore[two]\n'
     assert read(text) == [(1, 7, ['one'])]
     assert read('a: 1  # composer: ignore[one]\nb: \x07') == []

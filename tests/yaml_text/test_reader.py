@@ -272,7 +272,7 @@ def test_an_unreadable_text_gets_one_clear_line(text, line):
         ('%YAML 9.9\n---\na: 1\n', 1, 1, None),
     ],
 )
-def test_a_fault_of_syntax_has_a_place(text, line, column, help_text):
+def test_a_finding_of_syntax_has_a_place(text, line, column, help_text):
     (finding,) = parse(text).diagnostics
     assert finding.rule == 'yaml-syntax'
     assert finding.message.startswith('this is not YAML: ')

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
 from composer.language.specs import NodeSpec
-from composer.names import expand_name, find_namespace_fault, find_topic_name_fault, remap_name
+from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -164,11 +164,11 @@ def is_misnamed(positions: SourceMap, node: NodeSpec, name: str) -> bool:
     spans = positions.values
     own = spans.get((*node.path, 'namespace'))
     is_own = own is not None and own != spans.get(('defaults', 'namespace'))
-    return is_own and find_namespace_fault(node.namespace) is not None
+    return is_own and find_namespace_problem(node.namespace) is not None
 
 
 def _is_no_name(*names: str) -> bool:
-    return any(find_topic_name_fault(name) for name in names)
+    return any(find_topic_name_problem(name) for name in names)
 
 
 def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from composer.checks.connections.topology import full_name
 from composer.names import (
     expand_name,
-    find_namespace_fault,
-    find_node_name_fault,
-    find_topic_name_fault,
+    find_namespace_problem,
+    find_node_name_problem,
+    find_topic_name_problem,
     with_article,
 )
 from composer.spelling import suggest
@@ -52,16 +52,16 @@ def _check_name(
 ) -> Iterator[Diagnostic]:
     """Check that the name of a condition is one that ROS allows."""
     kind, name = condition.kind, condition.name
-    fault: str | None = None
+    problem: str | None = None
     if kind == 'node':
         namespace, _, last = expand_name(name, waiter.name, waiter.namespace or '/').rpartition(
             '/'
         )
-        fault = find_node_name_fault(last) or (namespace and find_namespace_fault(namespace))
+        problem = find_node_name_problem(last) or (namespace and find_namespace_problem(namespace))
     elif kind != 'process':
-        fault = find_topic_name_fault(name, kind)
-    if fault:
-        message = f"'{name}' cannot be the name of {with_article(kind)}: {fault}"
+        problem = find_topic_name_problem(name, kind)
+    if problem:
+        message = f"'{name}' cannot be the name of {with_article(kind)}: {problem}"
         yield context.at_value(condition.path, 'bad-name', message)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.arguments import ArgumentValues, sample_values
-from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_fault
+from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_problem
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -33,15 +33,15 @@ def values_from_include(
         path = (*section, name)
         if name in given:
             value = convert_parameter_value(given[name], argument.type)
-            fault = _find_fault(argument, value)
-            if not fault:
+            problem = _find_problem(argument, value)
+            if not problem:
                 values[name] = value
                 origins[name] = _origin(place.system, path)
             elif not place.is_open(path):
                 span = place.system.positions.value(path)
                 near = _nearest_choice(argument, value)
-                findings.append(diagnostic_at(span, 'argument-type', fault, help=near))
-            if fault or place.is_open(path):
+                findings.append(diagnostic_at(span, 'argument-type', problem, help=near))
+            if problem or place.is_open(path):
                 unknown.append(name)
         elif not place.system.dropped.isdisjoint((path, section)):
             unknown.append(name)
@@ -78,10 +78,10 @@ def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
     return suggest(value, argument.choices)
 
 
-def _find_fault(argument: ArgumentSpec, value: Any) -> str | None:
-    fault = find_type_fault(value, argument.type)
-    if fault:
-        return f"'{argument.name}': {fault}"
+def _find_problem(argument: ArgumentSpec, value: Any) -> str | None:
+    problem = find_type_problem(value, argument.type)
+    if problem:
+        return f"'{argument.name}': {problem}"
     if argument.choices and value not in argument.choices:
         choices = ', '.join(map(str, argument.choices))
         return f"'{argument.name}': {value!r} is not one of {choices}"

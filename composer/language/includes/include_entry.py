@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, is_in_package, list_neighbours, resolve_path
-from composer.names import find_namespace_fault
+from composer.names import find_namespace_problem
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -92,11 +92,11 @@ class IncludeEntry:
             # Without one of their own, its nodes might be called like others.
             return _allowed(self.label)
         namespace = str(self.data.get('namespace', ''))
-        fault = find_namespace_fault(namespace) if namespace else None
-        if fault is None:
+        problem = find_namespace_problem(namespace) if namespace else None
+        if problem is None:
             return namespace
         span = self.system.positions.value(path)
-        finding = diagnostic_at(span, 'bad-name', f"'{namespace}': {fault}")
+        finding = diagnostic_at(span, 'bad-name', f"'{namespace}': {problem}")
         self.system.diagnostics.append(finding)
         self.system.dropped.add(path)
         return _allowed(namespace)

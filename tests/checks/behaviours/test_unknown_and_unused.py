@@ -27,7 +27,7 @@ def run(*lines, head='def run(node):'):
         "[node.publish('outt', each) for each in range(3)]",
     ],
 )
-def test_a_name_that_the_node_does_not_declare_is_a_fault(check, line):
+def test_a_name_that_the_node_does_not_declare_is_a_finding(check, line):
     assert check(NODE, run(USES_ALL, line)) == [(6, 'unknown-publisher')]
 
 
@@ -77,7 +77,7 @@ def test_a_behaviour_that_is_imported_is_read_where_it_is(check, tmp_path):
     assert check(NODE, 'from far import run\n') == [(6, 'unknown-service-client')]
 
 
-def test_what_the_file_has_with_a_fault_is_declared(check):
+def test_what_the_file_has_with_a_finding_is_declared(check):
     nodes = NODE.replace('type: std_msgs/msg/String', 'type: String')
     assert [rule for _, rule in check(nodes, run(USES_ALL))] == ['bad-value']
     nodes = NODE.replace('publishers:', 'xyz:')

@@ -72,7 +72,7 @@ def test_a_right_annotation_passes_and_so_does_what_cannot_be_told(check, annota
         ('dict[str, str]', 'dict'),
     ],
 )
-def test_an_annotation_of_another_type_is_a_fault(check, annotation, shown):
+def test_an_annotation_of_another_type_is_a_finding(check, annotation, shown):
     code = IMPORTS + f'def hear(node: Node, message: {annotation}): ...\n'
     assert check(LISTENER, code, rule='wrong-annotation') == [
         f"'hear' takes a {shown} as 'message', and is given a std_msgs/msg/String"
@@ -93,7 +93,7 @@ SERVER = """
 
 
 @pytest.mark.parametrize(
-    ('annotations', 'faults'),
+    ('annotations', 'findings'),
     [
         ('request: SetBool.Request) -> SetBool.Response', 0),
         ('request: SetBool_Request) -> dict[str, object]', 0),
@@ -104,9 +104,9 @@ SERVER = """
         pytest.param('request) -> bool', 1, marks=pytest.mark.ros),
     ],
 )
-def test_a_service_is_annotated_with_its_parts(check, annotations, faults):
+def test_a_service_is_annotated_with_its_parts(check, annotations, findings):
     code = IMPORTS + f'def serve(node, {annotations}: ...\n'
-    assert len(check(SERVER, code, rule='wrong-annotation')) == faults
+    assert len(check(SERVER, code, rule='wrong-annotation')) == findings
 
 
 @pytest.mark.ros

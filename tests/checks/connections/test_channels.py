@@ -119,7 +119,7 @@ def test_a_name_that_the_command_line_decides_meets_anything(check):
     assert check(nodes, CODE, before=before) == []
 
 
-def test_a_name_with_a_fault_meets_anything(check):
+def test_a_name_with_a_finding_meets_anything(check):
     nodes = meeting('', '').replace('topic: heard', 'topic: 3')
     assert [rule for _, rule in check(nodes, CODE)] == ['wrong-type']
     nodes = meeting('', '').replace('publishers: {', 'publishers: 3 # {')

@@ -1,4 +1,4 @@
-"""Behaviours that the faulty files name."""
+"""Behaviours that the invalid files name."""
 
 DEPTH = 10
 

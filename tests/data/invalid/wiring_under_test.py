@@ -1,4 +1,4 @@
-"""Behaviours that the files with faults of wiring name."""
+"""Behaviours that the files with findings of wiring name."""
 
 from __future__ import annotations
 

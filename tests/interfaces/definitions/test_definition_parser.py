@@ -42,7 +42,7 @@ def test_values_are_python_values(type_text: str, text: str, value: object) -> N
         ('string[]', '[,]', "'[,]' is not a value of type string[]"),
     ],
 )
-def test_a_wrong_value_is_a_fault(type_text: str, text: str, message: str) -> None:
+def test_a_wrong_value_is_a_finding(type_text: str, text: str, message: str) -> None:
     with pytest.raises(DefinitionSyntaxError) as caught:
         parse_value(type_text, text)
     assert str(caught.value) == message
@@ -53,7 +53,7 @@ def test_a_unit_stays_in_the_comment() -> None:
     assert message.fields[0].comment == 'The speed [m/s]'
 
 
-def test_a_wrong_message_is_a_fault_and_prints_nothing(
+def test_a_wrong_message_is_a_finding_and_prints_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(DefinitionSyntaxError):

@@ -84,7 +84,7 @@ def test_services_and_actions_are_described_by_their_parts(
     assert action.feedback.fields[0].name == 'way'
 
 
-def test_all_faults_are_found_in_one_pass(write_definitions: WriteDefinitions) -> None:
+def test_all_findings_are_found_in_one_pass(write_definitions: WriteDefinitions) -> None:
     folder = write_definitions(
         {
             'msg/Robot.msg': 'int a\nint32 b\nint32 b\nuint8 C=300\nuint8 C=1\nint32 Wrong\n---\n',
@@ -141,18 +141,18 @@ def test_text_that_is_not_utf_8_is_found_on_its_line(tmp_path: Path) -> None:
     assert places(load_definitions('robots', tmp_path)) == [('Robot.msg', 2, 'not-utf-8')]
 
 
-def test_a_folder_without_definitions_is_a_fault(tmp_path: Path) -> None:
+def test_a_folder_without_definitions_is_a_finding(tmp_path: Path) -> None:
     [diagnostic] = load_definitions('robots', tmp_path / 'missing').diagnostics
     assert (diagnostic.rule, diagnostic.file) == ('no-definitions', str(tmp_path / 'missing'))
 
 
-def test_a_wrong_package_name_is_a_fault(write_definitions: WriteDefinitions) -> None:
+def test_a_wrong_package_name_is_a_finding(write_definitions: WriteDefinitions) -> None:
     folder = write_definitions({'msg/Robot.msg': 'int32 a\n'})
     assert places(load_definitions('Robots', folder)) == [(folder.name, 0, 'bad-name')]
 
 
 @pytest.mark.parametrize('package', InterfaceCatalogue().packages())
-def test_installed_definitions_have_no_faults(package: str) -> None:
+def test_installed_definitions_have_no_findings(package: str) -> None:
     prefix = find_package(package, ament_prefixes(), INTERFACE_INDEX)
     assert prefix is not None
     definitions = load_definitions(package, prefix / 'share' / package)
@@ -164,6 +164,6 @@ def test_installed_definitions_have_no_faults(package: str) -> None:
     }
 
 
-def test_shipped_definitions_have_no_faults() -> None:
+def test_shipped_definitions_have_no_findings() -> None:
     for folder in SHIPPED.iterdir():
         assert load_definitions(folder.name, folder).diagnostics == ()

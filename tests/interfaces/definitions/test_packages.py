@@ -123,7 +123,7 @@ def test_packages_cannot_use_each_other(write_definitions: WriteDefinitions) -> 
     assert diagnostic.rule == 'circular-packages'
 
 
-def test_faults_of_lines_and_of_references_come_together_in_order(
+def test_findings_of_lines_and_of_references_come_together_in_order(
     write_definitions: WriteDefinitions,
 ) -> None:
     diagnostics = check(write_definitions, robots={'msg/A.msg': 'int a\nMissing b\nint32 C\n'})

@@ -79,7 +79,7 @@ SOUND = [
 
 
 @pytest.mark.parametrize(('line', 'rule', 'text', 'advice'), FAULTY)
-def test_a_fault_is_found_where_it_is(
+def test_a_finding_is_found_where_it_is(
     line: str,
     rule: str,
     text: str,
@@ -95,13 +95,13 @@ def test_a_fault_is_found_where_it_is(
 
 
 @pytest.mark.parametrize('line', SOUND)
-def test_a_sound_line_has_no_faults(line: str) -> None:
+def test_a_sound_line_has_no_findings(line: str) -> None:
     statement = split_line(SourceFile('Some.msg', (line,)), 1)
     assert statement is not None
     assert list(check_statement(statement)) == []
 
 
-def test_a_line_may_have_several_faults() -> None:
+def test_a_line_may_have_several_findings() -> None:
     statement = split_line(SourceFile('Some.msg', (' strng goodName',)), 1)
     assert statement is not None
     rules = [diagnostic.rule for diagnostic in check_statement(statement)]

@@ -137,7 +137,7 @@ def load_by_rcl(context, *paths, name='arm', namespace='/robot'):
 
 def load_by_us(*paths, node='/robot/arm'):
     files = [read_parameter_file(path) for path in paths]
-    if any(file.faults for file in files):
+    if any(file.findings for file in files):
         return None
     return {
         name: (entry.type.upper(), repr(entry.value)) if entry.type else ('NOT_SET', 'None')
@@ -214,8 +214,10 @@ def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
             path.write_text(writer.file())
         expected, found = load_by_rcl(context, *paths), load_by_us(*paths)
         if found is None and expected is not None:
-            faults = [fault for path in paths for fault in read_parameter_file(path).faults]
-            assert all(fault.message.endswith(STRICTER) for fault in faults), seed
+            findings = [
+                finding for path in paths for finding in read_parameter_file(path).findings
+            ]
+            assert all(finding.message.endswith(STRICTER) for finding in findings), seed
             continue
         if expected is not None:
             # A name that one file gives a value and another one names below it.

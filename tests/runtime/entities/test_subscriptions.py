@@ -28,7 +28,7 @@ nodes:
       number: {type: std_msgs/msg/Int32, behaviour: 'parts:double', publish: doubled}
       twist: {type: geometry_msgs/msg/Twist, publish: relayed}
       point: {type: std_msgs/msg/Int32, behaviour: 'parts:to_point', publish: single}
-      fault: {type: std_msgs/msg/Int32, behaviour: 'parts:to_words', publish: wrong}
+      finding: {type: std_msgs/msg/Int32, behaviour: 'parts:to_words', publish: wrong}
 """
 
 CODE = """
@@ -112,11 +112,11 @@ def test_a_mapping_becomes_a_message_with_its_integers_made_doubles(exchange):
 
 
 def test_a_payload_of_another_type_is_an_error_that_names_field_and_types(child, shared_peer):
-    shared_peer.advertise(Int32, 'fault').publish(Int32(data=3))
+    shared_peer.advertise(Int32, 'finding').publish(Int32(data=3))
 
-    line = child.wait_for_line("[ERROR] [ears]: subscription 'fault' (system.yaml:20) raised")
+    line = child.wait_for_line("[ERROR] [ears]: subscription 'finding' (system.yaml:20) raised")
     assert line.startswith(
-        "[ERROR] [ears]: subscription 'fault' (system.yaml:20) raised PayloadError: "
+        "[ERROR] [ears]: subscription 'finding' (system.yaml:20) raised PayloadError: "
     )
     assert 'data' in line
     assert 'int32' in line

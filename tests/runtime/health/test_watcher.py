@@ -8,7 +8,7 @@ from composer.runtime.health import watcher as watching
 from composer.runtime.health.watcher import Watcher
 
 
-def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
+def test_a_finding_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
     logged, looks = [], []
     monkeypatch.setattr(watching.system_logger, 'error', logged.append)
 
@@ -18,7 +18,7 @@ def test_a_fault_is_logged_once_and_looking_goes_on(monkeypatch, wait_for):
 
     watch = Watcher('watch', look, 0.001)
     watch.start()
-    wait_for(lambda: len(looks) > 3, 'looks after the first fault')
+    wait_for(lambda: len(looks) > 3, 'looks after the first finding')
     watch.stop()
 
     assert len(logged) == 1

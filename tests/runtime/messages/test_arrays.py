@@ -54,7 +54,7 @@ def received(message: Any) -> Any:
     return deserialize_message(serialize_message(message), type(message))
 
 
-def fault(message_class: type, payload: object) -> str:
+def finding(message_class: type, payload: object) -> str:
     with pytest.raises(PayloadError) as caught:
         convert(message_class, payload)
     return str(caught.value)
@@ -133,7 +133,7 @@ def test_octets_arrive_from_whatever_holds_octets(octets: object) -> None:
     ],
 )
 def test_what_holds_no_array_is_refused(given: object, got: str) -> None:
-    assert fault(Int8MultiArray, {'data': given}) == (
+    assert finding(Int8MultiArray, {'data': given}) == (
         f'std_msgs/msg/Int8MultiArray: data: expected int8[], got {got}'
     )
 
@@ -141,7 +141,7 @@ def test_what_holds_no_array_is_refused(given: object, got: str) -> None:
 def test_a_view_of_other_things_than_octets_is_refused() -> None:
     view = memoryview(np.zeros(2, '>f8'))
     for message_class in (UInt8MultiArray, Float64MultiArray, ByteMultiArray):
-        assert 'got memoryview <memory at' in fault(message_class, {'data': view})
+        assert 'got memoryview <memory at' in finding(message_class, {'data': view})
 
 
 def test_a_matrix_is_laid_out_row_by_row() -> None:
@@ -159,7 +159,7 @@ def test_a_matrix_is_laid_out_row_by_row() -> None:
 
 
 def test_nested_lists_are_no_matrix() -> None:
-    assert fault(Float64MultiArray, {'data': [[1.0], [2.0]]}) == (
+    assert finding(Float64MultiArray, {'data': [[1.0], [2.0]]}) == (
         'std_msgs/msg/Float64MultiArray: data[0]: expected float64, got list [1.0]'
     )
 
@@ -215,7 +215,7 @@ def test_the_first_wrong_item_is_named(
     given: object,
     expected: str,
 ) -> None:
-    assert fault(message_class, {f'{name}_values': given}) == (
+    assert finding(message_class, {f'{name}_values': given}) == (
         f'test_msgs/msg/{message_class.__name__}: {name}_values{expected}'
     )
 
@@ -229,7 +229,7 @@ def test_the_number_of_items_is_checked(name: str, container: Any) -> None:
         (Arrays, 4, '[3]'),
         (BoundedSequences, 4, '[<=3]'),
     ]:
-        assert fault(message_class, {f'{name}_values': container([item] * length)}) == (
+        assert finding(message_class, {f'{name}_values': container([item] * length)}) == (
             f'test_msgs/msg/{message_class.__name__}: {name}_values: '
             f'expected {name}{bound}, got {length} items'
         )
@@ -238,7 +238,7 @@ def test_the_number_of_items_is_checked(name: str, container: Any) -> None:
 
 
 def test_a_list_too_long_is_told_by_its_length_before_its_items() -> None:
-    assert fault(BoundedSequences, {'int8_values': ['a'] * 4}) == (
+    assert finding(BoundedSequences, {'int8_values': ['a'] * 4}) == (
         'test_msgs/msg/BoundedSequences: int8_values: expected int8[<=3], got 4 items'
     )
 
@@ -267,12 +267,12 @@ def test_what_grew_in_a_message_is_checked() -> None:
     message = BoundedSequences()
     message.int8_values.append(1)
     message.bool_values = [True] * 4
-    assert fault(BoundedSequences, message) == (
+    assert finding(BoundedSequences, message) == (
         'test_msgs/msg/BoundedSequences: bool_values: expected bool[<=3], got 4 items'
     )
     message.bool_values = []
     message.int8_values.extend([1, 2, 3, 4])
-    assert fault(BoundedSequences, message) == (
+    assert finding(BoundedSequences, message) == (
         f'test_msgs/msg/BoundedSequences: int8_values: expected int8[<=3], '
         f'got {len(message.int8_values)} items'
     )
@@ -285,7 +285,7 @@ def test_a_matrix_in_a_message_is_laid_out_before_rclpy_reads_beyond_it() -> Non
     assert pose.covariance.shape == (36,)
     assert received(pose).covariance.tolist() == list(range(36))
     pose.covariance = np.zeros(9)
-    assert fault(PoseWithCovariance, pose) == (
+    assert finding(PoseWithCovariance, pose) == (
         'geometry_msgs/msg/PoseWithCovariance: covariance: expected float64[36], got 9 items'
     )
 

@@ -193,7 +193,7 @@ def test_what_a_message_holds_in_another_form_is_replaced_in_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ('message', 'fault'),
+    ('message', 'finding'),
     [
         (String(data=5), 'std_msgs/msg/String: data: expected string, got int 5'),
         (
@@ -219,12 +219,12 @@ def test_what_a_message_holds_in_another_form_is_replaced_in_place() -> None:
         ),
     ],
 )
-def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message: object, fault: str) -> None:
-    assert failure(type(message), message)[0] == fault
+def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message: object, finding: str) -> None:
+    assert failure(type(message), message)[0] == finding
 
 
 @pytest.mark.parametrize(
-    ('message_class', 'payload', 'fault', 'advice'),
+    ('message_class', 'payload', 'finding', 'advice'),
     [
         (
             Twist,
@@ -323,13 +323,13 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message: object, faul
         ),
     ],
 )
-def test_a_fault_names_message_field_and_both_types(
+def test_a_finding_names_message_field_and_both_types(
     message_class: type,
     payload: object,
-    fault: str,
+    finding: str,
     advice: str | None,
 ) -> None:
-    assert failure(message_class, payload) == (fault, advice)
+    assert failure(message_class, payload) == (finding, advice)
 
 
 def test_an_error_carries_type_and_path_for_programs() -> None:

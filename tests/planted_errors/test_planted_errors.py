@@ -1,12 +1,12 @@
-"""Faults that a program plants in valid systems are found where they are, and nothing else is."""
+"""Errors that a program plants in valid systems are found where they are, and nothing else is."""
 
 import pytest
 
-from tests.planted_faults.measurement import measure
+from tests.planted_errors.measurement import measure
 
 
 @pytest.mark.ros
-def test_planted_faults_are_found_in_their_lines_with_the_right_suggestions(tmp_path):
+def test_planted_errors_are_found_in_their_lines_with_the_right_suggestions(tmp_path):
     score = measure(tmp_path, seed=3, systems=120)
     assert score.false_alarms == []
     assert score.extra == []

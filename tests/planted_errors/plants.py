@@ -1,12 +1,12 @@
-"""Faults to plant in a system, each with what has to be said of it."""
+"""Errors to plant in a system, each with what has to be said of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from composer.language.qos import BUILTIN_PROFILES
 from tests.fuzz.mutations import misspell
-from tests.planted_faults.systems import RANGES
-from tests.planted_faults.wiring import OTHER_ENDS, WIRING_FAULTS, find_partners
+from tests.planted_errors.systems import RANGES
+from tests.planted_errors.wiring import OTHER_ENDS, WIRING_ERRORS, find_partners
 
 ENTITIES = ('publishers', 'subscriptions', 'timers', 'services', 'service_clients', 'actions', 'action_clients')  # fmt: skip
 CHOICES = ('clock', 'concurrency', 'log_level', 'on_error', 'reliability', 'durability', 'history')
@@ -14,7 +14,7 @@ CHOICES = ('clock', 'concurrency', 'log_level', 'on_error', 'reliability', 'dura
 
 @dataclass
 class Planted:
-    """A fault: the rule that finds it, where, and the right spelling that is suggested for it."""
+    """An error: the rule that finds it, where, and the right spelling that is suggested for it."""
 
     kind: str
     rules: tuple
@@ -23,18 +23,18 @@ class Planted:
 
 
 def plant(chance, system, count):
-    """Plant faults in parts of a system that are not the same; return them."""
+    """Plant errors in parts of a system that are not the same; return them."""
     planted, taken = [], set()
     for _ in range(count * 4):
-        kind = chance.choice(list(FAULTS))
+        kind = chance.choice(list(ERRORS))
         place = _choose(chance, system, kind, taken)
         if place is None:
             continue
         involved = _involved(system, place)
-        found = FAULTS[kind][1](chance, system, place)
+        found = ERRORS[kind][1](chance, system, place)
         if found:
             planted.append(Planted(kind, *found))
-            # One fault in a part, so that none hides another.
+            # One error in a part, so that none hides another.
             taken |= {place[:4], found[1][:4], *involved}
         if len(planted) == count:
             break
@@ -45,7 +45,7 @@ def _choose(chance, system, kind, taken):
     places = [
         path
         for path in _paths(system.data)
-        if FAULTS[kind][0](path, _at(system, path))
+        if ERRORS[kind][0](path, _at(system, path))
         and not _overlap(taken, {path})
         and not _overlap(taken, _involved(system, path))
     ]
@@ -368,7 +368,7 @@ def is_behaviour(path, value):
     return path[0] == 'nodes' and path[-1] in ('behaviour', 'result') and isinstance(value, str)
 
 
-FAULTS: dict[str, tuple[Callable, Callable]] = {
+ERRORS: dict[str, tuple[Callable, Callable]] = {
     'key typo': (is_key, plant_key_typo),
     'value typo': (lambda path, _: path[-1] in CHOICES, plant_value_typo),
     'dangling publisher': (lambda path, _: path[-1] == 'publish', plant_dangling_publisher),
@@ -400,7 +400,7 @@ FAULTS: dict[str, tuple[Callable, Callable]] = {
     'signature': (is_behaviour, plant_signature),
     'generator': (is_behaviour, plant_generator),
     'constant': (is_behaviour, plant_constant),
-    **WIRING_FAULTS,
+    **WIRING_ERRORS,
     'duplicate key': (lambda path, _: is_entity(path), plant_duplicate),
     'bad name': (
         lambda path, _: (

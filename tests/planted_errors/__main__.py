@@ -1,22 +1,22 @@
-"""python -m tests.planted_faults --systems 2000 --seed 1"""
+"""python -m tests.planted_errors --systems 2000 --seed 1"""
 
 import argparse
 import tempfile
 from pathlib import Path
 
-from tests.planted_faults.measurement import measure
+from tests.planted_errors.measurement import measure
 
 
 def main():
-    """Plant faults in systems and print what share of them is found."""
-    parser = argparse.ArgumentParser(prog='python -m tests.planted_faults')
+    """Plant errors in systems and print what share of them is found."""
+    parser = argparse.ArgumentParser(prog='python -m tests.planted_errors')
     parser.add_argument('--systems', type=int, default=2000)
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--faults', type=int, default=4, help='the most faults of one file')
+    parser.add_argument('--errors', type=int, default=4, help='the most errors of one file')
     parser.add_argument('--show', type=int, default=10, help='how many missed ones are shown')
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        score = measure(Path(folder), arguments.seed, arguments.systems, arguments.faults)
+        score = measure(Path(folder), arguments.seed, arguments.systems, arguments.errors)
     for kind, planted in sorted(score.planted.items()):
         found = f'{score.found[kind]}/{planted} found, {score.in_line[kind]} in line'
         suggested = f'{score.suggested[kind]}/{score.to_suggest[kind]} suggested'

@@ -1,4 +1,4 @@
-"""Faults between parts: what each takes is fine, and together they are not."""
+"""Errors between parts: what each takes is fine, and together they are not."""
 
 from tests.fuzz.mutations import misspell
 
@@ -194,7 +194,7 @@ def is_served(path, _):
     return len(path) == 4 and path[2] in ('services', 'actions')
 
 
-WIRING_FAULTS = {
+WIRING_ERRORS = {
     'qos conflict': (
         lambda path, value: is_user(path, value) and path[2] == 'subscriptions',
         plant_qos_conflict,

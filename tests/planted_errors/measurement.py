@@ -1,4 +1,4 @@
-"""How many planted faults are found, on the right line, with the right suggestion."""
+"""How many planted errors are found, on the right line, with the right suggestion."""
 
 import copy
 import random
@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from tests.planted_faults.faults import plant
-from tests.planted_faults.systems import Function, Generator
-from tests.planted_faults.writing import write_yaml
+from tests.planted_errors.plants import plant
+from tests.planted_errors.systems import Function, Generator
+from tests.planted_errors.writing import write_yaml
 
 # What is rightly said of one end when the other has another name.
 CONSEQUENCES = (
@@ -24,7 +24,7 @@ CONSEQUENCES = (
 
 @dataclass
 class Score:
-    """Counts by kind of fault, and the cases that were missed."""
+    """Counts by kind of error, and the cases that were missed."""
 
     planted: Counter = field(default_factory=Counter)
     found: Counter = field(default_factory=Counter)
@@ -44,7 +44,7 @@ class Score:
         }
 
 
-def measure(folder, seed, systems, faults=4):
+def measure(folder, seed, systems, errors=4):
     """Return the score over systems that are made, checked, spoilt and checked again."""
     score, catalogue = Score(), InterfaceCatalogue()
     for number in range(systems):
@@ -57,7 +57,7 @@ def measure(folder, seed, systems, faults=4):
         score.false_alarms += [(number, each) for each in findings]
         spoilt = copy.deepcopy(system)
         spoilt.catalogue = catalogue
-        planted = plant(chance, spoilt, chance.randint(1, faults))
+        planted = plant(chance, spoilt, chance.randint(1, errors))
         lines, findings = _check(home, spoilt, random.Random(number), catalogue)
         _count(score, number, planted, lines, findings)
     return score
@@ -78,28 +78,28 @@ def _check(home, system, chance, catalogue):
 
 def _count(score, number, planted, lines, findings):
     open_findings = list(findings)
-    for fault in planted:
-        score.planted[fault.kind] += 1
-        score.to_suggest[fault.kind] += fault.meant is not None
-        line = lines[fault.path]
-        right = [each for each in open_findings if each.rule in fault.rules]
+    for error in planted:
+        score.planted[error.kind] += 1
+        score.to_suggest[error.kind] += error.meant is not None
+        line = lines[error.path]
+        right = [each for each in open_findings if each.rule in error.rules]
         right.sort(
-            key=lambda each: (each.span.line != line, f"'{fault.meant}'" not in (each.help or ''))
+            key=lambda each: (each.span.line != line, f"'{error.meant}'" not in (each.help or ''))
         )
         if not right:
-            score.missed.append((number, fault, line, 'not found'))
+            score.missed.append((number, error, line, 'not found'))
             continue
         best = right[0]
         open_findings.remove(best)
-        score.found[fault.kind] += 1
+        score.found[error.kind] += 1
         if best.span.line != line:
-            score.missed.append((number, fault, line, best))
+            score.missed.append((number, error, line, best))
             continue
-        score.in_line[fault.kind] += 1
-        if fault.meant is None:
+        score.in_line[error.kind] += 1
+        if error.meant is None:
             continue
-        if f"'{fault.meant}'" in (best.help or ''):
-            score.suggested[fault.kind] += 1
+        if f"'{error.meant}'" in (best.help or ''):
+            score.suggested[error.kind] += 1
         else:
-            score.missed.append((number, fault, line, best))
+            score.missed.append((number, error, line, best))
     score.extra += [(number, each) for each in open_findings if each.rule not in CONSEQUENCES]
