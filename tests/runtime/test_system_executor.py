@@ -9,6 +9,7 @@ pytest.importorskip('rclpy')
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.task import Future
+from std_srvs.srv import Empty
 
 from composer.executor import ComposerExecutor
 from composer.runtime.nodes.callback_groups import (
@@ -16,6 +17,7 @@ from composer.runtime.nodes.callback_groups import (
     GatedMutuallyExclusiveGroup,
     GatedReentrantGroup,
 )
+from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -38,7 +40,7 @@ def system_executor(context, node):
 def test_a_closed_gate_keeps_ticks_until_it_opens_and_the_executor_is_woken(
     system_executor, node, wait_for, kind
 ):
-    gate = Gate()
+    gate = Gate(StopRequest())
     ticks, others = [], []
     node.create_timer(0.01, lambda: ticks.append(1), callback_group=kind(gate))
     node.create_timer(0.01, lambda: others.append(1))
@@ -54,7 +56,7 @@ def test_a_closed_gate_keeps_ticks_until_it_opens_and_the_executor_is_woken(
 def test_callbacks_of_a_gated_reentrant_group_run_beside_each_other(
     context, node, wait_for, system_executor
 ):
-    gate = Gate()
+    gate = Gate(StopRequest())
     gate.open()
     system_executor.stop(DEADLINE_SEC)
     executor = SystemExecutor(context, None, print)
@@ -157,3 +159,19 @@ def test_threads_end_with_their_executor(context, wait_for):
 
     # Threads of other executors may end meanwhile.
     wait_for(lambda: set(threading.enumerate()) <= before, 'the end of its threads')
+
+
+def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(node):
+    stop = StopRequest()
+    gate = Gate(stop)
+    gate.open()
+    timer = node.create_timer(3600.0, print)
+    service = node.create_service(Empty, 'served', print)
+    assert gate.allows(timer)
+    assert gate.allows_events()
+
+    stop.make()
+    assert not gate.allows(timer)
+    assert not gate.allows_events()
+    assert gate.allows(service)
+    assert gate.allows_requests()

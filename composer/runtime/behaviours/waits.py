@@ -8,6 +8,7 @@ waits for nodes, servers and messages that are not there yet.
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -17,13 +18,17 @@ from rclpy.task import Future
 from composer.errors import SystemStoppingError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import queue
+    from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
     from composer.executor import ComposerExecutor
     from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.01
+
+# What a wait for an item gets when a stop is requested.
+_STOPPED = object()
 
 
 def stopping_error() -> SystemStoppingError:
@@ -61,7 +66,6 @@ class Waits:
             SystemStoppingError: A stop was requested meanwhile; or before, and the wait has no
                 limit.
         """
-        self._refuse_unlimited(future, timeout_sec)
         woken = threading.Event()
 
         def wake(_future: Future | None = None) -> None:
@@ -70,13 +74,14 @@ class Waits:
         future.add_done_callback(wake)
         if future.done():
             return True
-        with self.stop.waking(wake) as ends_at_stop, self.make_room():
-            woken.wait(timeout_sec)
-        return self._finish(future, wake, ends_at_stop=ends_at_stop)
+        with self._ended_by_stop(wake, timeout_sec) as is_ended:
+            if not is_ended():
+                with self.make_room():
+                    woken.wait(timeout_sec)
+        return self._finish(future, wake, is_ended=is_ended())
 
     async def until_done_async(self, future: Future, timeout_sec: float | None) -> bool:
         """As `until_done`, for coroutines."""
-        self._refuse_unlimited(future, timeout_sec)
         first: Future = Future()
 
         def wake(_future: Future | None = None) -> None:
@@ -84,12 +89,28 @@ class Waits:
                 first.set_result(None)
 
         future.add_done_callback(wake)
-        with self.stop.waking(wake) as ends_at_stop:
-            if timeout_sec is None:
+        with self._ended_by_stop(wake, timeout_sec) as is_ended:
+            if is_ended():
+                pass
+            elif timeout_sec is None:
                 await first
             else:
                 await self._with_timeout(timeout_sec, wake, first)
-        return self._finish(future, wake, ends_at_stop=ends_at_stop)
+        return self._finish(future, wake, is_ended=is_ended())
+
+    def until_next(self, items: queue.SimpleQueue[Any]) -> Any:
+        """Wait without a limit for the next item of a queue, and return it.
+
+        Raises:
+            SystemStoppingError: As `until_done`.
+        """
+        with self._ended_by_stop(lambda: items.put(_STOPPED), None) as is_ended:
+            if not is_ended():
+                with self.make_room():
+                    item = items.get()
+        if is_ended() or item is _STOPPED:
+            raise stopping_error()
+        return item
 
     def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
         """Wait until a condition holds; return whether it did in time.
@@ -123,24 +144,31 @@ class Waits:
             await self._with_timeout(_POLL_SEC, partial(pause.set_result, None), pause)
         return True
 
-    def _finish(self, future: Future, wake: Callable[..., None], *, ends_at_stop: bool) -> bool:
+    @contextmanager
+    def _ended_by_stop(
+        self, wake: Callable[[], None], timeout_sec: float | None
+    ) -> Iterator[Callable[[], bool]]:
+        """Have `wake` called at a stop; return what tells whether a stop has ended the wait.
+
+        A stop that was requested before ends only a wait without a limit.
+        """
+        with self.stop.waking(wake) as is_before_stop:
+            ends = is_before_stop or (timeout_sec is None and not self._may_wait_at_stop)
+            yield lambda: ends and self.stop.is_set
+
+    def _finish(self, future: Future, wake: Callable[..., None], *, is_ended: bool) -> bool:
         """Return how a wait for a future has ended, or raise, as `until_done` does.
 
         Args:
             wake: The callback of the future, which is removed.
-            ends_at_stop: Whether the wait began before a stop.
+            is_ended: Whether a stop has ended the wait.
         """
         if future.done():
             return True
         future.remove_done_callback(wake)
-        if ends_at_stop and self.stop.is_set:
+        if is_ended:
             raise stopping_error()
         return False
-
-    def _refuse_unlimited(self, future: Future, timeout_sec: float | None) -> None:
-        """Begin no wait without a limit when the system is stopping, except in `on_stop`."""
-        if timeout_sec is None and self._is_refused() and not future.done():
-            raise stopping_error()
 
     def _is_refused(self) -> bool:
         """Return whether behaviours may no longer wait for what is not there yet."""

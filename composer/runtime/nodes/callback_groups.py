@@ -7,7 +7,7 @@ The executor asks a group before it takes a message, so nothing is lost at a clo
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.action import ActionServer
 from rclpy.callback_groups import (
@@ -17,19 +17,27 @@ from rclpy.callback_groups import (
 )
 from rclpy.service import Service
 
+if TYPE_CHECKING:
+    from composer.runtime.stop_request import StopRequest
+
 
 class Gate:
     """Whether the behaviours of a node may run.
 
+    Args:
+        stop: From the moment of this request on, only those of services and actions may: what a
+            stop has ended must not begin anew before the node is stopped.
+
     Attributes:
-        is_open: Whether all of them may: from the start of all nodes to the request to stop.
+        is_open: Whether all of them may: from the start of all nodes to their stop.
         serves: Whether those of services and actions may: from the end of the node's own
             `on_start` to its `on_stop`.
     """
 
-    __slots__ = ('is_open', 'serves')
+    __slots__ = ('_stop', 'is_open', 'serves')
 
-    def __init__(self) -> None:
+    def __init__(self, stop: StopRequest) -> None:
+        self._stop = stop
         self.is_open = False
         self.serves = False
 
@@ -45,11 +53,14 @@ class Gate:
 
     def allows(self, entity: Any) -> bool:
         """Return whether the callback of an entity may begin."""
-        return self.is_open or (self.serves and isinstance(entity, (Service, ActionServer)))
+        # Not `allows_events`: this is asked twice for every callback.
+        return (self.is_open and not self._stop.is_set) or (
+            self.serves and isinstance(entity, (Service, ActionServer))
+        )
 
     def allows_events(self) -> bool:
         """Return whether behaviours of subscriptions, timers and the like may begin."""
-        return self.is_open
+        return self.is_open and not self._stop.is_set
 
     def allows_requests(self) -> bool:
         """Return whether behaviours of services and actions may begin."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from action_msgs.msg import GoalStatus
 
 from composer.errors import GoalTimeoutError
-from composer.runtime.behaviours.waits import stopping_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,9 +23,6 @@ _STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: 'canceled',
     GoalStatus.STATUS_ABORTED: 'aborted',
 }
-
-# What a wait for feedback gets when a stop is requested.
-_STOPPED = object()
 
 
 class Goal:
@@ -62,17 +58,9 @@ class Goal:
         Raises:
             SystemStoppingError: A stop was requested while it waited for the next one.
         """
-        while (message := self._next_feedback()) is not None:
+        while (message := self._waits.until_next(self.feedback_queue)) is not None:
             yield message
         self.feedback_queue.put(None)
-
-    def _next_feedback(self) -> Any:
-        waking = self._waits.stop.waking(lambda: self.feedback_queue.put(_STOPPED))
-        with waking, self._waits.make_room():
-            message = self.feedback_queue.get()
-        if message is _STOPPED:
-            raise stopping_error()
-        return message
 
     def cancel(self, timeout: float | None = 5.0) -> bool:
         """Ask the server to cancel the goal; return whether it agreed.

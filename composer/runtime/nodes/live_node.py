@@ -276,7 +276,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
-    gate = Gate()
+    gate = Gate(system.stop)
     waits = Waits(system.executor, system.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))

@@ -1,6 +1,8 @@
 """Waits of behaviours beside a stop of the system."""
 
+import queue
 from contextlib import nullcontext
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -31,6 +33,27 @@ def test_nor_does_one_of_a_coroutine(waits):
     waits.stop.make()
     with pytest.raises(SystemStoppingError):
         waits.until_done_async(Future(), None).send(None)
+
+
+def test_nor_does_one_for_the_next_item_of_a_queue(waits):
+    items = queue.SimpleQueue()
+    items.put('feedback')
+    assert waits.until_next(items) == 'feedback'
+    waits.stop.make()
+    with pytest.raises(SystemStoppingError):
+        waits.until_next(items)
+
+
+def test_a_stop_ends_waits_that_begin_at_any_moment_before_it(waits):
+    """A stop between the look at it and the wait was lost."""
+    waits.stop.waking = partial(stop_first, waits.stop, waits.stop.waking)
+    with pytest.raises(SystemStoppingError):
+        waits.until_done(Future(), None)
+
+
+def stop_first(stop, waking, wake):
+    stop.make()
+    return waking(wake)
 
 
 def test_one_with_an_end_does_for_what_must_be_switched_off(waits):

@@ -336,7 +336,7 @@ def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
 def check_that_a_signal_ends_it(child, waiting=1):
     child.wait_for_line('waiting', times=waiting)
 
-    assert child.stop(signal.SIGINT) == 0
+    assert child.stop(signal.SIGINT) == 0, child.output
     assert 'rror' not in child.output
     assert 'did not end' not in child.output
 
@@ -354,5 +354,5 @@ def even_wait_for_result(node):
     )
     child.wait_for_line('waiting')
 
-    assert child.stop(signal.SIGINT) == 0
+    assert child.stop(signal.SIGINT) == 0, child.output
     assert 'rror' not in child.output
