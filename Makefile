@@ -15,7 +15,7 @@ up: .venv/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: .venv/ready
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
 
 check: .venv/ready
 	$(BIN)/ruff check .
