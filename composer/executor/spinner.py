@@ -4,6 +4,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 
@@ -23,31 +24,37 @@ GRACE_SEC = 0.05
 
 
 class Notifier:
-    """Makes threads that wait for a condition check it again."""
+    """Makes threads that wait for a condition check it again.
+
+    There is no lock, as a `threading.Condition` has one: the main thread may be interrupted by
+    a `KeyboardInterrupt` at any point.
+    """
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._count = 0
+        self._waiting: dict[SimpleQueue[None], None] = {}
 
     def notify(self) -> None:
         """Have all conditions checked."""
-        with self._changed:
-            self._count += 1
-            self._changed.notify_all()
+        for wake_ups in list(self._waiting):
+            # One that has not been taken yet is followed by a check, too.
+            if wake_ups.empty():
+                wake_ups.put(None)
 
     def wait_for(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
         """Wait until `condition()`, which is called with no lock held; False after the timeout."""
         deadline = None if timeout_sec is None or timeout_sec < 0 else (monotonic() + timeout_sec)
-        while True:
-            seen = self._count
-            if condition():
-                return True
-            left = None if deadline is None else deadline - monotonic()
-            if left is not None and left <= 0:
-                return False
-            with self._changed:
-                if self._count == seen:
-                    self._changed.wait(left)
+        wake_ups: SimpleQueue[None] = SimpleQueue()
+        try:
+            self._waiting[wake_ups] = None
+            while not condition():
+                left = None if deadline is None else deadline - monotonic()
+                if left is not None and left <= 0:
+                    return False
+                with suppress(Empty):
+                    wake_ups.get(timeout=left)
+            return True
+        finally:
+            self._waiting.pop(wake_ups, None)
 
 
 class Spinner:
@@ -183,7 +190,7 @@ class Spinner:
         """Be shut down: this is a forked child, and all of this belongs to its parent."""
         others = (self.wait_set_thread, self.registry, self.workers)
         reset_locks((self, self._executor, self.scheduler, self.poller, self.poller.deadlines))
-        reset_locks((self.notifier, *others))
+        reset_locks(others)
         self.is_shutdown = True
         self.scheduler.reset_after_fork(int(self.workers.is_in_callback()))
         for part in (self.poller, *others):

@@ -1,9 +1,12 @@
 """`shutdown`, `wake`, contexts and signals."""
 
 import signal
+import sys
 import threading
 import time
 import weakref
+from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import pytest
@@ -20,6 +23,7 @@ from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
 from std_msgs.msg import Empty
 
 from composer.executor import ComposerExecutor
+from composer.executor.spinner import Notifier
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -77,6 +81,7 @@ def test_signals_end_spin(name: str, how: str, start_program: Any) -> None:
     program = f"""
 import rclpy, time
 from composer.executor import ComposerExecutor
+from composer.executor.spinner import Notifier
 rclpy.init()
 node = rclpy.create_node('node')
 executor = ComposerExecutor()
@@ -96,6 +101,37 @@ except KeyboardInterrupt:
     output, _ = process.communicate(timeout=DEADLINE_SEC)
     assert output in ('interrupted\n', 'returned\n')
     assert process.returncode == 0
+
+
+def test_a_wait_may_be_interrupted_at_any_point() -> None:
+    notifier = Notifier()
+    point = 0
+    while interrupt_at(point, lambda: notifier.wait_for(lambda: False, 0.001)):
+        point += 1
+        notifier.notify()
+        assert notifier.wait_for(lambda: True, None)
+    assert point > 20
+
+
+def interrupt_at(point: int, function: Callable[[], Any]) -> bool:
+    """Raise KeyboardInterrupt at a point of what runs; return whether there are so many."""
+    points = count()
+
+    def trace(frame: Any, event: str, _: Any) -> Any:
+        frame.f_trace_opcodes = True
+        if event == 'opcode' and next(points) == point:
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        function()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
 
 
 def test_spin_ends_when_a_signal_ends_the_context_after_it_woke_the_executor(
