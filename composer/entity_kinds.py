@@ -54,7 +54,8 @@ class EntityKind:
         has_qos: Whether it has the key `qos`.
         publishes: Whether it has the key `publish`, for what its behaviour returns.
         has_group: Whether it has the key `group`; the behaviours of others run in no group.
-        is_timed: Whether an rclpy timer calls its behaviour.
+        is_timed: Whether a timer calls its behaviour; what creates it returns something with
+            rclpy's `reset` and `cancel`.
         missed: What it can miss if callbacks take too long, as attributes of the executor's
             `MissedCounts`, by their names in diagnostics.
         behaviours: The keys that name its behaviours.

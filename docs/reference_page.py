@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from composer.entity_kinds import ENTITY_KINDS
+from composer.names import with_article
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -13,14 +16,10 @@ _TEMPLATE = {'$ref': '#/$defs/template'}
 # The objects in the order of a file, then what they refer to.
 _TITLES = {
     'node': 'A node',
-    'publisher': 'A publisher',
-    'subscription': 'A subscription',
-    'timer': 'A timer',
-    'service': 'A service',
-    'service_client': 'A service client',
-    'action': 'An action',
-    'action_client': 'An action client',
-    'parameter': 'A parameter',
+    **{
+        kind.noun.replace(' ', '_'): with_article(kind.noun).capitalize()
+        for kind in (*ENTITY_KINDS[1:], ENTITY_KINDS[0])
+    },
     'hook': 'A behaviour',
     'argument': 'An argument',
     'include': 'An include',

@@ -14,8 +14,8 @@
                                             and servers, or subscriptions and clients
      "findings", "file", "line"}],
   "edges": [                   publishers, subscriptions, servers and clients
-    {"id": "publisher:/robot/arm:scan", "role": "publisher" | "subscription" | "service server" |
-     "service client" | "action server" | "action client", "name", "node": <id>, "channel": <id>,
+    {"id": "publisher:/robot/arm:scan", "role": its kind, as in "publisher" or
+     "service client"; "service server" and "action server", "name", "node": <id>, "channel": <id>,
      "from": <id>, "to": <id>,              the way of messages, requests and goals
      "type", "qos": {"depth": 5},           policies that differ from the default; durations in s
      "findings", "file", "line"}],

@@ -71,10 +71,12 @@ class Deadlines:
             timed.deadline_ns = deadline_ns
             if deadline_ns is None:
                 return
-            heapq.heappush(self._heap, (deadline_ns, next(self._numbers), timed))
+            entry = (deadline_ns, next(self._numbers), timed)
+            heapq.heappush(self._heap, entry)
             if len(self._heap) > self._heap_limit:
                 self._drop_replaced()
-            if self._heap[0][2] is timed:
+            # An earlier entry of the same may be the first: others come between the two.
+            if self._heap[0] is entry:
                 self.timer.expire_at(deadline_ns)
 
     def run_due(self) -> None:

@@ -13,7 +13,7 @@ from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS
 from composer.names import join_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from composer.entity_kinds import EntityKind
     from composer.yaml_text.positions import DataPath
@@ -219,14 +219,8 @@ class ActionClientSpec:
 
 
 # What meets others of its kind under a name.
-EndSpec: TypeAlias = (
-    PublisherSpec
-    | SubscriptionSpec
-    | ServiceSpec
-    | ServiceClientSpec
-    | ActionSpec
-    | ActionClientSpec
-)
+TopicEndSpec: TypeAlias = PublisherSpec | SubscriptionSpec
+EndSpec: TypeAlias = TopicEndSpec | ServiceSpec | ServiceClientSpec | ActionSpec | ActionClientSpec
 
 
 # All that stands in a section of a node.
@@ -355,19 +349,28 @@ class NodeSpec:
     def entities(self) -> Iterator[tuple[EntityKind, EntitySpec]]:
         """Yield all that the node has, each with its kind."""
         for kind in ENTITY_KINDS:
-            for entity in getattr(self, kind.section).values():
+            for entity in self._of(kind):
                 yield kind, entity
 
     def ends(self) -> Iterator[tuple[EntityKind, EndSpec]]:
         """Yield all that meets others on a topic, service or action, each with its kind."""
         for kind in CHANNEL_KINDS:
-            for entity in getattr(self, kind.section).values():
+            for entity in self._of(kind):
                 yield kind, entity
 
     @property
-    def triggers(self) -> tuple[TimerSpec | SubscriptionSpec, ...]:
-        """All that may publish what a behaviour returns."""
-        return (*self.timers.values(), *self.subscriptions.values())
+    def triggers(self) -> list[Any]:
+        """All that may publish what a behaviour returns: what has the key `publish`."""
+        return [each for kind in ENTITY_KINDS if kind.publishes for each in self._of(kind)]
+
+    @property
+    def grouped(self) -> list[Any]:
+        """All whose behaviours run in a callback group: what has the key `group`."""
+        return [each for kind in ENTITY_KINDS if kind.has_group for each in self._of(kind)]
+
+    def _of(self, kind: EntityKind) -> Iterable[Any]:
+        entities: Mapping[str, Any] = getattr(self, kind.section)
+        return entities.values()
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,7 +149,7 @@ def _names_of(node: NodeSpec) -> set[str]:
 
 def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
-        for entity in (*node.triggers, *node.services.values()):
+        for entity in node.grouped:
             group = entity.group
             if group and group != REENTRANT and _is_typo(group, REENTRANT):
                 yield context.at_value(

@@ -19,7 +19,7 @@ def create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
     """Create a publisher; return what publishes a payload on it."""
     message_class = import_interface(spec.type)
     profile = create_qos_profile(spec.qos, node.system.profiles)
-    endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
+    endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.place(spec.path))
     node.endpoints.append(endpoint)
     send = node.ros.create_publisher(
         message_class, spec.topic, profile, event_callbacks=endpoint.publisher_events()

@@ -27,7 +27,7 @@ def create_subscription(node: LiveNode, spec: SubscriptionSpec) -> Any:
         may_begin=node.gate.allows_events,
     )
     profile = create_qos_profile(spec.qos, node.system.profiles)
-    endpoint = TopicEndpoint(node.ros, spec, profile, node.place(spec.path))
+    endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.place(spec.path))
     node.endpoints.append(endpoint)
     subscription = node.ros.create_subscription(
         import_interface(spec.type),

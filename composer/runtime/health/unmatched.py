@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 
+from composer.entity_kinds import KIND_OF_NOUN
 from composer.executor import checked_seldom
 from composer.language.qos_conflicts import find_qos_conflicts
-from composer.language.specs import PublisherSpec
 from composer.runtime.health.watcher import Watcher
 from composer.runtime.messages.qos_profiles import read_policies
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-    from composer.language.specs import SubscriptionSpec
+    from composer.language.specs import TopicEndSpec
 
 _PAUSE_SEC = 1.0
 # The graph may learn the name of an end some time after the event.
@@ -38,6 +38,7 @@ class TopicEndpoint:
 
     Args:
         ros: Its node.
+        noun: Its kind, as in `publisher`.
         place: Where the file declares it, as `file:line`.
 
     Attributes:
@@ -47,7 +48,8 @@ class TopicEndpoint:
     def __init__(
         self,
         ros: RosNode,
-        spec: PublisherSpec | SubscriptionSpec,
+        noun: str,
+        spec: TopicEndSpec,
         profile: QoSProfile,
         place: str,
     ) -> None:
@@ -55,7 +57,8 @@ class TopicEndpoint:
         self._place = place
         self._spec = spec
         self._profile = profile
-        self._publishes = isinstance(spec, PublisherSpec)
+        self._noun = noun
+        self._publishes = KIND_OF_NOUN[noun].provides
         self._reported: set[tuple[str, str]] = set()
         self._checks_left = 0
         self.topic = ros.resolve_topic_name(spec.topic)
@@ -108,12 +111,8 @@ class TopicEndpoint:
         return list(get(self.topic))
 
     def _report(self, name: str, reason: str) -> None:
-        kind, what = (
-            ('publisher', 'sends nothing to')
-            if self._publishes
-            else ('subscription', 'gets nothing from')
-        )
-        owner = f"{kind} '{self._spec.name}' ({self._place})"
+        what = 'sends nothing to' if self._publishes else 'gets nothing from'
+        owner = f"{self._noun} '{self._spec.name}' ({self._place})"
         self.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
 
     def _find_reason(self, end: TopicEndpointInfo) -> str | None:
