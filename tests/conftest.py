@@ -159,3 +159,10 @@ def shared_peer(shared_compose):
     peer = Peer(shared_compose.domain_id)
     yield peer
     peer.close()
+
+
+@pytest.fixture(scope='module')
+def graph(request, shared_compose, shared_peer):
+    """Return a plain node in the domain where the module's `SYSTEM` runs with its `CODE`."""
+    shared_compose(request.module.SYSTEM, request.module.CODE).wait_until_ready()
+    return shared_peer.node

@@ -84,13 +84,6 @@ def count(node):
 """
 
 
-@pytest.fixture(scope='module')
-def graph(shared_compose, shared_peer):
-    """Return the peer's node, in a domain where the system runs."""
-    shared_compose(SYSTEM, CODE).wait_until_ready()
-    return shared_peer.node
-
-
 @pytest.fixture
 def publisher_of(graph, wait_for):
     def find(topic):

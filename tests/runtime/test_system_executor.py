@@ -9,7 +9,6 @@ pytest.importorskip('rclpy')
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.task import Future
-from std_srvs.srv import Empty
 
 from composer.executor import ComposerExecutor
 from composer.runtime.nodes.callback_groups import (
@@ -159,19 +158,3 @@ def test_threads_end_with_their_executor(context, wait_for):
 
     # Threads of other executors may end meanwhile.
     wait_for(lambda: set(threading.enumerate()) <= before, 'the end of its threads')
-
-
-def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(node):
-    stop = StopRequest()
-    gate = Gate(stop)
-    gate.open()
-    timer = node.create_timer(3600.0, print)
-    service = node.create_service(Empty, 'served', print)
-    assert gate.allows(timer)
-    assert gate.allows_events()
-
-    stop.make()
-    assert not gate.allows(timer)
-    assert not gate.allows_events()
-    assert gate.allows(service)
-    assert gate.allows_requests()

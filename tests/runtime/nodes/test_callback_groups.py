@@ -4,6 +4,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from std_srvs.srv import Empty
+
+from composer.runtime.nodes.callback_groups import Gate
+from composer.runtime.stop_request import StopRequest
+
 pytestmark = pytest.mark.ros
 
 # Two behaviours meet at a barrier only if they run at the same time.
@@ -109,3 +114,19 @@ def test_a_reentrant_timer_overlaps_itself(compose):
     child = compose(text, CODE.format(timeout=30))
 
     child.wait_for_line('[INFO] [parallel]: met', times=2)
+
+
+def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(node):
+    stop = StopRequest()
+    gate = Gate(stop)
+    gate.open()
+    timer = node.create_timer(3600.0, print)
+    service = node.create_service(Empty, 'served', print)
+    assert gate.allows(timer)
+    assert gate.allows_events()
+
+    stop.make()
+    assert not gate.allows(timer)
+    assert not gate.allows_events()
+    assert gate.allows(service)
+    assert gate.allows_requests()

@@ -83,13 +83,6 @@ lives = []
 LATCHED = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-@pytest.fixture(scope='module')
-def graph(shared_compose, shared_peer):
-    """Return the peer's node, in a domain where the system runs."""
-    shared_compose(SYSTEM, CODE).wait_until_ready()
-    return shared_peer.node
-
-
 @pytest.fixture
 def services_of(graph, wait_for):
     """Return a function that returns the last parts of the names of a node's services."""
