@@ -35,7 +35,7 @@ class SourceFile:
 
     @property
     def folder(self) -> Path:
-        """The folder for relative paths in it: that of the file itself, not that of a link to it."""
+        """The folder for relative paths in it; of a symbolic link, that of its target."""
         if self.home is not None:
             return Path(self.home)
         # As Path.is_symlink and Path.resolve, but for any name.
