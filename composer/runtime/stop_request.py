@@ -20,11 +20,15 @@ class StopRequest:
     Attributes:
         is_set: Whether it was made.
         code: The exit code: the first one that was not 0.
+        system_is_up: Whether all of the system has started.
+        kill_processes: Kills all external processes at once; a signal handler may call it.
     """
 
     def __init__(self) -> None:
         self.is_set = False
         self.code: int = ExitCode.DONE
+        self.system_is_up = False
+        self.kill_processes: Callable[[], None] = lambda: None
         self._callbacks: dict[Callable[[], None], None] = {}
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
 

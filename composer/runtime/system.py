@@ -43,6 +43,7 @@ class System:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
+        stop_request: The request to stop it; by default a new one.
 
     Attributes:
         has_ended: Whether everything has been destroyed. If not, behaviours still run after
@@ -56,11 +57,12 @@ class System:
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
+        stop_request: StopRequest | None = None,
     ) -> None:
         self._spec = spec
         self.has_ended = False
         self._begun = monotonic()
-        self._stop_request = StopRequest()
+        self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
@@ -84,6 +86,7 @@ class System:
             ros_arguments,
             log_levels,
         )
+        self._stop_request.kill_processes = self._processes.kill_all
 
     def _create_handle(
         self,
@@ -122,10 +125,6 @@ class System:
         """
         self._stop_request.make(code)
 
-    def kill_processes(self) -> None:
-        """Kill all external processes; a signal handler may call it before it ends this one."""
-        self._processes.kill_all()
-
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
@@ -157,6 +156,7 @@ class System:
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        self._stop_request.system_is_up = True
         self._starter.open(prompt)
 
     def wait(self) -> None:

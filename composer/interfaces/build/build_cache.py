@@ -24,6 +24,7 @@ from pathlib import Path
 
 from composer.errors import ComposerError
 from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.signals import interrupting
 
 # Raise it whenever the builder builds something else from the same definitions.
 BUILDER_FORMAT = 1
@@ -129,11 +130,12 @@ def _fill(place: Path, folder: BuildFolder, build: Callable[[BuildFolder], None]
     _remove_leftovers(place.parent, place)
     shutil.rmtree(folder.path, ignore_errors=True)
     folder.path.mkdir()
-    try:
-        build(folder)
-        folder.path.rename(place)
-    finally:
-        shutil.rmtree(folder.path, ignore_errors=True)
+    with interrupting():
+        try:
+            build(folder)
+            folder.path.rename(place)
+        finally:
+            shutil.rmtree(folder.path, ignore_errors=True)
 
 
 @contextmanager
