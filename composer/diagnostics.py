@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
@@ -34,8 +35,12 @@ class SourceFile:
 
     @property
     def folder(self) -> Path:
-        """The folder for relative paths in it, as the user would write it."""
-        return Path(self.name).parent if self.home is None else Path(self.home)
+        """The folder for relative paths in it; of a symbolic link, that of its target."""
+        if self.home is not None:
+            return Path(self.home)
+        # As Path.is_symlink and Path.resolve, but for any name.
+        is_link = os.path.islink(self.name)  # noqa: PTH114
+        return Path(os.path.realpath(self.name) if is_link else self.name).parent
 
     def line(self, number: int) -> str:
         """Return line `number`, counted from 1; an empty string past the end."""

@@ -114,11 +114,13 @@ class IncludeEntry:
 
 def shown_path(path: Path) -> str:
     """Return a path as findings show it: relative to the working folder if it is inside it."""
-    plain = Path(os.path.normpath(path))
+    real = os.path.realpath(path)
     try:
-        return str(plain.resolve().relative_to(Path.cwd()))
+        return str(Path(real).relative_to(Path.cwd()))
     except ValueError:
-        return str(plain)
+        # 'folder/..' is another folder if 'folder' is a link.
+        plain = os.path.normpath(path)
+        return plain if os.path.realpath(plain) == real else real
 
 
 def _locate_file(text: str, place: Span) -> Path:
