@@ -139,8 +139,7 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
-            for spec in self._spec.nodes.values():
-                self._starter.create(spec)
+            self._starter.create(self._spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_diagnostics()
