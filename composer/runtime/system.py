@@ -13,6 +13,7 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
+from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
@@ -75,6 +76,7 @@ class System:
         self._restarter = NodeRestarter(
             self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
         )
+        self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._diagnostics_publisher: DiagnosticsPublisher | None = None
         self._processes = ProcessSupervisor(
             spec.processes.values(),
@@ -145,6 +147,7 @@ class System:
             self._executor.start()
             self._hang_watcher.start()
             self._graph_watcher.start()
+            self._parameter_services.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
@@ -158,6 +161,7 @@ class System:
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
+        self._parameter_services.begin()
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -171,6 +175,7 @@ class System:
             run, and only the end of this process ends them.
         """
         self._error_policy.stop()
+        self._parameter_services.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
         # Processes end after the nodes: an `on_stop` may need them.
