@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.event_poller import UNKNOWN_COUNT
+from composer.executor.event_fds import UNKNOWN_COUNT
 
 _MIN_PAUSE_SEC = 0.0005
 _MAX_PAUSE_SEC = 0.01
