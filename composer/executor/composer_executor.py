@@ -14,8 +14,8 @@ from rclpy.task import Future, Task
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
-from composer.executor.event_source import MissedCounts
 from composer.executor.scheduler import ScheduledTask
+from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import GRACE_SEC, Spinner
 
 _MAX_THREADS = 256

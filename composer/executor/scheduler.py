@@ -15,7 +15,7 @@ import rclpy.timer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.event_poller import UNKNOWN_COUNT
+from composer.executor.event_fds import UNKNOWN_COUNT
 
 # rclpy 9, which brought `TimerInfo`, executes the oldest task first.
 _OLDEST_TASK_FIRST = hasattr(rclpy.timer, 'TimerInfo')

@@ -14,7 +14,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from composer.executor.after_fork import end_child, reset_locks
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.event_loop import CallbackRunner, EventLoop
-from composer.executor.event_source import ExecutorParts
+from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.switch_interval import short_switch_interval
 from composer.executor.wait_set_thread import WaitSetThread
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker

@@ -131,3 +131,4 @@ class NodeRestarter:
         self._system.executor.add_node(node.ros)
         self._starter.run_on_start(node)
         self._starter.open([node])
+        node.ros.start_parameter_services()

@@ -12,6 +12,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('test_msgs')
 
 import rclpy
+from raw_topics import RawPublisher
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import ClockType
 from rclpy.context import Context
@@ -20,9 +21,9 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
 from std_msgs.msg import Int32
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from composer.executor import ComposerExecutor
+from composer.executor import ComposerExecutor, MissedCounts
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -371,3 +372,44 @@ def test_a_response_waits_for_a_message_that_came_after_the_last_look(
     executor.spin_until_future_complete(future, timeout_sec=DEADLINE_SEC)
     wait_for(lambda: executor.spin_once(timeout_sec=0) or 'response' in heard)
     assert heard == ['message', 'response']
+
+
+@pytest.mark.parametrize(
+    ('topic', 'message_type'),
+    [('rq/switchRequest', SetBool.Request), ('rr/switchReply', SetBool.Response)],
+)
+def test_malformed_requests_and_responses_delay_nobody(
+    node: Any, executor: Any, context: Context, topic: str, message_type: Any
+) -> None:
+    other = rclpy.create_node('other', context=context)
+    client = node.create_client(SetBool, 'switch')
+    node.create_service(SetBool, 'switch', lambda _, r: r)
+    node.create_service(SetBool, 'other', lambda _, r: r)
+    peer = RawPublisher(other, message_type, topic)
+    with spinning(executor):
+        wait_for(peer.is_matched)
+        wait_for(client.call_async(SetBool.Request()).done)
+        for _ in range(40):
+            peer.publish(bytes([0, 1, 0, 0]))
+        for _ in range(3):
+            wait_for(client.call_async(SetBool.Request()).done)
+    peer.destroy()
+    other.destroy_node()
+
+
+def test_a_new_subscription_has_missed_nothing_of_a_destroyed_one(
+    node: Any, executor: Any
+) -> None:
+    ticks: list[int] = []
+    node.create_timer(0.01, lambda: ticks.append(1))
+    before = node.create_subscription(Int32, 'count', print, 10)
+    publisher = node.create_publisher(Int32, 'count', 100)
+    executor.spin_once(timeout_sec=0)
+    for number in range(30):
+        publisher.publish(Int32(data=number))
+    node.destroy_subscription(before)
+    executor.spin_once(timeout_sec=0)
+    silent = node.create_subscription(Int32, 'silent', print, 10)
+    with spinning(executor):
+        wait_for(lambda: len(ticks) > 3)
+        assert executor.missed_counts(node, silent) == MissedCounts()
