@@ -33,6 +33,7 @@ def run_system(
     *,
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
+    ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
 
@@ -41,6 +42,9 @@ def run_system(
     unless it was ignored before, as by `nohup`; further ones change nothing. If a behaviour does
     not end, this ends the process with the exit code, since its thread cannot be ended. A SIGINT
     before the system is up gives the exit code 130.
+
+    Args:
+        ends_process: Whether the process exits afterwards: that is how a large system ends fast.
 
     Returns:
         The exit code.
@@ -54,7 +58,15 @@ def run_system(
         log_levels(list(spec.nodes.values()), log_level_requests),
         _handling_signals(stop, spec),
     ):
-        system = System(spec, positions, functions, ros_arguments, log_level_requests, stop)
+        system = System(
+            spec,
+            positions,
+            functions,
+            ros_arguments,
+            log_level_requests,
+            stop_request=stop,
+            ends_process=ends_process,
+        )
         try:
             system.start()
             try:

@@ -1,10 +1,15 @@
 """Signals at any moment: before a system is up, and while its process exits."""
 
+import os
 import signal
+import subprocess
+import sys
 
 import pytest
 
 pytest.importorskip('rclpy')
+
+from tests.running import ROOT
 
 pytestmark = pytest.mark.ros
 
@@ -89,3 +94,29 @@ def test_while_the_process_exits_the_code_is_that_of_the_stop(compose, moment, n
     assert child.stop(number) == code
     assert not child.matching('Traceback')
     assert not child.matching('ignored')
+
+
+PRINTING = """
+def start(node):
+    print('one', 'two', 'three', sep='\\n', flush=True)
+"""
+
+
+@pytest.mark.parametrize('streams', ['', '2>&1'])
+def test_a_system_ends_when_nobody_reads_its_output(compose, streams):
+    path = compose.write(SYSTEM, PRINTING)
+    script = f'("$0" -m composer up "$1" {streams}; echo "$?" >code) | head -n 2'
+    result = subprocess.run(
+        ['sh', '-c', script, sys.executable, path.name],
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=True,
+    )
+
+    assert result.stdout == 'one\ntwo\n'
+    assert (compose.folder / 'code').read_text() == '1\n'
+    said = [line for line in result.stderr.splitlines() if line.startswith('[ERROR]')]
+    assert len(said) == (0 if streams else 1)
