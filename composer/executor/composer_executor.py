@@ -2,6 +2,7 @@
 
 import atexit
 import os
+import threading
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -76,12 +77,16 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def add_node(self, node: Any) -> bool:
         """Run the callbacks of `node`; returns False if the executor has it already."""
-        with self._nodes_lock:
+        with _moving:
             if node in self._nodes:
                 return False
-            self._nodes.add(node)
-            self._spinner.scheduler.set_nodes(self._nodes)
-        node.executor = self
+            # It leaves its executor first, which stops to listen to what this one will listen to.
+            if node.executor not in (None, self):
+                node.executor.remove_node(node)
+            with self._nodes_lock:
+                self._nodes.add(node)
+            node.executor = self
+        self._spinner.scheduler.retry_suspended()
         self.wake()
         return True
 
@@ -91,8 +96,8 @@ class ComposerExecutor(MultiThreadedExecutor):
             if node not in self._nodes:
                 return
             self._nodes.remove(node)
-            self._spinner.scheduler.set_nodes(self._nodes)
         self._spinner.registry.drop(node)
+        self._spinner.scheduler.retry_suspended()
         self.wake()
 
     def missed_counts(self, node: Any, entity: Any) -> MissedCounts:
@@ -209,6 +214,8 @@ def _is_over(future: Any) -> Callable[[], bool]:
     return lambda: future.done() or future.cancelled()
 
 
+# Held while a node leaves one executor for another: two threads may move the same node.
+_moving = threading.RLock()
 _executors: weakref.WeakSet[ComposerExecutor] = weakref.WeakSet()
 
 
@@ -223,6 +230,7 @@ _kept_for_parent: list[Any] = []
 
 
 def _reset_all_after_fork() -> None:
+    _moving._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001
     for executor in tuple(_executors):
         executor.reset_after_fork()
     _executors.clear()

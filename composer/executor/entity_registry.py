@@ -66,9 +66,10 @@ class EntityRegistry:
 
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
-        nodes = self._parts.executor.get_nodes()
         with self._lock:
+            # First this, then that: a node that is added in between makes it stale again.
             self.is_stale = False
+            nodes = self._parts.executor.get_nodes()
             begin = monotonic()
             changed = False
             for node in self._nodes.keys() - set(nodes):

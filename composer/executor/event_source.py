@@ -55,7 +55,10 @@ class ExecutorParts:
         self.executor = executor
         self.poller = EventPoller()
         self.deadlines = self.poller.deadlines
-        self.scheduler = Scheduler(max_running, self.poller.wake)
+        self.scheduler = Scheduler(max_running, self.poller.wake, self._has_node)
+
+    def _has_node(self, node: Any) -> bool:
+        return node in self.executor._nodes  # noqa: SLF001
 
 
 class EventSource:

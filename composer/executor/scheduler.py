@@ -90,6 +90,7 @@ class Scheduler:
     Args:
         max_running: How many callbacks may run at the same time.
         wake: Makes the threads that wait for events look again.
+        has_node: Tells whether the executor has a node, whose suspended callbacks it may resume.
 
     Attributes:
         running: How many callbacks have begun and not ended.
@@ -98,7 +99,9 @@ class Scheduler:
         is_closed: Whether no callback begins any more.
     """
 
-    def __init__(self, max_running: int, wake: Callable[[], None]) -> None:
+    def __init__(
+        self, max_running: int, wake: Callable[[], None], has_node: Callable[[Any], bool]
+    ) -> None:
         self.lock = threading.RLock()  # A finalizer may create a task.
         self.running = 0
         self.waiting = 0
@@ -106,12 +109,12 @@ class Scheduler:
         self.is_closed = False
         self._max_running = max_running
         self._wake = wake
+        self._has_node = has_node
         self._ready: deque[QueuedSource] = deque()
         self._tasks: list[ScheduledTask] = []
         self._new_tasks: list[ScheduledTask] = []
         self._tasks_without_node: list[ScheduledTask] = []
         self._deferred: list[QueuedSource] = []
-        self._nodes: set[Any] = set()
         self._prefers_tasks = True
         self._groups: WeakKeyDictionary[Any, Group] = WeakKeyDictionary()
 
@@ -170,10 +173,9 @@ class Scheduler:
             self._new_tasks.append(task)
         self._wake()
 
-    def set_nodes(self, nodes: set[Any]) -> None:
-        """Set the nodes whose suspended callbacks may be resumed."""
+    def retry_suspended(self) -> None:
+        """Queue the suspended callbacks again whose nodes were not in the executor."""
         with self.lock:
-            self._nodes = set(nodes)
             tasks, self._tasks_without_node = self._tasks_without_node, []
         # Those of destroyed nodes are dropped, which runs their `finally:` blocks.
         kept = [task for task in tasks if not task.is_orphan()]
@@ -286,7 +288,7 @@ class Scheduler:
             self._tasks, self._new_tasks = self._new_tasks, []
         while self._tasks:
             task = self._tasks.pop()
-            if task.node is not None and task.node not in self._nodes:
+            if task.node is not None and not self._has_node(task.node):
                 self._tasks_without_node.append(task)
                 continue
             self._prefers_tasks = False
