@@ -92,6 +92,23 @@ def provide_declared(
     return provide_packages(needed, progress)
 
 
+def import_declared(declared: DeclaredPackages, progress: Callable[[str], None]) -> list[Path]:
+    """Make the packages that a file declares importable; see `provide_declared`.
+
+    Returns:
+        The prefixes of those that are not installed, each after those that it uses.
+
+    Raises:
+        ComposerError: A package cannot be provided, or another Python module has its name.
+    """
+    provided = provide_declared(declared, progress)
+    if not provided:
+        return []
+    from composer.interfaces.build.provision import import_packages
+
+    return import_packages(provided)
+
+
 def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:
     return {package: Path(folder) for package, folder in spec.interfaces.items()} if spec else {}
 

@@ -3,34 +3,58 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import PACKAGE_INDEX, ament_prefixes
+from composer.ament import PACKAGE_INDEX
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Mapping, Sequence
 
     from composer.language.specs import SystemSpec
 
 
-def extend_variables(variables: Mapping[str, str], prefixes: Sequence[Path]) -> dict[str, str]:
-    """Return the values of variables by which programs find packages and what is there already.
+@dataclass(frozen=True, slots=True)
+class Entries:
+    """What to add to a variable that holds a list of paths.
+
+    Attributes:
+        first: The paths to put first.
+        last: Those to put last.
+    """
+
+    first: Sequence[str]
+    last: Sequence[str] = ()
+
+    def add_to(self, value: str | None) -> str:
+        """Return a value with the paths added, and none of them twice."""
+        before = value.split(os.pathsep) if value else []
+        return os.pathsep.join(dict.fromkeys([*self.first, *before, *self.last]))
+
+
+def find_entries(prefixes: Sequence[Path]) -> dict[str, Entries]:
+    """Return what to add to which variables to find packages that are not installed.
 
     Args:
-        variables: the environment before.
-        prefixes: of the packages.
+        prefixes: Of the packages.
     """
     if not prefixes:
         return {}
-    # Tools take what AMENT_PREFIX_PATH does not name for not installed: wheels, for example.
-    installed = [each for each in ament_prefixes() if (each / PACKAGE_INDEX).is_dir()]
+    # Tools find only what AMENT_PREFIX_PATH names; wheels are used without it.
+    wheels = [str(each) for each in (Path(sys.prefix),) if (each / PACKAGE_INDEX).is_dir()]
     return {
-        'AMENT_PREFIX_PATH': _extend(variables, 'AMENT_PREFIX_PATH', prefixes, installed),
-        'LD_LIBRARY_PATH': _extend(variables, 'LD_LIBRARY_PATH', (p / 'lib' for p in prefixes)),
-        'PYTHONPATH': _extend(variables, 'PYTHONPATH', (p / 'python' for p in prefixes)),
+        'AMENT_PREFIX_PATH': Entries([str(each) for each in prefixes], wheels),
+        'LD_LIBRARY_PATH': Entries([str(each / 'lib') for each in prefixes]),
+        'PYTHONPATH': Entries([str(each / 'python') for each in prefixes]),
     }
+
+
+def extend_variables(variables: Mapping[str, str], prefixes: Sequence[Path]) -> dict[str, str]:
+    """Return the new values of the variables by which programs find packages."""
+    entries = find_entries(prefixes)
+    return {name: each.add_to(variables.get(name)) for name, each in entries.items()}
 
 
 def extend_processes(spec: SystemSpec, prefixes: Sequence[Path]) -> SystemSpec:
@@ -44,11 +68,3 @@ def extend_processes(spec: SystemSpec, prefixes: Sequence[Path]) -> SystemSpec:
         name: replace(process, env=extend(process.env)) for name, process in spec.processes.items()
     }
     return replace(spec, processes=processes)
-
-
-def _extend(
-    variables: Mapping[str, str], name: str, first: Iterable[Path], last: Iterable[Path] = ()
-) -> str:
-    before = variables.get(name)
-    entries = before.split(os.pathsep) if before else []
-    return os.pathsep.join(dict.fromkeys([*map(str, first), *entries, *map(str, last)]))

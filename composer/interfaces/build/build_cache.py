@@ -6,9 +6,9 @@
         example_interfaces-1f6a….lock      locked by the process that builds it
 
 A package is built in its partial folder, which is renamed at the end. A folder that does not fit
-its manifest is damaged, and built again. Generators and compilers inherit the lock: no other process builds the package while
-one of them still writes, even if the process that started them was killed. A partial folder whose
-lock is free is removed.
+its manifest is damaged, and built again. Generators and compilers inherit the lock: no other
+process builds the package while one of them still writes, even if the process that started them
+was killed. A partial folder whose lock is free is removed.
 """
 
 import errno
@@ -23,13 +23,9 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
 
+from composer.ament import BUILD_MANIFEST
 from composer.errors import ComposerError
-from composer.interfaces.build.manifest import (
-    BUILD_MANIFEST,
-    is_intact,
-    read_manifest,
-    write_manifest,
-)
+from composer.interfaces.build.manifest import is_intact, read_manifest, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 
 # Raise it whenever the builder builds something else from the same definitions.

@@ -127,6 +127,21 @@ class _Provider:
         self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
 
 
+def import_packages(provided: Iterable[ProvidedPackage]) -> list[Path]:
+    """Let Python import packages.
+
+    Returns:
+        The prefixes of those that are not installed.
+
+    Raises:
+        ModuleTakenError: another Python module has a package's name.
+    """
+    built = [each for each in provided if not each.is_installed]
+    for each in built:
+        make_importable(each.package, each.prefix)
+    return [each.prefix for each in built]
+
+
 def make_importable(package: str, prefix: Path) -> None:
     """Let Python import a package from a prefix.
 
@@ -136,11 +151,7 @@ def make_importable(package: str, prefix: Path) -> None:
         ModuleTakenError: Python finds another module of that name first.
     """
     folder = prefix / 'python'
-    for entry in [*sys.path]:
-        other = Path(entry)
-        if other != folder and (other.parent / BUILD_MANIFEST).exists():
-            if (other / package).is_dir():
-                sys.path.remove(entry)
+    sys.path[:] = [each for each in sys.path if not _is_other_build(Path(each), folder, package)]
     if str(folder) not in sys.path:
         sys.path.append(str(folder))
         importlib.invalidate_caches()
@@ -155,6 +166,11 @@ def make_importable(package: str, prefix: Path) -> None:
             help='rename one of them; if the definitions changed since the package was imported, '
             'start again',
         )
+
+
+def _is_other_build(entry: Path, folder: Path, package: str) -> bool:
+    is_build = entry != folder and (entry.parent / BUILD_MANIFEST).exists()
+    return is_build and (entry / package).is_dir()
 
 
 def _find_origin(package: str) -> Path | None:
