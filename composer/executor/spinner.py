@@ -14,7 +14,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from composer.executor.after_fork import end_child, reset_locks
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.event_loop import CallbackRunner, EventLoop
-from composer.executor.event_source import ExecutorParts
+from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.switch_interval import short_switch_interval
 from composer.executor.wait_set_thread import WaitSetThread
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker
@@ -174,13 +174,18 @@ class Spinner:
         self.wake()
         return self._wait_for_end(timeout_sec)
 
-    def tear_down(self, nodes: list[Any]) -> None:
-        """Stop listening to `nodes`, end the threads, and close what they waited for."""
+    def tear_down(self, nodes: list[Any], timeout_sec: float) -> None:
+        """Stop listening to `nodes`, end the threads, and close what they waited for.
+
+        Args:
+            nodes: The nodes.
+            timeout_sec: How long to wait for the end of the threads.
+        """
         for node in nodes:
             with suppress(InvalidHandle):
                 self.registry.drop(node)
         self.wait_set_thread.close()
-        self.workers.end(GRACE_SEC)
+        self.workers.end(timeout_sec)
         if not self.workers.is_in_callback():
             self.notifier.wait_for(lambda: not self._spinning_once, GRACE_SEC)
         if not self._spinning_once and not self.workers.has_threads():
