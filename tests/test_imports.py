@@ -18,6 +18,7 @@ ROOMS = (
         'version',
         'spelling',
         'terminal',
+        'input_limits',
         'names',
         'ament',
         'entity_kinds',
