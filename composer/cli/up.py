@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from typing import TYPE_CHECKING
 
 import click
@@ -14,7 +15,7 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared_packages import provide_declared
+from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
@@ -37,6 +38,8 @@ def up(
     ros_arguments: Sequence[str] = (),
     log_levels: Sequence[str] = (),
     set_values: Sequence[str] = (),
+    *,
+    ends_process: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
 
@@ -46,6 +49,7 @@ def up(
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all nodes, `talker:=debug` for one.
         set_values: Values to change, as in `nodes.talker.log_level=debug`.
+        ends_process: Whether the process exits afterwards.
 
     Raises:
         RosNotFoundError: There is no rclpy.
@@ -64,26 +68,38 @@ def up(
     # ROS reads it when it is imported.
     with environment_set(context.spec.environment):
         check_middleware(context.spec.environment)
-        return _run(context, ros_arguments, log_levels)
+        return _run(context, ros_arguments, log_levels, ends_process=ends_process)
 
 
-def _run(context: CheckContext, ros_arguments: Sequence[str], log_levels: Sequence[str]) -> int:
+def _run(
+    context: CheckContext,
+    ros_arguments: Sequence[str],
+    log_levels: Sequence[str],
+    *,
+    ends_process: bool,
+) -> int:
+    from composer.interfaces.search_paths import extend_processes, extend_variables
     from composer.runtime.behaviours.callables import project_on_path
+    from composer.runtime.environment import environment_set
     from composer.runtime.run import run_system
 
     system = context.system
-    provide_declared(context.interfaces, lambda line: click.echo(line, err=True))
-    with project_on_path(project_search_path(system.files)):
+    prefixes = import_declared(context.interfaces, lambda line: click.echo(line, err=True))
+    with (
+        environment_set(extend_variables(os.environ, prefixes)),
+        project_on_path(project_search_path(system.files)),
+    ):
         functions, findings = import_behaviours(context)
         # The check has already reported comments that silence nothing.
         if _report(leave_out_silenced(findings, system.positions.source)):
             return ExitCode.FAILED
         return run_system(
-            context.spec,
+            extend_processes(context.spec, prefixes),
             system.positions,
             functions,
             ros_arguments=ros_arguments,
             log_level_requests=log_levels,
+            ends_process=ends_process,
         )
 
 

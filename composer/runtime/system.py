@@ -17,7 +17,7 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.ros_context import create_ros_context
+from composer.runtime.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -44,10 +44,11 @@ class System:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
+        ends_process: Whether the process exits after the stop. Nothing may use ROS then.
 
     Attributes:
-        has_ended: Whether everything has been destroyed. If not, behaviours still run after
-            `stop`, and only the end of this process ends them.
+        has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
+            only the end of this process ends them.
     """
 
     def __init__(
@@ -57,8 +58,11 @@ class System:
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
+        *,
+        ends_process: bool = False,
     ) -> None:
         self._spec = spec
+        self._ends_process = ends_process
         self.has_ended = False
         self._begun = monotonic()
         self._stop_request = StopRequest()
@@ -139,8 +143,7 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
-            for spec in self._spec.nodes.values():
-                self._starter.create(spec)
+            self._starter.create(self._spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_diagnostics()
@@ -184,7 +187,7 @@ class System:
         for node in self._nodes.values():
             node.errors.flush()
         if ended:
-            self._destroy()
+            self._end_graph()
         self.has_ended = ended
         return self._stop_request.code, ended
 
@@ -227,7 +230,7 @@ class System:
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'/diagnostics is not published: {error}')
+            system_logger.warning(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 
@@ -247,20 +250,24 @@ class System:
             system_logger.error('the ROS context was shut down, so the system ends')
             self.request_stop(ExitCode.FAILED)
 
-    def _destroy(self) -> None:
+    def _end_graph(self) -> None:
         self._graph_watcher.stop()
         if self._diagnostics_publisher is not None:
             self._diagnostics_publisher.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)
+        self._hang_watcher.stop()
+        release(self._context)
+        if not (self._ends_process and leave_graph_at_exit(self._context, self._nodes)):
+            self._destroy_nodes()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+    def _destroy_nodes(self) -> None:
         for node in self._nodes.values():
             node.destroy()
         self._nodes.clear()
-        self._hang_watcher.stop()
-        release(self._context)
-        self._context.try_shutdown()
-        self._context.destroy()
 
 
 def _limits(spec: SystemSpec) -> Iterator[float | None]:
