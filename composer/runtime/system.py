@@ -230,7 +230,7 @@ class System:
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'/diagnostics is not published: {error}')
+            system_logger.warning(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 
