@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
+from composer.processes.guardian_client import end_marked
 from composer.processes.supervisor import ProcessSupervisor
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
+    from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
@@ -42,6 +45,7 @@ class System:
     Args:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
+        guardian: Ends the process if the stop takes too long.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
         ends_process: Whether the process exits after the stop. Nothing may use ROS then.
@@ -56,12 +60,14 @@ class System:
         spec: SystemSpec,
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
+        guardian: GuardianClient,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
         ends_process: bool = False,
     ) -> None:
         self._spec = spec
+        self._guardian = guardian
         self._ends_process = ends_process
         self.has_ended = False
         self._begun = monotonic()
@@ -178,19 +184,32 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
+        self._guardian.begin_stop()
+        try:
+            self.has_ended = self._stop()
+        except BaseException as error:  # noqa: BLE001 - the process must end, whatever is broken
+            self._stop_request.set_code(ExitCode.FAILED)
+            system_logger.error(f'the stop failed: {format_internal_error(error)}')
+        return self._stop_request.code, self.has_ended
+
+    def _stop(self) -> bool:
+        """Stop everything; return whether all behaviours have ended."""
+        timeout_sec = self._spec.shutdown_timeout_sec
         self._error_policy.stop()
         self._parameter_services.stop()
         with self._restarter.lock:
-            ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+            ended = stop_nodes(list(self._nodes.values()), timeout_sec)
         # Processes end after the nodes: an `on_stop` may need them.
-        if not (self._processes.stop() and ended):
+        none_killed = self._processes.stop()
+        if self._guardian.mark:
+            none_killed &= end_marked(self._guardian.mark, timeout_sec, system_logger)
+        if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
             node.errors.flush()
         if ended:
             self._end_graph()
-        self.has_ended = ended
-        return self._stop_request.code, ended
+        return ended
 
     def _start_all(self) -> list[LiveNode]:
         """Start all processes and nodes; return the nodes whose gates are still to be opened."""
