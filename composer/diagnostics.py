@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from typing import Unpack
 
 
-# Nobody reads more of one file, and to find a hundred thousand would take minutes.
-MAX_FINDINGS = 1000
 _LONGEST = 2000
 
 
@@ -162,6 +160,11 @@ def _printable(text: str) -> str:
     if text.isprintable():
         return text
     return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
+def errors_first(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return findings with the errors before the warnings: only the first may be shown."""
+    return sorted(diagnostics, key=lambda each: each.severity is not Severity.ERROR)
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:

@@ -12,7 +12,17 @@ import composer
 PACKAGE = Path(composer.__file__).parent
 # From low to high: a room imports from itself and from rooms above it in this list.
 ROOMS = (
-    *('errors', 'version', 'spelling', 'names', 'ament', 'entity_kinds', 'rules', 'diagnostics'),
+    *(
+        'errors',
+        'input_limits',
+        'version',
+        'spelling',
+        'names',
+        'ament',
+        'entity_kinds',
+        'rules',
+        'diagnostics',
+    ),
     *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
     *('python_source', 'checks', 'reports', 'drawing', 'executor', 'processes', 'runtime'),
     *('cli', 'api', '__init__', '__main__'),

@@ -30,7 +30,8 @@ from composer.checks.processes import (
     check_processes,
 )
 from composer.checks.references import check_publish, check_qos, check_types
-from composer.diagnostics import MAX_FINDINGS
+from composer.diagnostics import errors_first
+from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
 from composer.language.pipeline import load_system
@@ -131,8 +132,8 @@ def check_in_context(
 def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
     if len(findings) <= MAX_FINDINGS:
         return findings
-    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
-    return [*findings[: MAX_FINDINGS - 1], last]
+    shown = sorted(errors_first(findings)[:MAX_FINDINGS], key=lambda finding: finding.sort_key)
+    return [*shown[:-1], replace(shown[-1], help=_MORE)]
 
 
 def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:

@@ -148,11 +148,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         with _calling_when_done(future, self._spinner.wake):
             self._spinner.spin_once(_is_over(future), timeout_sec)
 
-    def shutdown(self, timeout_sec: float | None = None) -> bool:
+    def shutdown(self, timeout_sec: float | None = None, *, wait_for_threads: bool = True) -> bool:
         """Begin no more callbacks and wait for those that run.
 
         Args:
             timeout_sec: Seconds to wait; None or negative for ever, 0 not at all.
+            wait_for_threads: Wait until the threads that have nothing to do any more have ended.
 
         Returns:
             False if callbacks still ran after that time; then this can be called again.
@@ -161,7 +162,7 @@ class ComposerExecutor(MultiThreadedExecutor):
         must_end = timeout_sec is not None or self._spinner.is_context_valid()
         if not self._spinner.stop(timeout_sec if must_end else GRACE_SEC) and must_end:
             return False
-        self._spinner.tear_down(self.get_nodes())
+        self._spinner.tear_down(self.get_nodes(), GRACE_SEC if wait_for_threads else 0.0)
         with self._nodes_lock:
             self._nodes: set[Any] = set()
         with self._shutdown_lock:

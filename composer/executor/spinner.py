@@ -174,13 +174,18 @@ class Spinner:
         self.wake()
         return self._wait_for_end(timeout_sec)
 
-    def tear_down(self, nodes: list[Any]) -> None:
-        """Stop listening to `nodes`, end the threads, and close what they waited for."""
+    def tear_down(self, nodes: list[Any], timeout_sec: float) -> None:
+        """Stop listening to `nodes`, end the threads, and close what they waited for.
+
+        Args:
+            nodes: The nodes.
+            timeout_sec: How long to wait for the end of the threads.
+        """
         for node in nodes:
             with suppress(InvalidHandle):
                 self.registry.drop(node)
         self.wait_set_thread.close()
-        self.workers.end(GRACE_SEC)
+        self.workers.end(timeout_sec)
         if not self.workers.is_in_callback():
             self.notifier.wait_for(lambda: not self._spinning_once, GRACE_SEC)
         if not self._spinning_once and not self.workers.has_threads():

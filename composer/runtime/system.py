@@ -149,8 +149,7 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
-            for spec in self._spec.nodes.values():
-                self._starter.create(spec)
+            self._starter.create(self._spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_diagnostics()
@@ -250,7 +249,7 @@ class System:
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'/diagnostics is not published: {error}')
+            system_logger.warning(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 

@@ -1,9 +1,12 @@
 """Timers, subscriptions, services and clients as event sources."""
 
+import inspect
 import threading
 from time import monotonic_ns
 from typing import Any
 
+import rclpy.exceptions
+import rclpy.timer
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
@@ -23,13 +26,17 @@ A thread that computes lets go of the interpreter once in `sys.getswitchinterval
 that was set: beside it, timers with short periods are late indeed.
 """
 
+# Since rclpy 9.
+_TimerInfo = getattr(rclpy.timer, 'TimerInfo', None)
+_TimerCancelledError = getattr(rclpy.exceptions, 'TimerCancelledError', InvalidHandle)
+
 
 class TimerSource(EventSource):
     """A timer: due at its deadline, or when its ROS clock gets there; its events are resets."""
 
     has_own_event_fd = False
     watch_entity = staticmethod(c_bindings.watch_timer_reset)
-    __slots__ = ('_clock', '_late', '_rearming', '_skipped', 'deadline_ns')
+    __slots__ = ('_clock', '_info_name', '_late', '_rearming', '_skipped', 'deadline_ns')
 
     def open(self) -> None:
         """See the base class."""
@@ -89,40 +96,64 @@ class TimerSource(EventSource):
     def run(self) -> Any:
         """See the base class."""
         timer = self.entity
+        callback = timer.callback
+        if callback is not self._callback:
+            self._info_name = _name_of_timer_info(callback)
+        is_async = self._is_async(callback)
         try:
             handle = timer.handle
             with handle:
-                due = self._call(handle)
-        except InvalidHandle:
+                arguments = self._call(handle)
+        except (InvalidHandle, _TimerCancelledError):
             return NOTHING
         self.rearm()
-        if not due:
+        if arguments is None:
             return NOTHING
-        callback = timer.callback
-        result = callback()
-        return result if result is not None and self._is_async(callback) else None
+        result = callback(**arguments)
+        return result if result is not None and is_async else None
 
     def missed_counts(self) -> MissedCounts:
         """See the base class."""
         return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
 
-    def _call(self, handle: Any) -> bool:
-        """Tell rcl that the tick begins, and count what was missed; False if it is not due."""
+    def _call(self, handle: Any) -> dict[str, Any] | None:
+        """Tell rcl that the tick begins, and count what was missed.
+
+        Returns:
+            The arguments of the callback, or None if the timer is not due.
+        """
         begin_ns = monotonic_ns()
         until_ns = handle.time_until_next_call()
         if until_ns is None or until_ns > 0:
-            return False
-        handle.call_timer()
+            return None
+        arguments = {}
+        if self._info_name is None:
+            handle.call_timer()
+        else:
+            info = handle.call_timer_with_info()
+            clock_type = self.entity.clock.clock_type
+            arguments[self._info_name] = _TimerInfo(**info, clock_type=clock_type)  # type: ignore[misc]
         next_until_ns = handle.time_until_next_call()
         period_ns = handle.get_timer_period()
         if next_until_ns is None or not period_ns:
-            return True
+            return arguments
         if -until_ns > _MIN_LATE_NS and -until_ns > _LATE_SHARE * period_ns:
             self._late += 1
         # rcl sets the next tick to the next multiple of the period that has not passed.
         advance_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
         self._skipped += max(0, advance_ns // period_ns - 1)
-        return True
+        return arguments
+
+
+def _name_of_timer_info(callback: Any) -> str | None:
+    """Return the parameter of `callback` that is annotated with `TimerInfo`, as rclpy finds it."""
+    if _TimerInfo is None:
+        return None
+    try:
+        parameters = inspect.signature(callback).parameters.values()
+    except ValueError:  # A function in C may have none that is known.
+        return None
+    return next((p.name for p in parameters if p.annotation == _TimerInfo), None)
 
 
 class SubscriptionSource(EventSource):

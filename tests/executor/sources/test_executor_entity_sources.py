@@ -1,6 +1,7 @@
 """Subscriptions, timers, services and clients."""
 
 import asyncio
+import functools
 import threading
 import time
 from typing import Any
@@ -192,6 +193,35 @@ def test_timers_of_all_clocks_fire(node: Any, executor: Any) -> None:
         )
     with spinning(executor):
         wait_for(lambda: len(ticks) == 3)
+
+
+@pytest.mark.skipif(not hasattr(rclpy.timer, 'TimerInfo'), reason='since rclpy 9')
+def test_a_timer_callback_may_ask_for_the_times_of_its_call(node: Any, executor: Any) -> None:
+    from rclpy.timer import TimerInfo
+
+    async def coroutine(at: TimerInfo) -> None:
+        seen['coroutine'] = at
+
+    def function(number: int, *, at: TimerInfo) -> None:
+        seen[number] = at
+
+    class Listener:
+        def on_tick(self, at: TimerInfo) -> None:
+            seen['method'] = at
+
+    seen: dict[Any, Any] = {}
+    callbacks = (coroutine, functools.partial(function, 1), Listener().on_tick, lambda: None)
+    for callback in callbacks:
+        node.create_timer(0.01, callback)
+    replaced = node.create_timer(0.01, lambda: None)
+    without_signature = {'left': 1}
+    node.create_timer(0.01, without_signature.clear)
+    with spinning(executor):
+        replaced.callback = functools.partial(function, 2)
+        wait_for(lambda: len(seen) == 4 and not without_signature)
+    for info in seen.values():
+        assert info.expected_call_time <= info.actual_call_time
+        assert info.actual_call_time.clock_type == ClockType.ROS_TIME
 
 
 def test_a_rate_sleeps_in_a_callback(node: Any, executor: Any) -> None:
