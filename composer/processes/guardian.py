@@ -64,6 +64,8 @@ class Guardian:
         self._ended = os.pidfd_open(composer)
         self._deadline = _NEVER
         self._interrupts = 0
+        # Python takes back the handler of its stacks when it exits.
+        self._is_exiting = False
         self._has_left = False
 
     def run(self) -> bool:
@@ -84,7 +86,9 @@ class Guardian:
                 if not data:
                     # A behaviour has closed the descriptors of Composer.
                     poll.unregister(self._reports)
-                for byte in data or [BEGUN]:
+                    self._take(BEGUN)
+                    self._signal(signal.SIGTERM)
+                for byte in data:
                     self._take(byte)
         return False
 
@@ -97,6 +101,7 @@ class Guardian:
         if byte in {signal.SIGINT, signal.SIGTERM} and self._interrupts > 1:
             self._deadline = min(self._deadline, now + _HURRY_SEC)
         if byte == OVER:
+            self._is_exiting = True
             self._deadline = now + self._exit_sec
         if byte == LEAVE:
             self._has_left = True
@@ -105,8 +110,9 @@ class Guardian:
         tell(
             '[FATAL] [composer]: the system did not end in time, and is ended; its threads are at'
         )
-        self._signal(STACKS_SIGNAL)
-        self._wait(_STACKS_SEC)
+        if not self._is_exiting:
+            self._signal(STACKS_SIGNAL)
+            self._wait(_STACKS_SEC)
         with contextlib.suppress(OSError):
             os.write(self._switch, b'\0')
         if not self._wait(_END_SEC):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import faulthandler
 import os
 import resource
@@ -62,9 +63,9 @@ class GuardianClient:
         """Wait until the guardian is no child of this process any more."""
         self._process.wait()
 
-    def begin_stop(self) -> None:
-        """Let the time of a stop run."""
-        self._send(guardian.BEGUN)
+    def begin_stop(self) -> bool:
+        """Let the time of a stop run; return whether the guardian can be told."""
+        return self._send(guardian.BEGUN)
 
     def end_stop(self) -> None:
         """Let the time of the exit run instead."""
@@ -76,10 +77,13 @@ class GuardianClient:
         with suppress(OSError):
             os.close(self.descriptor)
 
-    def _send(self, byte: int) -> None:
-        # A behaviour may have closed it; then the guardian acts by itself.
-        with suppress(OSError):
+    def _send(self, byte: int) -> bool:
+        # A behaviour may have closed it; then the guardian stops the system.
+        try:
             os.write(self.descriptor, bytes([byte]))
+        except OSError as error:
+            return error.errno != errno.EBADF
+        return True
 
     def _set_mark(self) -> None:
         _, hard = resource.getrlimit(guardian.RLIMIT_LOCKS)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from time import monotonic
+from contextlib import suppress
+from time import monotonic, monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
@@ -27,7 +28,7 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.processes.guardian_client import GuardianClient
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 _EXECUTOR_STOP_SEC = 1.0
+_MOST_SUSPECTS = 5
 
 
 class System:
@@ -75,7 +77,11 @@ class System:
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
-            self._context, spec.threads, log=system_logger.error, on_lost=self._on_lost
+            self._context,
+            spec.threads,
+            log=system_logger.error,
+            on_lost=self._on_lost,
+            on_broken=self._on_broken,
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
@@ -183,12 +189,14 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
-        self._guardian.begin_stop()
+        if not self._guardian.begin_stop():
+            self._on_broken('The descriptor of the guardian was closed.')
         try:
             self.has_ended = self._stop()
         except BaseException as error:  # noqa: BLE001 - the process must end, whatever is broken
             self._stop_request.set_code(ExitCode.FAILED)
-            system_logger.error(f'the stop failed: {format_internal_error(error)}')
+            with suppress(BaseException):
+                system_logger.error(f'the stop failed: {format_internal_error(error)}')
         return self._stop_request.code, self.has_ended
 
     def _stop(self) -> bool:
@@ -269,6 +277,16 @@ class System:
             system_logger.error('the ROS context was shut down, so the system ends')
             self.request_stop(ExitCode.FAILED)
 
+    def _on_broken(self, reason: str) -> None:
+        try:
+            system_logger.fatal(
+                'the system is broken, and ends. A behaviour may have closed descriptors that are '
+                'not its own, or replaced what all use. The last ones to begin were:\n'
+                f'{_describe_last_calls(list(self._nodes.values()))}\n{reason}'
+            )
+        finally:
+            self._stop_request.make(ExitCode.FAILED)
+
     def _end_graph(self) -> None:
         self._graph_watcher.stop()
         if self._diagnostics_publisher is not None:
@@ -295,6 +313,21 @@ def _limits(spec: SystemSpec) -> Iterator[float | None]:
         for kind in ENTITY_KINDS:
             for entity in getattr(node, kind.section).values():
                 yield getattr(entity, 'warn_after_sec', None)
+
+
+def _describe_last_calls(nodes: Iterable[LiveNode]) -> str:
+    """Return the behaviours that began last, a line for each: those that run, or have ended."""
+    found = []
+    for node in nodes:
+        calls = [(call.owner, call.begun_ns) for call in node.running.calls()]
+        if node.running.last is not None:
+            calls.append(node.running.last)
+        found += [(begun_ns, node.spec.key, str(owner)) for owner, begun_ns in calls]
+    now_ns = monotonic_ns()
+    return '\n'.join(
+        f"  node '{node}': {owner}, {(now_ns - begun_ns) * 1e-9:.3f} s ago"
+        for begun_ns, node, owner in sorted(found, reverse=True)[:_MOST_SUSPECTS]
+    )
 
 
 def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
