@@ -32,14 +32,17 @@ class GuardianClient:
     Args:
         stop_sec: How long a stop may take.
         exit_sec: How long Python may take to exit after it.
-        owns_process: Whether all processes that this one starts from now on belong to the system.
+        owns_process: Whether this process exits with the system, to which all processes that it
+            starts from now on belong.
 
     Attributes:
+        owns_process: As given.
         descriptor: For `signal.set_wakeup_fd`.
         mark: What marks the processes that belong to the system; 0 if nothing does.
     """
 
     def __init__(self, stop_sec: float, exit_sec: float, *, owns_process: bool) -> None:
+        self.owns_process = owns_process
         self.mark = secrets.randbits(_MARK_BITS) if owns_process else 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         switch = _create_switch()

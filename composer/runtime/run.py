@@ -7,10 +7,12 @@ import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from composer import signals
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forced_exit, forked_children
 from composer.runtime.logs import log_levels, system_logger
+from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
 
 if TYPE_CHECKING:
@@ -44,7 +46,8 @@ def run_system(
     The first SIGINT or SIGTERM stops the system, and a second one ends the process at once with
     exit code 1. SIGHUP stops the system, too, unless it was ignored before, as by `nohup`; further
     ones change nothing. If a behaviour does not end, this ends the process with the exit code,
-    since its thread cannot be ended. The guardian ends it if no Python code can run.
+    since its thread cannot be ended. The guardian ends it if no Python code can run. A SIGINT
+    before the system is up gives the exit code 130.
 
     Args:
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
@@ -57,9 +60,11 @@ def run_system(
         StartError: The system could not start.
         UsageError: The ROS arguments are wrong.
     """
+    stop = StopRequest()
     with (
         log_levels(list(spec.nodes.values()), log_level_requests),
         _guarded(spec, ends_process=ends_process) as guardian,
+        _handling_signals(stop, guardian.descriptor),
     ):
         system = System(
             spec,
@@ -68,22 +73,23 @@ def run_system(
             guardian,
             ros_arguments,
             log_level_requests,
-            ends_process=ends_process,
+            stop_request=stop,
         )
         guardian.wait_until_begun()
-        with _handling_signals(system, guardian.descriptor):
+        try:
+            system.start()
             try:
-                system.start()
-                try:
-                    system.wait()
-                finally:
-                    # Also if a signal handler of a behaviour raised an error in this thread.
-                    code, ended = system.stop()
-            except ComposerError as error:
-                if system.has_ended:
-                    raise
-                system_logger.error(str(error))
-                code, ended = ExitCode.FAILED, False
+                system.wait()
+            finally:
+                # Also if a signal handler of a behaviour raised an error in this thread.
+                code, ended = system.stop()
+        except ComposerError as error:
+            code, ended = ExitCode.FAILED, False
+            if system.has_ended:
+                signals.end_with(code)
+                raise
+            system_logger.error(str(error))
+        signals.end_with(code)
         if not ended:
             forced_exit.leave(code)
     return code
@@ -109,25 +115,26 @@ def _guarded(spec: SystemSpec, *, ends_process: bool) -> Iterator[GuardianClient
 
 
 @contextmanager
-def _handling_signals(system: System, wake_up: int) -> Iterator[None]:
+def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
     # Python handles signals in the main thread alone; elsewhere the caller keeps them.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def handle(number: int, _frame: FrameType | None) -> None:
-        if system.stop_requested:
+        if stop.is_set:
             if number == _HANG_UP:
                 return
-            system.kill_processes()
+            stop.kill_processes()
             forced_exit.leave(ExitCode.FAILED)
-        system.request_stop()
+        is_early = number == signal.SIGINT and not stop.system_is_up
+        stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
 
     handled = list(_SIGNALS)
     if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
         handled.append(_HANG_UP)
     before: dict[int, Any] = {number: signal.signal(number, handle) for number in handled}
-    forked_children.signal_handlers.update(before)
+    forked_children.signal_handlers.update(before | signals.previous)
     wake_up_before = signal.set_wakeup_fd(wake_up, warn_on_full_buffer=False)
     try:
         yield

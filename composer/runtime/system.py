@@ -15,7 +15,7 @@ from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
-from composer.runtime.logs import system_logger
+from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
@@ -47,10 +47,11 @@ class System:
     Args:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
-        guardian: Ends the process if the stop takes too long.
+        guardian: Ends the process if the stop takes too long. If it owns the process, that exits
+            after the stop, and nothing uses ROS then.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
-        ends_process: Whether the process exits after the stop. Nothing may use ROS then.
+        stop_request: The request to stop it; by default a new one.
 
     Attributes:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
@@ -66,14 +67,13 @@ class System:
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
-        ends_process: bool = False,
+        stop_request: StopRequest | None = None,
     ) -> None:
         self._spec = spec
         self._guardian = guardian
-        self._ends_process = ends_process
         self.has_ended = False
         self._begun = monotonic()
-        self._stop_request = StopRequest()
+        self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
@@ -102,6 +102,7 @@ class System:
             ros_arguments,
             log_levels,
         )
+        self._stop_request.kill_processes = self._processes.kill_all
 
     def _create_handle(
         self,
@@ -140,10 +141,6 @@ class System:
         """
         self._stop_request.make(code)
 
-    def kill_processes(self) -> None:
-        """Kill all external processes; a signal handler may call it before it ends this one."""
-        self._processes.kill_all()
-
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
@@ -175,12 +172,13 @@ class System:
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        self._stop_request.system_is_up = True
         self._starter.open(prompt)
         self._parameter_services.begin()
 
     def wait(self) -> None:
-        """Wait until a stop is requested."""
-        self._stop_request.wait()
+        """Wait until a stop is requested, or nobody reads the output any more."""
+        self._stop_request.wait(self._stop_if_unread)
 
     def stop(self) -> tuple[int, bool]:
         """Stop the system.
@@ -272,6 +270,11 @@ class System:
     def _endpoints(self) -> list[TopicEndpoint]:
         return [end for node in list(self._nodes.values()) for end in node.endpoints]
 
+    def _stop_if_unread(self) -> None:
+        if not self.stop_requested and is_output_unread():
+            system_logger.error('nobody reads the output any more, so the system ends')
+            self.request_stop(ExitCode.FAILED)
+
     def _on_lost(self) -> None:
         if not self.stop_requested:
             system_logger.error('the ROS context was shut down, so the system ends')
@@ -296,7 +299,7 @@ class System:
         self._executor.stop(_EXECUTOR_STOP_SEC)
         self._hang_watcher.stop()
         release(self._context)
-        if not (self._ends_process and leave_graph_at_exit(self._context, self._nodes)):
+        if not (self._guardian.owns_process and leave_graph_at_exit(self._context, self._nodes)):
             self._destroy_nodes()
         self._context.try_shutdown()
         self._context.destroy()
