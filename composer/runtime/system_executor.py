@@ -14,7 +14,7 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
-from composer.executor.c_bindings import ExecutorError
+from composer.executor.descriptors import ExecutorError
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -118,4 +118,5 @@ class SystemExecutor(ComposerExecutor):
         # It was broken on purpose, or by accident: nothing is certain to work.
         with suppress(BaseException):
             if self._on_broken is not None and not self._is_stopped:
-                self._on_broken(format_internal_error(error))
+                is_known = isinstance(error, ExecutorError)
+                self._on_broken(str(error) if is_known else format_internal_error(error))
