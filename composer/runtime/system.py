@@ -13,11 +13,11 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
+from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
