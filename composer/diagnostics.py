@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
 from composer.rules import Severity, load_rule
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -157,9 +158,7 @@ def diagnostic_at(span: Span, rule: str, message: str, **remarks: Unpack[Remarks
 def _printable(text: str) -> str:
     if len(text) > _LONGEST:
         text = f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
-    if text.isprintable():
-        return text
-    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+    return escape(text)
 
 
 def errors_first(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

@@ -14,9 +14,11 @@ PACKAGE = Path(composer.__file__).parent
 ROOMS = (
     *(
         'errors',
-        'input_limits',
+        'signals',
         'version',
         'spelling',
+        'terminal',
+        'input_limits',
         'names',
         'ament',
         'entity_kinds',
@@ -30,6 +32,7 @@ ROOMS = (
 # Of these names there are several, which are the same thing in several rooms.
 SHARED_NAMES = {
     '__init__.py',
+    'environment.py',  # variables, and their checks
     'names.py',  # the rules for names, and their checks
     'parameters.py',  # their checks, and their life in a node
     'qos.py',  # profiles and policies, and their checks

@@ -23,6 +23,13 @@ _STOP_ALL = {
 }
 
 
+class _SystemContext(Context):
+    """A context whose nodes the system destroys."""
+
+    def track_node(self, node: Any) -> None:
+        """Do not destroy `node` at the shutdown, as rclpy does since version 9."""
+
+
 def create_ros_context(ros_arguments: Sequence[str]) -> Context:
     """Return an initialized context, which only the system itself may shut down.
 
@@ -34,7 +41,7 @@ def create_ros_context(ros_arguments: Sequence[str]) -> Context:
         StartError: ROS 2 cannot start.
     """
     remove_left_segments()
-    context = Context()
+    context = _SystemContext()
     _init(context, ros_arguments)
     reserve(context, 'the context', 'shutdown', 'try_shutdown', 'destroy')
     return context
