@@ -10,11 +10,11 @@ from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
-from rclpy.task import Future, Task
+from rclpy.task import Future
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
-from composer.executor.scheduler import ScheduledTask
+from composer.executor.scheduler import ExecutorTask, ScheduledTask
 from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import GRACE_SEC, Spinner
 
@@ -54,9 +54,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         if type(callback) is ImmediateCallback:
             callback(*args)
             return None
-        task: Any = Task(callback, args, kwargs, executor=self)
+        task: Any = ExecutorTask(callback, args, kwargs, executor=self)
         self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
+
+    def _call_task_in_next_spin(self, task: Any) -> None:
+        """Do nothing: since rclpy 7.1.9, a task that yields calls this, and is resumed anyway."""
 
     def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> DelayedCall:
         """Add a callback like `create_task`, `delay_sec` from now; it can be cancelled."""
