@@ -161,8 +161,9 @@ class System:
             return
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
-        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
+        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
         self._parameter_services.begin()
 
