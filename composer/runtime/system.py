@@ -74,7 +74,9 @@ class System:
             self._context, spec.threads, log=system_logger.error, on_lost=self._on_lost
         )
         reserve(self._executor, 'the executor', 'shutdown')
-        self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
+        self._hang_watcher = HangWatcher(
+            lambda: list(self._nodes.values()), _limits(spec), self._executor.errors
+        )
         self._graph_watcher = GraphWatcher(self._endpoints)
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._handle = self._create_handle(positions, functions, ros_arguments)
@@ -187,6 +189,7 @@ class System:
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
             node.errors.flush()
+        self._executor.errors.flush()
         if ended:
             self._end_graph()
         self.has_ended = ended
