@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from composer.processes import guardian
 
 if TYPE_CHECKING:
-    from rclpy.impl.rcutils_logger import RcutilsLogger
+    from composer.terminal import EscapingLogger
 
 _SIGEV_THREAD = 2
 _MARK_BITS = 62
@@ -97,7 +97,7 @@ class GuardianClient:
             self.mark = 0
 
 
-def end_marked(mark: int, timeout_sec: float, logger: RcutilsLogger) -> bool:
+def end_marked(mark: int, timeout_sec: float, logger: EscapingLogger) -> bool:
     """End all processes that bear a mark, and log which.
 
     Returns:

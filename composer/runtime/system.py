@@ -286,7 +286,7 @@ class System:
 
     def _on_broken(self, reason: str) -> None:
         try:
-            system_logger.fatal(
+            system_logger.error(
                 'the system is broken, and ends. A behaviour may have closed descriptors that are '
                 'not its own, or replaced what all use. The last ones to begin were:\n'
                 f'{_describe_last_calls(list(self._nodes.values()))}\n{reason}'
