@@ -89,6 +89,7 @@ class System:
             spec.shutdown_timeout_sec,
             ros_arguments,
             log_levels,
+            is_alone=not spec.nodes,
         )
 
     def _create_handle(
@@ -164,6 +165,7 @@ class System:
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
+        self._processes.tell_ends()
         self._parameter_services.begin()
 
     def wait(self) -> None:

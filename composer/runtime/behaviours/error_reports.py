@@ -60,9 +60,7 @@ class ErrorReporter:
             else:
                 count.shown.add(kind)
                 earlier = f'{_format_count(owner, place, count)}\n' if count.unreported else ''
-                text = (
-                    f'{earlier}{owner} ({place}) raised {summary}\n{format_behaviour_error(error)}'
-                )
+                text = f'{earlier}{owner} ({place}) raised {format_behaviour_error(error)}'
             count.last_line = now
         self._log(text)
 

@@ -17,6 +17,7 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
+from composer.names import expand_name
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
@@ -112,6 +113,10 @@ class LiveNode:
             kind = GatedReentrantGroup if key == REENTRANT else GatedMutuallyExclusiveGroup
             self._groups[key] = kind(self.gate)
         return self._groups[key]
+
+    def resolve_action_name(self, name: str) -> str:
+        """Return the full name of an action, whose name itself ROS does not remap."""
+        return expand_name(name, self.ros.get_name(), self.ros.get_namespace())
 
     def place(self, path: DataPath) -> str:
         """Return `file:line` of a place in the file."""
