@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from typing import TYPE_CHECKING
 
 import click
@@ -14,7 +15,7 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared_packages import provide_declared
+from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
@@ -62,11 +63,20 @@ def up(
     if importlib.util.find_spec('rclpy') is None:
         message = 'cannot run without ROS 2: this Python has no rclpy'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
-    from composer.runtime.environment import check_middleware, environment_set
+    # These import nothing of ROS, which reads its environment when it is imported.
+    from composer.runtime.environment import (
+        check_log_folder,
+        check_middleware,
+        check_shell,
+        environment_set,
+        find_colour,
+    )
 
-    # ROS reads it when it is imported.
-    with environment_set(context.spec.environment):
-        check_middleware(context.spec.environment)
+    variables = context.spec.environment
+    with environment_set({**find_colour(), **variables}):
+        check_shell(variables)
+        check_log_folder(ros_arguments)
+        check_middleware(os.environ)
         return _run(context, ros_arguments, log_levels, ends_process=ends_process)
 
 
@@ -77,18 +87,23 @@ def _run(
     *,
     ends_process: bool,
 ) -> int:
+    from composer.interfaces.search_paths import extend_processes, extend_variables
     from composer.runtime.behaviours.callables import project_on_path
+    from composer.runtime.environment import environment_set
     from composer.runtime.run import run_system
 
     system = context.system
-    provide_declared(context.interfaces, lambda line: click.echo(line, err=True))
-    with project_on_path(project_search_path(system.files)):
+    prefixes = import_declared(context.interfaces, lambda line: click.echo(line, err=True))
+    with (
+        environment_set(extend_variables(os.environ, prefixes)),
+        project_on_path(project_search_path(system.files)),
+    ):
         functions, findings = import_behaviours(context)
         # The check has already reported comments that silence nothing.
         if _report(leave_out_silenced(findings, system.positions.source)):
             return ExitCode.FAILED
         return run_system(
-            context.spec,
+            extend_processes(context.spec, prefixes),
             system.positions,
             functions,
             ros_arguments=ros_arguments,

@@ -10,12 +10,11 @@ from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
-from rclpy.task import Future, Task
+from rclpy.task import Future
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
-from composer.executor.scheduler import ScheduledTask
-from composer.executor.sources.event_source import MissedCounts
+from composer.executor.scheduler import ExecutorTask, ScheduledTask
 from composer.executor.spinner import GRACE_SEC, Spinner
 
 _MAX_THREADS = 256
@@ -54,9 +53,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         if type(callback) is ImmediateCallback:
             callback(*args)
             return None
-        task: Any = Task(callback, args, kwargs, executor=self)
+        task: Any = ExecutorTask(callback, args, kwargs, executor=self)
         self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
+
+    def _call_task_in_next_spin(self, task: Any) -> None:
+        """Do nothing: since rclpy 7.1.9, a task that yields calls this, and is resumed anyway."""
 
     def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> DelayedCall:
         """Add a callback like `create_task`, `delay_sec` from now; it can be cancelled."""
@@ -100,13 +102,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.scheduler.retry_suspended()
         self.wake()
 
-    def missed_counts(self, node: Any, entity: Any) -> MissedCounts:
-        """Return what a subscription or timer of `node` missed because callbacks took too long.
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Have `observer` told of what comes to a subscription or a timer of `node`.
 
-        Counting begins when the executor listens to the entity; before, it has missed nothing.
+        It is a guest: a `QueueObserver` or a `TickObserver` (`sources.entity_sources`).
         """
-        source = self._spinner.registry.source_of(node, entity)
-        return MissedCounts() if source is None else source.missed_counts()
+        self._spinner.registry.observe(node, entity, observer)
 
     def wake(self) -> None:
         """Look again at the entities, their groups, the context and what is waited for."""

@@ -3,12 +3,15 @@
 import threading
 from contextlib import suppress
 from time import monotonic
-from typing import Any
+from typing import Any, TypeGuard
+from weakref import WeakKeyDictionary
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
+from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 
+from composer.executor.event_fds import UNKNOWN_COUNT
 from composer.executor.sources.entity_sources import (
     ClientSource,
     ServiceSource,
@@ -16,9 +19,12 @@ from composer.executor.sources.entity_sources import (
     TimerSource,
 )
 from composer.executor.sources.event_source import EventSource, ExecutorParts
+from composer.executor.sources.qos_events import is_checked_seldom
 from composer.executor.sources.waitable_sources import (
     ActionSource,
     GuardConditionSource,
+    QosEventSource,
+    SeldomQosEventSource,
     WaitableSource,
     WaitSetSource,
 )
@@ -47,6 +53,7 @@ class EntityRegistry:
         self._wait_set_thread = wait_set_thread
         self._lock = threading.RLock()
         self._nodes: dict[Any, _NodeEntities] = {}
+        self._observers: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self._rest_until = 0.0
         self.is_stale = False
 
@@ -69,20 +76,22 @@ class EntityRegistry:
             self.is_stale = False
             nodes = self._parts.executor.get_nodes()
             begin = monotonic()
-            changed = False
             for node in self._nodes.keys() - set(nodes):
                 self.drop(node)
             for node in nodes:
-                changed |= self._refresh_node(node)
+                self._refresh_node(node)
             end = monotonic()
             self._rest_until = end + _REST_FACTOR * (end - begin)
-        if changed:
-            self._wait_set_thread.check_events_soon()
 
-    def source_of(self, node: Any, entity: Any) -> EventSource | None:
-        """Return the source of an entity of `node`, None if the executor does not listen to it."""
-        entities = self._nodes.get(node)
-        return None if entities is None else entities.sources.get(entity)
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Have `observer` told what happens to an entity of `node`."""
+        with self._lock:
+            self._observers[entity] = observer
+            entities = self._nodes.get(node)
+            source = None if entities is None else entities.sources.get(entity)
+            if source is not None:
+                source.observer = observer
+                source.on_events(UNKNOWN_COUNT)
 
     def drop(self, node: Any) -> None:
         """Stop listening to the entities of `node`."""
@@ -96,7 +105,7 @@ class EntityRegistry:
         """Forget the sources: the parent process listens to the entities."""
         self._nodes = {}
 
-    def _refresh_node(self, node: Any) -> bool:
+    def _refresh_node(self, node: Any) -> None:
         seen = self._nodes.setdefault(node, _NodeEntities())
         lists = (
             tuple(node.timers),
@@ -107,7 +116,7 @@ class EntityRegistry:
             tuple(node.waitables),
         )
         if lists == seen.lists:
-            return False
+            return
         seen.lists = lists
         classes = (
             TimerSource,
@@ -128,17 +137,17 @@ class EntityRegistry:
             if entity not in seen.sources:
                 with suppress(InvalidHandle):
                     source = source_class(entity, node, self._parts)
+                    source.observer = self._observers.get(entity)
                     self._open(source)
                     seen.sources[entity] = source
-        return True
 
     def _open(self, source: EventSource) -> None:
         source.open()
-        if isinstance(source, WaitSetSource):
+        if _is_waited_for(source):
             self._wait_set_thread.add(source)
 
     def _close(self, source: EventSource) -> None:
-        if isinstance(source, WaitSetSource):
+        if _is_waited_for(source):
             self._wait_set_thread.remove(source)
         source.close()
 
@@ -146,4 +155,11 @@ class EntityRegistry:
 def _class_for(waitable: Any) -> type[EventSource]:
     if isinstance(waitable, ActionServer | ActionClient):
         return ActionSource
+    if type(waitable) is EventHandler:
+        is_seldom = is_checked_seldom(waitable.callback)
+        return SeldomQosEventSource if is_seldom else QosEventSource
     return WaitableSource
+
+
+def _is_waited_for(source: EventSource) -> TypeGuard[WaitSetSource]:
+    return isinstance(source, WaitSetSource) and not isinstance(source, SeldomQosEventSource)

@@ -15,7 +15,7 @@ from composer.errors import StartError
 from composer.names import expand_name, remap_name
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.logs import system_logger
-from composer.runtime.ros_graph import RosGraph, create_graph_node, describe_graph
+from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

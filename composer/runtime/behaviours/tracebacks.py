@@ -40,21 +40,21 @@ def place_of(error: BaseException) -> tuple[str, int | None]:
 
 
 def format_behaviour_error(error: BaseException) -> str:
-    """Return type, message, traceback without Composer's own frames around it, and help.
+    """Return its traceback, without Composer's own frames around the behaviour, and its help.
 
     That a server is not there is no error in the code: it has no traceback.
     """
-    summary, help_text = summarize(error), _help_of(error)
+    help_text = _help_of(error)
+    advice = f'\nhelp: {help_text}' if help_text else ''
     if isinstance(error, ServiceNotAvailableError | ActionNotAvailableError):
-        return f'{summary}; {help_text}' if help_text else summary
+        return advice.lstrip('\n')
     try:
         described = traceback.TracebackException.from_exception(error, compact=True)
         _drop_own_frames(described, error)
         text = ''.join(described.format()).rstrip()
     except BaseException as other:  # noqa: BLE001 - an exception can be made to break anything
         text = f'(its traceback cannot be shown: {type(other).__name__})'
-    text = f'{summary}\n{_cut(text, _LONGEST_TRACEBACK)}'
-    return f'{text}\nhelp: {help_text}' if help_text else text
+    return _cut(text, _LONGEST_TRACEBACK) + advice
 
 
 def format_internal_error(error: BaseException) -> str:

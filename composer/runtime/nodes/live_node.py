@@ -23,6 +23,7 @@ from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
+from composer.runtime.health.missed import count_missed
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     Gate,
@@ -32,6 +33,7 @@ from composer.runtime.nodes.callback_groups import (
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -160,7 +162,7 @@ class LiveNode:
                 return
             if health is not None:
                 health.note_error(error)
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
@@ -193,7 +195,7 @@ class LiveNode:
         def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             if failed is not None:
                 failed(error)
 
@@ -243,7 +245,7 @@ class LiveNode:
         """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
-            health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
+            health.follow(count_missed(self.system.executor, self.ros, entity))
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""
@@ -271,7 +273,7 @@ class LiveNode:
 
     def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
         if owner not in self.limits:
-            warn = self.ros.get_logger().warning
+            warn = EscapingLogger(self.ros.get_logger()).warning
             self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
 
@@ -293,7 +295,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         system,
         ros,
         behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
-        errors=ErrorReporter(ros.get_logger().error),
+        errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
         entities=entities,
         waits=waits,
         background=background,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
+from composer.runtime.middleware.shared_memory import remove_left_segments
 from composer.runtime.reserved_methods import reserve
 
 if TYPE_CHECKING:
@@ -22,6 +23,13 @@ _STOP_ALL = {
 }
 
 
+class _SystemContext(Context):
+    """A context whose nodes the system destroys."""
+
+    def track_node(self, node: Any) -> None:
+        """Do not destroy `node` at the shutdown, as rclpy does since version 9."""
+
+
 def create_ros_context(ros_arguments: Sequence[str]) -> Context:
     """Return an initialized context, which only the system itself may shut down.
 
@@ -32,7 +40,8 @@ def create_ros_context(ros_arguments: Sequence[str]) -> Context:
         UsageError: ROS does not accept them, or they rename all nodes.
         StartError: ROS 2 cannot start.
     """
-    context = Context()
+    remove_left_segments()
+    context = _SystemContext()
     _init(context, ros_arguments)
     reserve(context, 'the context', 'shutdown', 'try_shutdown', 'destroy')
     return context
