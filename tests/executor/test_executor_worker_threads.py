@@ -20,7 +20,9 @@ def test_threads_that_have_still_to_begin_count(monkeypatch):
     begin = _thread.start_new_thread
     late = []
     monkeypatch.setattr(_thread, 'start_new_thread', lambda work, _: late.append(work))
-    threads = WorkerThreads(lambda worker: threads.is_leader(worker, lambda: False), pytest.fail)
+    threads = WorkerThreads(
+        lambda worker: threads.is_leader(worker, lambda: False), pytest.fail, pytest.fail
+    )
     threads.start()
     monkeypatch.undo()
     threads.end(0.0)

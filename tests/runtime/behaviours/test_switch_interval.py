@@ -1,0 +1,60 @@
+"""The interpreter's switch interval is short while an executor spins, and only then."""
+
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.runtime.behaviours.switch_interval import INTERVAL_SEC, ShortSwitchInterval
+from composer.runtime.system_executor import SystemExecutor
+
+DEADLINE_SEC = 40.0
+
+
+@pytest.fixture(autouse=True)
+def interval_is_pythons_own():
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(0.005)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_the_interval_is_short_until_the_last_user_has_left():
+    interval = ShortSwitchInterval()
+    with interval:
+        with interval:
+            pass
+        assert sys.getswitchinterval() == INTERVAL_SEC
+    assert sys.getswitchinterval() == 0.005
+
+
+def test_a_shorter_interval_is_not_changed():
+    sys.setswitchinterval(0.0005)
+    with ShortSwitchInterval():
+        assert sys.getswitchinterval() == 0.0005
+    assert sys.getswitchinterval() == 0.0005
+
+
+def test_an_interval_that_was_set_meanwhile_is_not_changed():
+    interval = ShortSwitchInterval()
+    with interval:
+        sys.setswitchinterval(0.02)
+    assert sys.getswitchinterval() == 0.02
+    with interval:
+        pass
+    assert sys.getswitchinterval() == 0.02
+
+
+@pytest.mark.ros
+def test_callbacks_of_a_system_run_with_the_short_interval_and_its_end_restores_it(
+    context, wait_for
+):
+    executor = SystemExecutor(context, None, pytest.fail)
+    seen = []
+    executor.create_task(lambda: seen.append(sys.getswitchinterval()))
+    executor.start()
+    wait_for(lambda: seen, 'the end of the task')
+    assert seen == [INTERVAL_SEC]
+    executor.stop(DEADLINE_SEC)
+    wait_for(lambda: sys.getswitchinterval() == 0.005, 'the end of the thread that spins')
