@@ -76,6 +76,13 @@ class Program:
         """Ask it to end."""
         self._process.send_signal(signal.SIGINT)
 
+    def stop(self) -> float:
+        """Ask it to end, and return how long that took (s)."""
+        begun = time.monotonic()
+        self.interrupt()
+        self._process.wait(_READY_SEC)
+        return time.monotonic() - begun
+
     def end(self) -> None:
         """See that it has ended."""
         try:

@@ -152,6 +152,20 @@ def _thousand() -> list[Row]:
     ]
 
 
+def _start_stop() -> list[Row]:
+    def side(name: str, key: str) -> Side:
+        return _side('start_stop', name, 500, key)
+
+    def row(what: str, key: str, figure: Callable[[float, float], float], target: float) -> Row:
+        what = f'500 nodes with parameter services, {what}'
+        return Row(what, side('composer', key), side('rclpy', key), figure, '<=', target)
+
+    return [
+        row('s until all are up, against rclpy', 'start_sec', times, 1.5),
+        row('s to stop (other: rclpy)', 'stop_sec', alone, 3),
+    ]
+
+
 def _at_rest_and_under_load() -> list[Row]:
     def jitter(what: str, key: str, target: float) -> Row:
         ours, threads = (_side('jitter', name, 0, key) for name in ('composer', 'threads'))
@@ -194,6 +208,7 @@ ROWS: list[Row] = [
     *_forty(),
     *_further_node(),
     *_thousand(),
+    *_start_stop(),
     *_at_rest_and_under_load(),
     *_check(),
     *_soak(),

@@ -13,7 +13,12 @@ def render_system(nodes: dict[str, Any]) -> str:
 
 
 def idle_nodes(count: int, *, parameters: bool = False) -> dict[str, Any]:
-    """Return nodes that do nothing, each with a publisher and a subscription of its own."""
+    """Return nodes that do nothing, each with a publisher and a subscription of its own.
+
+    Args:
+        parameters: Whether they have a parameter and parameter services; if not, they are as lean
+            as a file can make them.
+    """
     return {f'idle_{number}': _idle_node(number, parameters) for number in range(count)}
 
 
@@ -29,7 +34,8 @@ def _idle_node(number: int, parameters: bool) -> dict[str, Any]:  # noqa: FBT001
             }
         },
     }
-    return {'parameters': {'speed': 1.0}, **node} if parameters else node
+    own = {'parameters': {'speed': 1.0}} if parameters else {'parameter_services': False}
+    return own | node
 
 
 def rally(seconds: float) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def up_command(
             click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
-    return up(paths, arguments, context.obj, log_levels, set_values)
+    return up(paths, arguments, context.obj, log_levels, set_values, ends_process=True)
 
 
 @cli.command('check')

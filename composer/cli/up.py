@@ -37,6 +37,8 @@ def up(
     ros_arguments: Sequence[str] = (),
     log_levels: Sequence[str] = (),
     set_values: Sequence[str] = (),
+    *,
+    ends_process: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
 
@@ -46,6 +48,7 @@ def up(
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all nodes, `talker:=debug` for one.
         set_values: Values to change, as in `nodes.talker.log_level=debug`.
+        ends_process: Whether the process exits afterwards.
 
     Raises:
         RosNotFoundError: There is no rclpy.
@@ -64,10 +67,16 @@ def up(
     # ROS reads it when it is imported.
     with environment_set(context.spec.environment):
         check_middleware(context.spec.environment)
-        return _run(context, ros_arguments, log_levels)
+        return _run(context, ros_arguments, log_levels, ends_process=ends_process)
 
 
-def _run(context: CheckContext, ros_arguments: Sequence[str], log_levels: Sequence[str]) -> int:
+def _run(
+    context: CheckContext,
+    ros_arguments: Sequence[str],
+    log_levels: Sequence[str],
+    *,
+    ends_process: bool,
+) -> int:
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.run import run_system
 
@@ -84,6 +93,7 @@ def _run(context: CheckContext, ros_arguments: Sequence[str], log_levels: Sequen
             functions,
             ros_arguments=ros_arguments,
             log_level_requests=log_levels,
+            ends_process=ends_process,
         )
 
 

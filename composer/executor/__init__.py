@@ -14,7 +14,7 @@ How it gets its events was decided by measuring (two cores, round trips/s betwee
 
 The way of a message:
 
-1. The middleware adds to the eventfd of the subscription (`c_bindings`).
+1. The middleware adds to the eventfd of the subscription (`c_bindings`, `event_fds`).
 2. The leader's wait on an epoll returns, and the source of that subscription is told
    (`event_poller`).
 3. The source is queued, or parked if its callback group is busy (`scheduler`).
@@ -31,12 +31,12 @@ callbacks for, and `entity_registry` keeps the sources in step with the entities
 `after_fork` says what a forked child does with all this.
 
 Locks are held for moments, and nothing is called under them but the next in this order:
-`entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_poller`.
+`entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_fds`.
 Callbacks, takes and waits run under none.
 """
 
 from composer.executor.composer_executor import ComposerExecutor
-from composer.executor.event_source import MissedCounts
+from composer.executor.sources.event_source import MissedCounts
 from composer.executor.wait_set_thread import checked_seldom
 
 __all__ = ['ComposerExecutor', 'MissedCounts', 'checked_seldom']

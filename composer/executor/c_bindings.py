@@ -14,23 +14,38 @@ other way round (ros2/rmw_fastrtps pull request 890).
 
 import ctypes
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from time import monotonic_ns
-from typing import Any
+from typing import Any, cast
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.errors import ComposerError
 from composer.executor.after_fork import replace_descriptors
 
+
+class ExecutorError(ComposerError):
+    """The middleware or the system lacks what the executor needs."""
+
+
+def check_word_size(pointer_size: int) -> None:
+    """Refuse a system on which the two functions take their arguments in different ways.
+
+    Raises:
+        ExecutorError: Addresses have another size than 8 bytes.
+    """
+    if pointer_size != ctypes.sizeof(ctypes.c_uint64):
+        message = f'the executor needs a 64-bit system: this one has {8 * pointer_size} bits'
+        raise ExecutorError(message)
+
+
+check_word_size(ctypes.sizeof(ctypes.c_void_p))
 _rcl = ctypes.CDLL(_rclpy.__file__)
 _rcl_holding_gil = ctypes.PyDLL(_rclpy.__file__)
 _libc = ctypes.CDLL(None, use_errno=True)
 _libc_holding_gil = ctypes.PyDLL(None)
-
-
-class ExecutorError(ComposerError):
-    """The middleware lacks what the executor needs."""
 
 
 # Eventfds
@@ -176,6 +191,104 @@ def list_parts(wait_set: Any) -> list[tuple[Callable[[int, int | None], None], i
         (watch_service, raw.services, raw.service_count),
     )
     return [(watch, array[i]) for watch, array, count in kinds for i in range(count) if array[i]]
+
+
+# What the middleware has, asked at once
+
+
+class _Entities(ctypes.Structure):
+    """`rmw_services_t` and its like: all are a number and an array of addresses (rmw/types.h)."""
+
+    _fields_ = (('count', ctypes.c_size_t), ('addresses', ctypes.POINTER(ctypes.c_void_p)))
+
+
+class _RmwEntity(ctypes.Structure):
+    """What `rmw_service_t` and its like begin with."""
+
+    _fields_ = (('implementation_identifier', ctypes.c_char_p), ('data', ctypes.c_void_p))
+
+
+def _rmw_handle_function(rcl_name: str) -> Callable[[int], int]:
+    function = getattr(_rcl_holding_gil, rcl_name)
+    function.argtypes = (ctypes.c_void_p,)
+    function.restype = ctypes.c_void_p
+    return cast('Callable[[int], int]', function)
+
+
+_rmw_context = _rmw_handle_function('rcl_context_get_rmw_context')
+_rmw_guard_condition = _rmw_handle_function('rcl_guard_condition_get_rmw_handle')
+_rmw_subscription = _rmw_handle_function('rcl_subscription_get_rmw_handle')
+_rmw_service = _rmw_handle_function('rcl_service_get_rmw_handle')
+_rmw_client = _rmw_handle_function('rcl_client_get_rmw_handle')
+rmw_event = _rmw_handle_function('rcl_event_get_rmw_handle')
+"""Return the address of the `rmw_event_t` of the `rcl_event_t` at an address."""
+
+_rcl_holding_gil.rcl_trigger_guard_condition.argtypes = (ctypes.c_void_p,)
+_rcl.rmw_create_wait_set.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
+_rcl.rmw_create_wait_set.restype = ctypes.c_void_p
+_rcl.rmw_destroy_wait_set.argtypes = (ctypes.c_void_p,)
+_rcl.rmw_wait.argtypes = (*[ctypes.POINTER(_Entities)] * 5, ctypes.c_void_p, ctypes.c_void_p)
+
+
+def _data_of(rmw_entity: int) -> int:
+    data: int = _RmwEntity.from_address(rmw_entity).data
+    return data
+
+
+class Readiness:
+    """Asks the middleware whether entities have something to take, at once.
+
+    A guard condition that is triggered keeps `rmw_wait` from waiting, and from all that it does
+    before it waits. The entities must not be destroyed meanwhile.
+
+    Args:
+        context: The rclpy context of the entities.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = context.handle
+        self._lock = threading.Lock()
+        with self._context:
+            self._guard = _rclpy.GuardCondition(self._context)
+            rmw_context = _rmw_context(self._context.pointer)
+            self._wait_set = _rcl.rmw_create_wait_set(rmw_context, 0)
+        self._no_timeout = (ctypes.c_uint64 * 2)()
+
+    def has_messages(self, subscription: int) -> bool:
+        """Ask for the `rcl_subscription_t` at that address."""
+        return bool(self._wait(0, (_data_of(_rmw_subscription(subscription)),)))
+
+    def has_requests(self, service: int) -> bool:
+        """Ask for the `rcl_service_t` at that address."""
+        return bool(self._wait(2, (_data_of(_rmw_service(service)),)))
+
+    def has_responses(self, client: int) -> bool:
+        """Ask for the `rcl_client_t` at that address."""
+        return bool(self._wait(3, (_data_of(_rmw_client(client)),)))
+
+    def list_happened(self, rmw_events: Sequence[int]) -> list[int]:
+        """Return the indices of the `rmw_event_t` that have happened since they were taken."""
+        return self._wait(4, rmw_events)
+
+    def _wait(self, position: int, addresses: Sequence[int]) -> list[int]:
+        """Return the indices of what is ready among one kind, given by `rmw_wait`'s argument."""
+        asked = (ctypes.c_void_p * len(addresses))(*addresses)
+        with self._lock, self._context, self._guard:
+            _rcl_holding_gil.rcl_trigger_guard_condition(self._guard.pointer)
+            guard = (ctypes.c_void_p * 1)(_data_of(_rmw_guard_condition(self._guard.pointer)))
+            kinds: list[Any] = [None] * 5
+            kinds[1] = _Entities(1, guard)
+            kinds[position] = _Entities(len(addresses), asked)
+            result = _rcl.rmw_wait(*kinds, self._wait_set, self._no_timeout)
+        if result != _RCL_RET_OK:
+            _rcl.rcutils_reset_error()
+            return []
+        return [index for index, address in enumerate(asked) if address]
+
+    def __del__(self) -> None:
+        with suppress(AttributeError):  # `__init__` may have failed half-way.
+            # The guard condition keeps what is left of the context until after this.
+            _rcl.rmw_destroy_wait_set(self._wait_set)
 
 
 # Timers

@@ -14,8 +14,8 @@ from rclpy.task import Future, Task
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
-from composer.executor.event_source import MissedCounts
 from composer.executor.scheduler import ScheduledTask
+from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import Spinner
 
 _MAX_THREADS = 256
@@ -160,11 +160,12 @@ class ComposerExecutor(MultiThreadedExecutor):
             with suppress(AttributeError):  # As that of concurrent.futures.
                 future.remove_done_callback(callback)
 
-    def shutdown(self, timeout_sec: float | None = None) -> bool:
+    def shutdown(self, timeout_sec: float | None = None, *, wait_for_threads: bool = True) -> bool:
         """Begin no more callbacks and wait for those that run.
 
         Args:
             timeout_sec: Seconds to wait; None or negative for ever, 0 not at all.
+            wait_for_threads: Wait until the threads that have nothing to do any more have ended.
 
         Returns:
             False if callbacks still ran after that time; then this can be called again.
@@ -172,7 +173,7 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._is_shutdown = True
         if not self._spinner.stop(timeout_sec):
             return False
-        self._spinner.tear_down(self.get_nodes())
+        self._spinner.tear_down(self.get_nodes(), wait_for_threads=wait_for_threads)
         with self._nodes_lock:
             self._nodes: set[Any] = set()
         with self._shutdown_lock:

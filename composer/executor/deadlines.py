@@ -117,7 +117,11 @@ class Deadlines:
     def rearm_after_jumps(self) -> None:
         """Call `rearm` of the followers of the clocks that have jumped."""
         while self.jumped:
-            for follower in tuple(self.jumped.popleft().followers):
+            try:
+                clock = self.jumped.popleft()
+            except IndexError:  # Another thread was faster.
+                return
+            for follower in tuple(clock.followers):
                 follower.rearm()
 
     def _drop_replaced(self) -> None:

@@ -9,23 +9,21 @@ from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.entity_sources import (
+from composer.executor.sources.entity_sources import (
     ClientSource,
     ServiceSource,
     SubscriptionSource,
     TimerSource,
 )
-from composer.executor.event_poller import EventFd
-from composer.executor.event_source import EventSource, ExecutorParts
-from composer.executor.wait_set_thread import WaitSetThread
-from composer.executor.waitable_sources import (
+from composer.executor.sources.event_source import EventSource, ExecutorParts
+from composer.executor.sources.waitable_sources import (
     ActionSource,
     GuardConditionSource,
     WaitableSource,
     WaitSetSource,
 )
+from composer.executor.wait_set_thread import WaitSetThread
 
-_SERVICES_PER_EVENT_FD = 8
 _REST_FACTOR = 4
 
 
@@ -126,28 +124,18 @@ class EntityRegistry:
         wanted.update((waitable, _class_for(waitable)) for waitable in lists[-1])
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
-        shared: list[EventFd] = []
         for entity, source_class in wanted.items():
             if entity not in seen.sources:
                 with suppress(InvalidHandle):
                     source = source_class(entity, node, self._parts)
-                    self._open(source, shared)
+                    self._open(source)
                     seen.sources[entity] = source
         return True
 
-    def _open(self, source: EventSource, shared: list[EventFd]) -> None:
-        """Open `source`; up to eight services, which are called seldom, share an eventfd."""
+    def _open(self, source: EventSource) -> None:
+        source.open()
         if isinstance(source, WaitSetSource):
-            source.open()
             self._wait_set_thread.add(source)
-        elif not isinstance(source, ServiceSource):
-            source.open()
-        elif shared and len(shared[-1].listeners) < _SERVICES_PER_EVENT_FD:
-            source.open(shared[-1])
-        else:
-            source.open()
-            if source.event_fd is not None:
-                shared.append(source.event_fd)
 
     def _close(self, source: EventSource) -> None:
         if isinstance(source, WaitSetSource):

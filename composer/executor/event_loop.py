@@ -16,8 +16,8 @@ from rclpy.task import Future, Task
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
-from composer.executor.event_source import NOTHING, EventSource, ExecutorParts
 from composer.executor.scheduler import ScheduledTask, Session
+from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
 
 _RETRY_SEC = 0.001

@@ -11,11 +11,14 @@ from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
+import rclpy.timer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.event_poller import UNKNOWN_COUNT
+from composer.executor.event_fds import UNKNOWN_COUNT
 
+# rclpy 9, which brought `TimerInfo`, executes the oldest task first.
+_OLDEST_TASK_FIRST = hasattr(rclpy.timer, 'TimerInfo')
 _MIN_PAUSE_SEC = 0.0005
 _MAX_PAUSE_SEC = 0.01
 
@@ -372,9 +375,11 @@ class Scheduler:
         return None
 
     def _next_task(self) -> ScheduledTask | None:
-        """Return the newest of the oldest batch, as rclpy's executors do."""
+        """Return a task of the oldest batch, in the order of this rclpy's executors."""
         if not self._tasks:
             self._tasks, self._new_tasks = self._new_tasks, []
+            if _OLDEST_TASK_FIRST:
+                self._tasks.reverse()
         while self._tasks:
             task = self._tasks.pop()
             if task.node is not None and not self._has_node(task.node):

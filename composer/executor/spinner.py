@@ -13,8 +13,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from composer.executor.after_fork import end_child, reset_locks
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.event_loop import CallbackRunner, EventLoop
-from composer.executor.event_source import ExecutorParts
 from composer.executor.scheduler import Session
+from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.wait_set_thread import WaitSetThread
 from composer.executor.worker_threads import TAKEOVER_SEC
 
@@ -22,6 +22,7 @@ GRACE_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
 
 _MAX_LOOK_SEC = 1.0
+_MAX_END_SEC = 1.0
 
 
 class Notifier:
@@ -209,13 +210,15 @@ class Spinner:
         self.wake()
         return self._wait_for_end(timeout_sec)
 
-    def tear_down(self, nodes: list[Any]) -> None:
+    def tear_down(self, nodes: list[Any], *, wait_for_threads: bool) -> None:
         """Stop listening to `nodes`, end the threads, and close what they waited for."""
         for node in nodes:
             with suppress(InvalidHandle):
                 self.registry.drop(node)
         self.wait_set_thread.close()
-        self.workers.end(GRACE_SEC)
+        # Other callbacks that shut down, too, keep their threads a little longer.
+        end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC
+        self.workers.end(end_sec if wait_for_threads else 0.0)
         if not self.workers.has_threads():
             self.poller.close()
 

@@ -18,7 +18,7 @@ from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 from rclpy.waitable import NumberOfEntities
 
-from composer.executor.waitable_sources import (
+from composer.executor.sources.waitable_sources import (
     GuardConditionSource,
     WaitableSource,
     WaitSetSource,

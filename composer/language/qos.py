@@ -56,6 +56,17 @@ BUILTIN_PROFILES: dict[str, dict[str, Any]] = {
     },
 }
 
+# What the middleware chooses for `best_available` where it knows no other end, or asks none
+# (`rmw_dds_common/qos.hpp`). Publishers are created before all subscriptions of a system.
+BEST_OF_PUBLISHERS = {
+    'reliability': 'reliable',
+    'durability': 'transient_local',
+    'liveliness': 'automatic',
+    'deadline': INFINITE,
+    'liveliness_lease_duration': INFINITE,
+}
+BEST_OF_SERVICES = BEST_OF_PUBLISHERS | {'durability': 'volatile'}
+
 # Nobody writes longer ones; thousands of profiles in a chain would take quadratic time.
 _LONGEST_CHAIN = 50
 
@@ -99,6 +110,14 @@ def resolve_qos(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> dict[str, Any
     for link in reversed(chain):
         policies |= link.policies
     return policies
+
+
+def settle_best_available(policies: Mapping[str, Any], best: Mapping[str, Any]) -> dict[str, Any]:
+    """Return policies with each that is `best_available` as `best` has it."""
+    return {
+        policy: best[policy] if value == 'best_available' else value
+        for policy, value in policies.items()
+    }
 
 
 def format_policy_value(policy: str, value: Any) -> str:

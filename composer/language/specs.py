@@ -313,7 +313,7 @@ class NodeSpec:
     description: str = ''
     log_level: LogLevel | None = None
     use_sim_time: bool = False
-    parameter_services: bool
+    parameter_services: bool = True
     rosout: bool = True
     type_description_service: bool = False
     logger_services: bool = False

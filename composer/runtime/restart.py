@@ -127,7 +127,8 @@ class NodeRestarter:
         return True
 
     def _build(self, old: LiveNode) -> None:
-        node = self._starter.create(old.spec)
+        (node,) = self._starter.create([old.spec])
         self._system.executor.add_node(node.ros)
         self._starter.run_on_start(node)
         self._starter.open([node])
+        node.ros.start_parameter_services()

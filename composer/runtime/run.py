@@ -31,6 +31,7 @@ def run_system(
     *,
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
+    ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
 
@@ -38,6 +39,9 @@ def run_system(
     code 1, and a third one does so even if no Python code can run. SIGHUP stops the system, too,
     unless it was ignored before, as by `nohup`; further ones change nothing. If a behaviour does
     not end, this ends the process with the exit code, since its thread cannot be ended.
+
+    Args:
+        ends_process: Whether the process exits afterwards: that is how a large system ends fast.
 
     Returns:
         The exit code.
@@ -47,7 +51,14 @@ def run_system(
         UsageError: The ROS arguments are wrong.
     """
     with log_levels(list(spec.nodes.values()), log_level_requests):
-        system = System(spec, positions, functions, ros_arguments, log_level_requests)
+        system = System(
+            spec,
+            positions,
+            functions,
+            ros_arguments,
+            log_level_requests,
+            ends_process=ends_process,
+        )
         with _handling_signals(system, spec):
             try:
                 system.start()

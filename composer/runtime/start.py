@@ -14,6 +14,8 @@ from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from composer.language.specs import NodeSpec
     from composer.runtime.nodes.system_handle import SystemHandle
 
@@ -31,20 +33,15 @@ class NodeStarter:
         self._nodes = nodes
         self._system = system
 
-    def create(self, spec: NodeSpec) -> LiveNode:
-        """Create a node with all its entities; none of its behaviours is called yet.
+    def create(self, specs: Iterable[NodeSpec]) -> list[LiveNode]:
+        """Create nodes with all their entities; none of their behaviours is called yet.
 
         Raises:
-            StartError: It, or one of them, cannot be created.
+            StartError: One of them, or of their entities, cannot be created.
         """
-        try:
-            node = create_live_node(spec, self._system)
-        except Exception as error:
-            message = f"node '{spec.key}' cannot be created: {error}"
-            raise StartError(message) from error
-        self._nodes[spec.full_name] = node
-        create_entities(node)
-        return node
+        nodes = [self._create_node(spec) for spec in specs]
+        create_entities(nodes)
+        return nodes
 
     def run_on_start(self, node: LiveNode) -> None:
         """Call a node's `on_start`, and wait for its end or for a stop of the system.
@@ -81,3 +78,12 @@ class NodeStarter:
                     # `on_start` may have destroyed it.
                     timer.reset()
         self._system.executor.wake()
+
+    def _create_node(self, spec: NodeSpec) -> LiveNode:
+        try:
+            node = create_live_node(spec, self._system)
+        except Exception as error:
+            message = f"node '{spec.key}' cannot be created: {error}"
+            raise StartError(message) from error
+        self._nodes[spec.full_name] = node
+        return node

@@ -13,10 +13,11 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
+from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.ros_context import create_ros_context
+from composer.runtime.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -43,10 +44,11 @@ class System:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
+        ends_process: Whether the process exits after the stop. Nothing may use ROS then.
 
     Attributes:
-        has_ended: Whether everything has been destroyed. If not, behaviours still run after
-            `stop`, and only the end of this process ends them.
+        has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
+            only the end of this process ends them.
     """
 
     def __init__(
@@ -56,8 +58,11 @@ class System:
         functions: Mapping[str, Callable[..., Any]],
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
+        *,
+        ends_process: bool = False,
     ) -> None:
         self._spec = spec
+        self._ends_process = ends_process
         self.has_ended = False
         self._begun = monotonic()
         self._stop_request = StopRequest()
@@ -75,6 +80,7 @@ class System:
         self._restarter = NodeRestarter(
             self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
         )
+        self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._diagnostics_publisher: DiagnosticsPublisher | None = None
         self._processes = ProcessSupervisor(
             spec.processes.values(),
@@ -137,14 +143,14 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
-            for spec in self._spec.nodes.values():
-                self._starter.create(spec)
+            self._starter.create(self._spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_diagnostics()
             self._executor.start()
             self._hang_watcher.start()
             self._graph_watcher.start()
+            self._parameter_services.start()
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
@@ -158,6 +164,7 @@ class System:
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
+        self._parameter_services.begin()
 
     def wait(self) -> None:
         """Wait until a stop is requested."""
@@ -171,6 +178,7 @@ class System:
             run, and only the end of this process ends them.
         """
         self._error_policy.stop()
+        self._parameter_services.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
         # Processes end after the nodes: an `on_stop` may need them.
@@ -179,7 +187,7 @@ class System:
         for node in self._nodes.values():
             node.errors.flush()
         if ended:
-            self._destroy()
+            self._end_graph()
         self.has_ended = ended
         return self._stop_request.code, ended
 
@@ -242,20 +250,24 @@ class System:
             system_logger.error('the ROS context was shut down, so the system ends')
             self.request_stop(ExitCode.FAILED)
 
-    def _destroy(self) -> None:
+    def _end_graph(self) -> None:
         self._graph_watcher.stop()
         if self._diagnostics_publisher is not None:
             self._diagnostics_publisher.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)
+        self._hang_watcher.stop()
+        release(self._context)
+        if not (self._ends_process and leave_graph_at_exit(self._context, self._nodes)):
+            self._destroy_nodes()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+    def _destroy_nodes(self) -> None:
         for node in self._nodes.values():
             node.destroy()
         self._nodes.clear()
-        self._hang_watcher.stop()
-        release(self._context)
-        self._context.try_shutdown()
-        self._context.destroy()
 
 
 def _limits(spec: SystemSpec) -> Iterator[float | None]:

@@ -24,6 +24,7 @@ TINY = {
     'idle_cpu': 2,
     'round_trips': 1,
     'soak': 100,
+    'start_stop': 2,
     'thousand': 2,
 }
 

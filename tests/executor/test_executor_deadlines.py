@@ -58,3 +58,17 @@ def test_what_is_postponed_does_not_keep_others_waiting(deadlines: Any, changes:
         deadlines.run_due()
     assert due == ['second']
     assert monotonic_ns() >= begun + 20 * MS
+
+
+def test_two_threads_may_follow_the_same_jump(deadlines: Any) -> None:
+    class Jumped:
+        """Clocks of which another thread takes the last one between a look and a take."""
+
+        def __bool__(self) -> bool:
+            return True
+
+        def popleft(self) -> Any:
+            raise IndexError
+
+    deadlines.jumped = Jumped()
+    deadlines.rearm_after_jumps()

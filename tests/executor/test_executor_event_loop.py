@@ -25,7 +25,26 @@ pytestmark = [
 ]
 
 
-def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -> None:
+def test_tasks_run_in_the_order_of_rclpy(node: Any, executor: Any) -> None:
+    """Oldest first since rclpy 9, newest first before; later tasks after those in any case."""
+
+    def run_order(tasks: Any) -> list[int]:
+        order: list[int] = []
+        for number in range(5):
+            tasks.create_task(order.append, number)
+        tasks.spin_once(timeout_sec=0)
+        tasks.create_task(order.append, 5)
+        while len(order) < 6:
+            tasks.spin_once(timeout_sec=0)
+        return order
+
+    stock = rclpy.executors.SingleThreadedExecutor(context=node.context)
+    expected = run_order(stock)
+    stock.shutdown()
+    assert run_order(executor) == expected
+
+
+def test_tasks_await_each_other(node: Any, executor: Any) -> None:
     async def first() -> str:
         return 'first'
 
@@ -35,11 +54,7 @@ def test_tasks_run_newest_first_and_await_each_other(node: Any, executor: Any) -
         return await one + ' second'
 
     two = executor.create_task(second)
-    executor.spin_once(timeout_sec=0)
-    executor.spin_once(timeout_sec=0)
-    assert one.done()
-    assert not two.done()
-    executor.spin_once(timeout_sec=DEADLINE_SEC)
+    executor.spin_until_future_complete(two, DEADLINE_SEC)
     assert two.result() == 'first second'
 
 

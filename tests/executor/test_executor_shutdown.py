@@ -35,18 +35,23 @@ def test_wait_for_ready_callbacks_raises_after_shutdown(executor: Any) -> None:
         executor.wait_for_ready_callbacks()
 
 
-def test_shutdown_waits_for_a_callback_and_reports_a_stuck_one(node: Any, executor: Any) -> None:
+@pytest.mark.parametrize('wait_for_threads', [True, False])
+def test_shutdown_waits_for_a_callback_and_reports_a_stuck_one(
+    node: Any,
+    executor: Any,
+    wait_for_threads: bool,  # noqa: FBT001
+) -> None:
     let_go = threading.Event()
     began = threading.Event()
     node.create_timer(0.01, lambda: (began.set(), let_go.wait(DEADLINE_SEC)))
     thread = threading.Thread(target=executor.spin)
     thread.start()
     assert began.wait(DEADLINE_SEC)
-    assert not executor.shutdown(timeout_sec=0.05)
+    assert not executor.shutdown(timeout_sec=0.05, wait_for_threads=wait_for_threads)
     thread.join(DEADLINE_SEC)
     assert not thread.is_alive()
     let_go.set()
-    assert executor.shutdown()
+    assert executor.shutdown(wait_for_threads=wait_for_threads)
 
 
 def test_shutdown_from_a_callback(node: Any, executor: Any) -> None:

@@ -66,27 +66,10 @@ def test_an_empty_node_has_the_defaults():
     assert node.path == ('nodes', 'rover')
 
 
-@pytest.mark.parametrize(
-    ('node', 'has_them'),
-    [
-        ('{}', False),
-        ('{parameters: {}}', False),
-        ('{use_sim_time: true}', False),
-        ('{parameters: {speed: 1}}', True),
-        ('{on_parameters: b:f}', True),
-        ('{parameters: {speed: 1}, parameter_services: false}', False),
-        ('{parameter_services: true}', True),
-    ],
-)
-def test_a_node_has_parameter_services_if_it_has_parameters_or_says_so(node, has_them):
-    assert load_node(node).parameter_services is has_them
-
-
-def test_of_other_services_a_node_has_only_rosout_by_itself():
-    node = load_node('{parameters: {speed: 1}}')
-    assert (node.rosout, node.type_description_service, node.logger_services) == (
-        True, False, False
-    )  # fmt: skip
+def test_a_node_has_parameter_services_and_rosout_by_itself():
+    node = load_node('{}')
+    assert (node.parameter_services, node.rosout) == (True, True)
+    assert (node.type_description_service, node.logger_services) == (False, False)
 
 
 @pytest.mark.parametrize(

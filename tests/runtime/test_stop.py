@@ -152,3 +152,30 @@ forced_exit._MARGIN_SEC = 0.5
 
     assert child.stop() == 1
     assert child.matching('in hold_interpreter')
+
+
+def test_a_process_leaves_the_graph_as_a_whole(compose, wait_for, peer):
+    text = """
+        version: 1
+        defaults: {parameter_services: true}
+        nodes:
+          one: {on_stop: 'parts:stop'}
+          two: {on_stop: 'parts:stop'}
+    """
+    tell = """
+import rclpy.node
+
+def destroy_node(self):
+    print('destroyed', self.get_name(), flush=True)
+
+rclpy.node.Node.destroy_node = destroy_node
+"""
+    child = compose(text, CODE + tell)
+    child.wait_until_ready()
+    wait_for(lambda: {'one', 'two'} <= set(peer.node.get_node_names()), 'the nodes')
+
+    assert child.stop() == 0
+    assert len(child.matching(': stop')) == 2
+    assert not child.matching('destroyed one')
+    wait_for(lambda: not {'one', 'two'} & set(peer.node.get_node_names()), 'their end')
+    wait_for(lambda: not peer.node.count_services('/one/set_parameters'), 'the end of services')

@@ -5,7 +5,13 @@ from __future__ import annotations
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from composer.language.qos import QosError, resolve_qos
+from composer.language.qos import (
+    BEST_OF_PUBLISHERS,
+    BEST_OF_SERVICES,
+    QosError,
+    resolve_qos,
+    settle_best_available,
+)
 from composer.language.qos_conflicts import QosConflict, find_qos_conflicts
 
 if TYPE_CHECKING:
@@ -83,10 +89,13 @@ def _is_unknown(context: CheckContext, path: DataPath) -> bool:
 def _find_conflicts(
     channel: Channel, provided: Mapping[str, Any], used: Mapping[str, Any]
 ) -> Iterator[QosConflict]:
-    yield from find_qos_conflicts(provided, used)
-    if channel.kind == 'service':
-        # A service is two topics: here the client publishes, and the server hears.
-        yield from find_qos_conflicts(used, provided)
+    if channel.kind == 'topic':
+        yield from find_qos_conflicts(settle_best_available(provided, BEST_OF_PUBLISHERS), used)
+        return
+    server, client = (settle_best_available(each, BEST_OF_SERVICES) for each in (provided, used))
+    yield from find_qos_conflicts(server, client)
+    # A service is two topics: here the client publishes, and the server hears.
+    yield from find_qos_conflicts(client, server)
 
 
 def _explain(

@@ -27,7 +27,6 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
     return NodeSpec(
         name=name,
         namespace=namespace or '/',
-        parameter_services=data.get('parameter_services', _has_parameters(data)),
         state=MappingProxyType(data.get('state', {})),
         remap=tuple(data.get('remap', {}).items()),
         on_start=_parse_hook(data, path, 'on_start'),
@@ -40,10 +39,6 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         **parse_entities(data, path),
         **parse_run_options({}, data),
     )
-
-
-def _has_parameters(node: Data) -> bool:
-    return bool(node.get('parameters')) or 'on_parameters' in node
 
 
 def _parse_hook(node: Data, path: DataPath, key: str) -> BehaviourSpec | None:

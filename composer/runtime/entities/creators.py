@@ -1,10 +1,11 @@
-"""The entities of a node are created, those that behaviours use before those that call behaviours.
+"""The entities of nodes are created, those that behaviours use before those that call behaviours.
 
 A new kind of entity is a file here and a row in `CREATORS`.
 """
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
@@ -18,7 +19,7 @@ from composer.runtime.entities.subscriptions import create_subscription
 from composer.runtime.entities.timers import create_timer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -35,17 +36,30 @@ CREATORS: dict[str, Callable[[LiveNode, Any], Any]] = {
 }
 
 
-def create_entities(node: LiveNode) -> None:
-    """Create all that a node declares.
+def create_entities(nodes: Sequence[LiveNode]) -> None:
+    """Create all that nodes declare, one kind of entity after the other.
+
+    The publishers of all nodes come first: a subscription whose QoS is `best_available` takes what
+    the publishers that are there offer, and never matches one that comes later and offers less.
 
     Raises:
         StartError: One of them cannot be created.
     """
+    for node in nodes:
+        with _failing_for(node):
+            declare_parameters(node)
+    for section, create in CREATORS.items():
+        for node in nodes:
+            with _failing_for(node):
+                for spec in getattr(node.spec, section).values():
+                    node.entities[section][spec.name] = create(node, spec)
+
+
+@contextmanager
+def _failing_for(node: LiveNode) -> Iterator[None]:
+    """Raise every error as a `StartError` that names the node."""
     try:
-        declare_parameters(node)
-        for section, create in CREATORS.items():
-            for spec in getattr(node.spec, section).values():
-                node.entities[section][spec.name] = create(node, spec)
+        yield
     except ComposerError as error:
         message = f"node '{node.spec.key}': {error}"
         raise StartError(message, help=error.help) from error

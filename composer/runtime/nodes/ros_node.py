@@ -13,14 +13,15 @@ a node without any takes 0.01 MB and 0.3 ms):
 
 So a node has
 
-- parameter services if it declares parameters: otherwise there is nothing to list or set, and
-  `ros2 param list` skips a node without them. `use_sim_time` is given by the file or the
-  command line; rclpy subscribes to `/clock` only where it is true.
+- parameter services, as every ROS node: `ros2 param list` waits five seconds for those of each
+  node. They are there from the start if the node declares parameters, which the `on_start` of
+  another one may want to set; otherwise they are created later (see
+  `composer.runtime.nodes.parameter_services`).
 - `/rosout`, as every ROS node: it is cheap, and users expect a node's log there. It is created
   with the node, not with the first line: subscriptions that are not transient local would miss
   that line.
-- `/parameter_events` from the start if it declares parameters or has their services, otherwise
-  from the first change of a parameter.
+- `/parameter_events` from the start if it declares parameters, otherwise from the first change
+  of a parameter, or with its parameter services.
 - no type description service: no tool of Jazzy calls it.
 - no logger services: rclpy leaves them out, too.
 
@@ -40,6 +41,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
 
 from composer.language.paths import resolve_path
 from composer.ros_parameters.file_reader import read_parameter_file
@@ -76,7 +78,9 @@ class ComposedRosNode(Node):
         overrides = parse_command_line(ros_arguments, spec.full_name) if files else {}
         self.from_files = _read_files(files, spec.full_name, overrides)
         self._late_events: _LatePublisher | None = None
-        self._events_are_late = not (spec.parameter_services or spec.parameters)
+        has_parameters = bool(spec.parameters) or spec.on_parameters is not None
+        self._events_are_late = not has_parameters
+        self._lacks_services = spec.parameter_services and not has_parameters
         # Global arguments hold for every node of the process, where a __node rule would give all
         # of them one name.
         super().__init__(
@@ -90,7 +94,7 @@ class ComposedRosNode(Node):
             ],
             use_global_arguments=False,
             enable_rosout=spec.rosout,
-            start_parameter_services=spec.parameter_services,
+            start_parameter_services=spec.parameter_services and has_parameters,
             enable_logger_service=spec.logger_services,
         )
         if self._late_events is not None:
@@ -105,6 +109,15 @@ class ComposedRosNode(Node):
             lambda: self.create_publisher(msg_type, topic, *arguments, **options)
         )
         return self._late_events
+
+    def start_parameter_services(self) -> None:
+        """Create the parameter services, unless the node has them or the file turns them off."""
+        if not self._lacks_services:
+            return
+        self._lacks_services = False
+        if self._late_events is not None:
+            self._late_events.create()
+        self._parameter_service = ParameterService(self)
 
     def wait_until_gone(self, timeout_sec: float) -> bool:
         """Wait until the destroyed node is gone; return whether it went in time.
@@ -141,12 +154,15 @@ class _LatePublisher:
 
     def publish(self, event: ParameterEvent) -> None:
         """Publish a change of parameters."""
-        if not self._is_open:
-            return
+        if self._is_open:
+            self.create().publish(event)
+
+    def create(self) -> Publisher:
+        """Return the publisher, which is created if there is none."""
         with self._lock:
             if self._publisher is None:
                 self._publisher = self._create()
-        self._publisher.publish(event)
+        return self._publisher
 
 
 def _node_arguments(

@@ -82,12 +82,12 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
     timers:
       a: {period: 1, publish: out, message: {}}
       b: {period: 1, behaviour: parts:ask}
-  b: {parameters: {speed: 1}}
+  b: {}
 """
     assert check(nodes, CODE, installed=False) == []
     elsewhere = nodes.replace('/b/get', '/c/get')
     assert check(elsewhere, CODE, installed=False) == [(11, 'no-server')]
-    without = nodes.replace('speed: 1}', 'speed: 1}, parameter_services: false')
+    without = nodes.replace('b: {}', 'b: {parameter_services: false}')
     assert check(without, CODE, installed=False) == [(11, 'no-server')]
 
 

@@ -158,3 +158,20 @@ def test_messages_that_come_before_the_start_is_over_wait_for_it(compose, peer):
     assert child.matching('heard') == [
         f'[INFO] [patient]: heard {number}, started: True' for number in range(3)
     ]
+
+
+def test_the_best_available_qos_fits_publishers_of_nodes_that_stand_below(compose):
+    text = """
+        version: 1
+        nodes:
+          ears:
+            subscriptions:
+              word: {type: std_msgs/msg/String, qos: best_available, behaviour: 'parts:shout'}
+          mouth:
+            publishers:
+              word: {type: std_msgs/msg/String, qos: sensor_data}
+            timers:
+              speak: {period: 0.05, publish: word, message: hello}
+    """
+    child = compose(text, CODE.replace('suffix)', "suffix='')"))
+    child.wait_for_line('heard String hello')

@@ -28,7 +28,7 @@ nodes:
   plain: {subscriptions: {word: {type: std_msgs/msg/String, behaviour: 'parts:ignore'}}}
   with_parameters: {parameters: {speed: 1.5}}
   with_a_hook: {on_parameters: parts:ignore}
-  forced: {parameter_services: true}
+  lean: {parameter_services: false}
   spared: {parameters: {speed: 1.5}, parameter_services: false}
   all_of_them:
     parameter_services: true
@@ -40,10 +40,11 @@ nodes:
     publishers: {word: std_msgs/msg/String}
   levelled: {logger_services: true}
   silent: {rosout: false}
-  last: {parameters: {speed: 1.5}}
+  last: {}
 """
 
 CODE = """
+import threading
 from rclpy.parameter import Parameter
 
 def ignore(node, message):
@@ -66,6 +67,17 @@ def set_of_plain(node):
         node.set_parameters('plain', {'speed': 2.0}, timeout=30)
     except Exception as error:
         node.logger.info(f'{type(error).__name__}: {error}; {error.help}')
+
+def ask_plain(node):
+    values = node.get_parameters('plain', ['use_sim_time'], timeout=30)
+    node.logger.info(f"plain simulates: {values['use_sim_time']}")
+
+def block(node):
+    node.logger.info(f'{node.name} blocks')
+    threading.Event().wait()
+
+def announce(node):
+    node.logger.info('not a moment')
 
 def live(node):
     node.state.ticks += 1
@@ -102,14 +114,14 @@ def services_of(graph, wait_for):
 @pytest.mark.parametrize(
     ('node', 'namespace', 'expected'),
     [
-        ('plain', '/', set()),
+        ('plain', '/', PARAMETER_SERVICES),
         ('with_parameters', '/', PARAMETER_SERVICES),
         ('with_a_hook', '/', PARAMETER_SERVICES),
-        ('forced', '/', PARAMETER_SERVICES),
+        ('lean', '/', set()),
         ('spared', '/', set()),
-        ('silent', '/', set()),
-        ('described', '/deep', TYPE_DESCRIPTION_SERVICE),
-        ('levelled', '/', LOGGER_SERVICES),
+        ('silent', '/', PARAMETER_SERVICES),
+        ('described', '/deep', PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE),
+        ('levelled', '/', PARAMETER_SERVICES | LOGGER_SERVICES),
         ('all_of_them', '/', PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE | LOGGER_SERVICES),
     ],
 )
@@ -123,11 +135,11 @@ def test_a_node_has_the_services_that_the_file_asks_for_and_no_others(
 @pytest.mark.parametrize(
     ('node', 'topics'),
     [
-        ('plain', {'/rosout'}),
+        ('plain', {'/rosout', '/parameter_events'}),
         ('with_parameters', {'/rosout', '/parameter_events'}),
         ('spared', {'/rosout', '/parameter_events'}),
-        ('forced', {'/rosout', '/parameter_events'}),
-        ('silent', set()),
+        ('lean', {'/rosout'}),
+        ('silent', {'/parameter_events'}),
     ],
 )
 @pytest.mark.usefixtures('services_of')
@@ -143,7 +155,7 @@ def test_a_node_publishes_its_log_and_what_becomes_of_its_parameters(
 
 def test_services_that_were_asked_for_answer(graph, shared_peer, wait_for):
     assert graph.get_name() == 'peer'
-    response = shared_peer.call(ListParameters, '/forced/list_parameters')
+    response = shared_peer.call(ListParameters, '/plain/list_parameters')
     assert 'use_sim_time' in response.result.names
     request = {'names': ['levelled']}
     (level,) = shared_peer.call(GetLoggerLevels, '/levelled/get_logger_levels', **request).levels
@@ -163,7 +175,9 @@ def test_a_node_without_events_of_its_own_tells_of_changes_that_a_behaviour_make
     text = """
         version: 1
         nodes:
-          plain: {timers: {change: {period: 0.05, behaviour: 'parts:change'}}}
+          plain:
+            parameter_services: false
+            timers: {change: {period: 0.05, behaviour: 'parts:change'}}
     """
     heard = peer.listen(ParameterEvent, '/parameter_events')
     compose(text, CODE).wait_until_ready()
@@ -257,7 +271,7 @@ def test_setting_a_parameter_of_a_node_without_services_is_an_error_that_says_so
           asking:
             namespace: deep
             timers: {ask: {period: 0.02, behaviour: 'parts:set_of_plain'}}
-          plain: {namespace: deep}
+          plain: {namespace: deep, parameter_services: false}
     """
     child = compose(text, CODE)
 
@@ -265,3 +279,47 @@ def test_setting_a_parameter_of_a_node_without_services_is_an_error_that_says_so
         "ServiceNotAvailableError: node '/deep/plain' has no parameter services; "
         "write 'parameter_services: true' where the file declares it"
     )
+
+
+def test_a_start_that_waits_for_the_parameter_services_of_another_node_gets_them(compose):
+    """They are created when the system is ready, which it is after this start."""
+    text = """
+        version: 1
+        nodes:
+          asking: {on_start: parts:ask_plain}
+          waiting: {wait_for: {service: plain/set_parameters}}
+          plain: {}
+    """
+    child = compose(text, CODE)
+    child.wait_until_ready()
+    assert child.matching('plain simulates: False')
+    assert child.stop() == 0
+
+
+def test_parameters_are_served_beside_a_behaviour_that_blocks_and_after_a_restart(compose, peer):
+    text = """
+        version: 1
+        executor: {shutdown_timeout: 0.2}
+        nodes:
+          blocking: {timers: {block: {period: 0.02, behaviour: 'parts:block'}}}
+          phoenix:
+            on_error: restart
+            state: {ticks: 0}
+            timers: {live: {period: 0.02, behaviour: 'parts:live'}}
+            on_start: parts:begin
+    """
+    child = compose(text, CODE)
+    child.wait_for_line('blocking blocks')
+    child.wait_for_line("node 'phoenix' was restarted")
+    for node in ('blocking', 'phoenix'):
+        response = peer.call(ListParameters, f'/{node}/list_parameters')
+        assert 'use_sim_time' in response.result.names
+
+
+@pytest.mark.parametrize('moment', ['ready in', 'not a moment'])
+def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose, moment):
+    nodes = ''.join(f'  node_{number}: {{}}\n' for number in range(60))
+    child = compose(f'version: 1\nnodes:\n  first: {{on_start: parts:announce}}\n{nodes}', CODE)
+    child.wait_for_line(moment)
+    assert child.stop() == 0
+    assert not child.matching('ERROR')

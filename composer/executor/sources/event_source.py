@@ -1,14 +1,14 @@
 """What all kinds of sources share: a source listens to one entity, takes what came and runs it."""
 
 import inspect
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.c_bindings import ExecutorError
-from composer.executor.event_poller import UNKNOWN_COUNT, EventFd, EventPoller
+from composer.executor.c_bindings import Readiness
+from composer.executor.event_fds import UNKNOWN_COUNT, EventFd
+from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Group, Scheduler
 
 NOTHING = object()
@@ -53,7 +53,9 @@ class ExecutorParts:
 
     def __init__(self, executor: Any, max_running: int) -> None:
         self.executor = executor
+        self.readiness = Readiness(executor.context)
         self.poller = EventPoller()
+        self.event_fds = self.poller.event_fds
         self.deadlines = self.poller.deadlines
         self.scheduler = Scheduler(max_running, self.poller.wake, self._has_node)
 
@@ -69,12 +71,16 @@ class EventSource:
     Attributes:
         rank: The order of what is ready at the same time. rclpy executes timers, subscriptions,
             guard conditions, clients, services, waitables.
-        watch: The function that has rcl write to an eventfd; None if the subclass does not use it.
+        has_own_event_fd: Whether it has an eventfd of its own from the start, if there are any.
+        ask: The method of `Readiness` that tells whether there is something to take.
+        watch_entity: The function that has rcl write to an eventfd.
         slow: Whether the last callback held up the leader.
     """
 
     rank = 0
-    watch: ClassVar[Any] = None
+    has_own_event_fd = True
+    ask: ClassVar[Any] = None
+    watch_entity: ClassVar[Any] = None
     __slots__ = (
         '__weakref__',
         '_callback',
@@ -105,17 +111,24 @@ class EventSource:
         self._callback: Any = None
         self._is_coroutine_function = False
 
-    def open(self, shared: EventFd | None = None) -> None:
-        """Listen to the entity, with an eventfd of its own or `shared`."""
-        self._listen(shared)
+    def open(self) -> None:
+        """Listen to the entity."""
+        self.parts.event_fds.attach(self)
         self.parts.scheduler.add_events(self, UNKNOWN_COUNT)
 
     def close(self) -> None:
         """Stop listening."""
         self.alive = False
-        with suppress(InvalidHandle, ExecutorError), self.entity.handle:
-            self.watch(self.entity.handle.pointer, None)
-        self._detach()
+        self.parts.event_fds.detach(self)
+
+    def watch(self, fd: int | None) -> None:
+        """Have rcl add to the eventfd `fd` when something new is there; None for nowhere."""
+        with self.entity.handle:
+            self.watch_entity(self.entity.handle.pointer, fd)
+
+    def is_gone(self) -> bool:
+        """Tell whether rcl writes nowhere any more, because nothing is left of the entity."""
+        return not self.entity.handle.pointer
 
     def run(self) -> Any:
         """Take and run the callback; returns its coroutine if it has one, or `NOTHING`."""
@@ -129,21 +142,32 @@ class EventSource:
         """Return what the entity has missed."""
         return MissedCounts()
 
+    def _note_taken(self) -> None:
+        """Have an eventfd of its own: it is busy."""
+        event_fd = self.event_fd
+        if event_fd is not None and event_fd.is_shared:
+            self.parts.event_fds.note_busy(self)
+
+    def _note_nothing_taken(self, revision: int) -> None:
+        """Go on only if the middleware has something after all.
+
+        A malformed request, or a response to another client, is taken as if there was nothing:
+        what was announced may be behind it.
+        """
+        if self.pending and not self._has_data():
+            self.parts.scheduler.set_empty(self, revision)
+
+    def _has_data(self) -> bool:
+        """Ask the middleware whether there is something to take."""
+        try:
+            with self.entity.handle:
+                has_data: bool = self.ask(self.parts.readiness, self.entity.handle.pointer)
+                return has_data
+        except InvalidHandle:
+            return False
+
     def _is_async(self, callback: Any) -> bool:
         if callback is not self._callback:
             self._callback = callback
             self._is_coroutine_function = inspect.iscoroutinefunction(callback)
         return self._is_coroutine_function
-
-    def _listen(self, shared: EventFd | None) -> None:
-        self.event_fd = self.parts.poller.attach(self, shared)
-        try:
-            with self.entity.handle:
-                self.watch(self.entity.handle.pointer, self.event_fd.fd)
-        except BaseException:
-            self.parts.poller.detach(self, self.event_fd)
-            raise
-
-    def _detach(self) -> None:
-        if self.event_fd is not None:
-            self.parts.poller.detach(self, self.event_fd)

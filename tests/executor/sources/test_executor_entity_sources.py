@@ -1,6 +1,7 @@
 """Subscriptions, timers, services and clients."""
 
 import asyncio
+import functools
 import threading
 import time
 from typing import Any
@@ -11,6 +12,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('test_msgs')
 
 import rclpy
+from raw_topics import RawPublisher
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import ClockType
 from rclpy.context import Context
@@ -19,9 +21,9 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
 from std_msgs.msg import Int32
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from composer.executor import ComposerExecutor
+from composer.executor import ComposerExecutor, MissedCounts
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -193,6 +195,35 @@ def test_timers_of_all_clocks_fire(node: Any, executor: Any) -> None:
         wait_for(lambda: len(ticks) == 3)
 
 
+@pytest.mark.skipif(not hasattr(rclpy.timer, 'TimerInfo'), reason='since rclpy 9')
+def test_a_timer_callback_may_ask_for_the_times_of_its_call(node: Any, executor: Any) -> None:
+    from rclpy.timer import TimerInfo
+
+    async def coroutine(at: TimerInfo) -> None:
+        seen['coroutine'] = at
+
+    def function(number: int, *, at: TimerInfo) -> None:
+        seen[number] = at
+
+    class Listener:
+        def on_tick(self, at: TimerInfo) -> None:
+            seen['method'] = at
+
+    seen: dict[Any, Any] = {}
+    callbacks = (coroutine, functools.partial(function, 1), Listener().on_tick, lambda: None)
+    for callback in callbacks:
+        node.create_timer(0.01, callback)
+    replaced = node.create_timer(0.01, lambda: None)
+    without_signature = {'left': 1}
+    node.create_timer(0.01, without_signature.clear)
+    with spinning(executor):
+        replaced.callback = functools.partial(function, 2)
+        wait_for(lambda: len(seen) == 4 and not without_signature)
+    for info in seen.values():
+        assert info.expected_call_time <= info.actual_call_time
+        assert info.actual_call_time.clock_type == ClockType.ROS_TIME
+
+
 def test_a_rate_sleeps_in_a_callback(node: Any, executor: Any) -> None:
     rate = node.create_rate(100)
     slept: list[int] = []
@@ -341,3 +372,44 @@ def test_a_response_waits_for_a_message_that_came_after_the_last_look(
     executor.spin_until_future_complete(future, timeout_sec=DEADLINE_SEC)
     wait_for(lambda: executor.spin_once(timeout_sec=0) or 'response' in heard)
     assert heard == ['message', 'response']
+
+
+@pytest.mark.parametrize(
+    ('topic', 'message_type'),
+    [('rq/switchRequest', SetBool.Request), ('rr/switchReply', SetBool.Response)],
+)
+def test_malformed_requests_and_responses_delay_nobody(
+    node: Any, executor: Any, context: Context, topic: str, message_type: Any
+) -> None:
+    other = rclpy.create_node('other', context=context)
+    client = node.create_client(SetBool, 'switch')
+    node.create_service(SetBool, 'switch', lambda _, r: r)
+    node.create_service(SetBool, 'other', lambda _, r: r)
+    peer = RawPublisher(other, message_type, topic)
+    with spinning(executor):
+        wait_for(peer.is_matched)
+        wait_for(client.call_async(SetBool.Request()).done)
+        for _ in range(40):
+            peer.publish(bytes([0, 1, 0, 0]))
+        for _ in range(3):
+            wait_for(client.call_async(SetBool.Request()).done)
+    peer.destroy()
+    other.destroy_node()
+
+
+def test_a_new_subscription_has_missed_nothing_of_a_destroyed_one(
+    node: Any, executor: Any
+) -> None:
+    ticks: list[int] = []
+    node.create_timer(0.01, lambda: ticks.append(1))
+    before = node.create_subscription(Int32, 'count', print, 10)
+    publisher = node.create_publisher(Int32, 'count', 100)
+    executor.spin_once(timeout_sec=0)
+    for number in range(30):
+        publisher.publish(Int32(data=number))
+    node.destroy_subscription(before)
+    executor.spin_once(timeout_sec=0)
+    silent = node.create_subscription(Int32, 'silent', print, 10)
+    with spinning(executor):
+        wait_for(lambda: len(ticks) > 3)
+        assert executor.missed_counts(node, silent) == MissedCounts()

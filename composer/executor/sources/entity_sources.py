@@ -1,41 +1,51 @@
 """Timers, subscriptions, services and clients as event sources."""
 
+import inspect
 import threading
 from time import monotonic_ns
 from typing import Any
 
+import rclpy.exceptions
+import rclpy.timer
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
 from composer.executor import c_bindings
 from composer.executor.after_fork import end_child
-from composer.executor.event_poller import UNKNOWN_COUNT, EventFd
-from composer.executor.event_source import NOTHING, EventSource, MissedCounts
+from composer.executor.c_bindings import Readiness
+from composer.executor.event_fds import UNKNOWN_COUNT
+from composer.executor.sources.event_source import NOTHING, EventSource, MissedCounts
 
 _LATE_SHARE = 0.1
 _MIN_LATE_NS = 1_000_000
+_MIN_RESET_NS = 1_000_000
 """A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its time.
 
 A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms unless
 that was set: beside it, timers with short periods are late indeed.
 """
 
+# Since rclpy 9.
+_TimerInfo = getattr(rclpy.timer, 'TimerInfo', None)
+_TimerCancelledError = getattr(rclpy.exceptions, 'TimerCancelledError', InvalidHandle)
+
 
 class TimerSource(EventSource):
     """A timer: due at its deadline, or when its ROS clock gets there; its events are resets."""
 
-    watch = staticmethod(c_bindings.watch_timer_reset)
-    __slots__ = ('_clock', '_late', '_rearming', '_skipped', 'deadline_ns')
+    has_own_event_fd = False
+    watch_entity = staticmethod(c_bindings.watch_timer_reset)
+    __slots__ = ('_clock', '_info_name', '_late', '_rearming', '_skipped', 'deadline_ns')
 
-    def open(self, shared: EventFd | None = None) -> None:
+    def open(self) -> None:
         """See the base class."""
         self._rearming = threading.Lock()
         self._late = 0
         self._skipped = 0
         self.deadline_ns: int | None = None
         self._clock = None
-        self._listen(shared)
+        self.parts.event_fds.attach(self)
         self._clock = self.parts.deadlines.follow(self.entity.clock, self)
         self.rearm()
 
@@ -47,8 +57,15 @@ class TimerSource(EventSource):
         super().close()
 
     def on_events(self, count: int) -> None:  # noqa: ARG002
-        """Find out when the timer is due, for it was reset."""
+        """Find out when the timer is due, for it may have been reset."""
+        before_ns = self.deadline_ns
         self.rearm()
+        if before_ns != self.deadline_ns and (
+            before_ns is None
+            or self.deadline_ns is None
+            or abs(self.deadline_ns - before_ns) > _MIN_RESET_NS
+        ):
+            self._note_taken()
 
     def on_deadline(self) -> None:
         """Queue the source; `run` asks rcl whether the timer is due."""
@@ -79,40 +96,64 @@ class TimerSource(EventSource):
     def run(self) -> Any:
         """See the base class."""
         timer = self.entity
+        callback = timer.callback
+        if callback is not self._callback:
+            self._info_name = _name_of_timer_info(callback)
+        is_async = self._is_async(callback)
         try:
             handle = timer.handle
             with handle:
-                due = self._call(handle)
-        except InvalidHandle:
+                arguments = self._call(handle)
+        except (InvalidHandle, _TimerCancelledError):
             return NOTHING
         self.rearm()
-        if not due:
+        if arguments is None:
             return NOTHING
-        callback = timer.callback
-        result = callback()
-        return result if result is not None and self._is_async(callback) else None
+        result = callback(**arguments)
+        return result if result is not None and is_async else None
 
     def missed_counts(self) -> MissedCounts:
         """See the base class."""
         return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
 
-    def _call(self, handle: Any) -> bool:
-        """Tell rcl that the tick begins, and count what was missed; False if it is not due."""
+    def _call(self, handle: Any) -> dict[str, Any] | None:
+        """Tell rcl that the tick begins, and count what was missed.
+
+        Returns:
+            The arguments of the callback, or None if the timer is not due.
+        """
         begin_ns = monotonic_ns()
         until_ns = handle.time_until_next_call()
         if until_ns is None or until_ns > 0:
-            return False
-        handle.call_timer()
+            return None
+        arguments = {}
+        if self._info_name is None:
+            handle.call_timer()
+        else:
+            info = handle.call_timer_with_info()
+            clock_type = self.entity.clock.clock_type
+            arguments[self._info_name] = _TimerInfo(**info, clock_type=clock_type)  # type: ignore[misc]
         next_until_ns = handle.time_until_next_call()
         period_ns = handle.get_timer_period()
         if next_until_ns is None or not period_ns:
-            return True
+            return arguments
         if -until_ns > _MIN_LATE_NS and -until_ns > _LATE_SHARE * period_ns:
             self._late += 1
         # rcl sets the next tick to the next multiple of the period that has not passed.
         advance_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
         self._skipped += max(0, advance_ns // period_ns - 1)
-        return True
+        return arguments
+
+
+def _name_of_timer_info(callback: Any) -> str | None:
+    """Return the parameter of `callback` that is annotated with `TimerInfo`, as rclpy finds it."""
+    if _TimerInfo is None:
+        return None
+    try:
+        parameters = inspect.signature(callback).parameters.values()
+    except ValueError:  # A function in C may have none that is known.
+        return None
+    return next((p.name for p in parameters if p.annotation == _TimerInfo), None)
 
 
 class SubscriptionSource(EventSource):
@@ -124,19 +165,24 @@ class SubscriptionSource(EventSource):
     """
 
     rank = 1
-    watch = staticmethod(c_bindings.watch_subscription)
-    __slots__ = ('_arrived', '_overruns', '_taken')
+    ask = staticmethod(Readiness.has_messages)
+    watch_entity = staticmethod(c_bindings.watch_subscription)
+    __slots__ = ('_arrived', '_is_counting', '_overruns', '_taken')
 
-    def open(self, shared: EventFd | None = None) -> None:
+    def open(self) -> None:
         """See the base class."""
         self._arrived = 0
         self._taken = 0
         self._overruns = 0
-        super().open(shared)
+        self._is_counting = True
+        super().open()
 
     def on_events(self, count: int) -> None:
         """See the base class."""
-        if count < UNKNOWN_COUNT:
+        event_fd = self.event_fd
+        if count >= UNKNOWN_COUNT or event_fd is None or event_fd.is_shared:
+            self._is_counting = False
+        else:
             self._arrived += count
         super().on_events(count)
 
@@ -166,9 +212,15 @@ class SubscriptionSource(EventSource):
             return NOTHING
         if taken is None:
             self._taken -= 1
-            self._note_overruns(arrived - self._taken)
-            self.parts.scheduler.set_empty(self, revision)
+            if self._is_counting:
+                self._note_overruns(arrived - self._taken)
+            else:
+                # What the others of a shared eventfd had is not known: begin again from here.
+                self._arrived = self._taken + self._overruns
+                self._is_counting = True
+            self._note_nothing_taken(revision)
             return NOTHING
+        self._note_taken()
         callback = entity.callback
         if entity._callback_type is Subscription.CallbackType.MessageOnly:  # noqa: SLF001
             result = callback(taken[0])
@@ -177,32 +229,22 @@ class SubscriptionSource(EventSource):
         return result if result is not None and self._is_async(callback) else None
 
 
-# A larger number of events is not known, and begins at `UNKNOWN_COUNT`.
-_MOST_COUNTED = UNKNOWN_COUNT // 2
-# So many takes without a response mean that there is none, where the number is not known.
-_MOST_MISSES = 32
-
-
 class ClientSource(EventSource):
     """A service client.
 
     Whoever spins until the response is there stops then. So what came with it or before it runs
     first, once: rclpy executes tasks and messages before responses.
-
-    To take a response to another client of the service looks as if there was none: one to this
-    client may be behind it.
     """
 
     rank = 2
-    watch = staticmethod(c_bindings.watch_client)
-    __slots__ = ('_has_yielded', '_misses')
+    ask = staticmethod(Readiness.has_responses)
+    watch_entity = staticmethod(c_bindings.watch_client)
+    __slots__ = ('_has_yielded',)
 
-    def open(self, shared: EventFd | None = None) -> None:
+    def open(self) -> None:
         """See the base class."""
         self._has_yielded = False
-        self._misses = 0
-        # What came before is announced at once; the number must be known, see `run`.
-        self._listen(shared)
+        super().open()
 
     def run(self) -> Any:
         """See the base class."""
@@ -221,12 +263,9 @@ class ClientSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            self._misses += 1
-            if self.pending > _MOST_COUNTED and self._misses > _MOST_MISSES:
-                self._misses = 0
-                parts.scheduler.set_empty(self, revision)
+            self._note_nothing_taken(revision)
             return NOTHING
-        self._misses = 0
+        self._note_taken()
         try:
             future = self.entity.get_pending_request(header.request_id.sequence_number)
         except KeyError:
@@ -239,8 +278,10 @@ class ClientSource(EventSource):
 class ServiceSource(EventSource):
     """A service."""
 
+    has_own_event_fd = False
     rank = 3
-    watch = staticmethod(c_bindings.watch_service)
+    ask = staticmethod(Readiness.has_requests)
+    watch_entity = staticmethod(c_bindings.watch_service)
     __slots__ = ()
 
     def run(self) -> Any:
@@ -254,8 +295,9 @@ class ServiceSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            self.parts.scheduler.set_empty(self, revision)
+            self._note_nothing_taken(revision)
             return NOTHING
+        self._note_taken()
         callback = service.callback
         response = callback(request, service.srv_type.Response())
         if self.parts.executor.is_forked:

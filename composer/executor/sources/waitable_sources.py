@@ -10,8 +10,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.executor import c_bindings
-from composer.executor.event_poller import UNKNOWN_COUNT, EventFd
-from composer.executor.event_source import NOTHING, EventSource
+from composer.executor.event_fds import UNKNOWN_COUNT
+from composer.executor.sources.event_source import NOTHING, EventSource
 
 
 class _ActionTimer:
@@ -52,19 +52,19 @@ class ActionSource(EventSource):
         handle = getattr(self.entity, '_handle', None)
         return self.entity._client_handle if handle is None else handle  # noqa: SLF001
 
-    def open(self, shared: EventFd | None = None) -> None:
+    def open(self) -> None:
         """See the base class."""
         self._checking = threading.Lock()
-        self._timers: list[_ActionTimer] = []
         self._clock = None
         with self.hold_entity():
             self._wait_set = _create_wait_set_of(self.entity, self.parts.executor.context)
             self._parts = c_bindings.list_parts(self._wait_set)
-            self.event_fd = self.parts.poller.attach(self, shared)
-            for watch, pointer in self._parts:
-                watch(pointer, self.event_fd.fd)
-                if watch is c_bindings.watch_timer_reset:
-                    self._timers.append(_ActionTimer(pointer, self))
+            self._timers = [
+                _ActionTimer(pointer, self)
+                for watch, pointer in self._parts
+                if watch is c_bindings.watch_timer_reset
+            ]
+            self.parts.event_fds.attach(self)
         if self._timers:
             self._clock = self.parts.deadlines.follow(self.entity._node.get_clock(), self)  # noqa: SLF001
         self.on_events(1)
@@ -76,10 +76,17 @@ class ActionSource(EventSource):
             self.parts.deadlines.set(timer, None)
         if self._clock is not None:
             self.parts.deadlines.unfollow(self._clock, self)
-        with suppress(InvalidHandle, c_bindings.ExecutorError), self.hold_entity():
+        self.parts.event_fds.detach(self)
+
+    def watch(self, fd: int | None) -> None:
+        """See the base class."""
+        with self.hold_entity():
             for watch, pointer in self._parts:
-                watch(pointer, None)
-        self._detach()
+                watch(pointer, fd)
+
+    def is_gone(self) -> bool:
+        """See the base class."""
+        return not self.hold_entity().pointer
 
     def on_events(self, count: int) -> None:  # noqa: ARG002
         """See the base class."""
@@ -105,6 +112,7 @@ class ActionSource(EventSource):
                 timer.rearm()
             self.parts.scheduler.set_empty(self, revision)
             return NOTHING
+        self._note_taken()
         return self._execute(data)
 
     async def _execute(self, data: Any) -> None:
@@ -129,7 +137,7 @@ class WaitSetSource(EventSource):
     on_taken: Callable[[], None] | None
     __slots__ = ('on_taken',)
 
-    def open(self, shared: EventFd | None = None) -> None:  # noqa: ARG002
+    def open(self) -> None:
         """See the base class; the wait set thread does the rest."""
         self.on_taken = None
         self.entity._executor_event = False  # noqa: SLF001

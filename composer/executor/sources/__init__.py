@@ -1,0 +1,1 @@
+"""Event sources: a source listens to one entity, takes what came and runs its callback."""
