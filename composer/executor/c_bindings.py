@@ -94,21 +94,12 @@ class _PollFd(ctypes.Structure):
     _fields_ = (('fd', ctypes.c_int), ('events', ctypes.c_short), ('revents', ctypes.c_short))
 
 
-class _TimeSpec(ctypes.Structure):
-    _fields_ = (('sec', ctypes.c_long), ('nsec', ctypes.c_long))
-
-
 _MAX_EVENTS = 64
 _EpollEvents = _EpollEvent * _MAX_EVENTS
 _spare_events: list[Any] = []  # A new one is made only when several threads look at once.
 _epoll_wait = _libc_holding_gil.epoll_wait
 _POLLIN = 1
-_libc.ppoll.argtypes = (
-    ctypes.POINTER(_PollFd),
-    ctypes.c_ulong,
-    ctypes.POINTER(_TimeSpec),
-    ctypes.c_void_p,
-)
+_libc.poll.argtypes = (ctypes.POINTER(_PollFd), ctypes.c_ulong, ctypes.c_int)
 
 
 def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
@@ -123,13 +114,13 @@ def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     return arrived
 
 
-def wait_readable(fd: int, timeout_sec: float) -> None:
-    """Wait until `fd` is readable, a POSIX signal comes, or exactly `timeout_sec` has passed.
+def wait_readable(fd: int, timeout_sec: float | None) -> None:
+    """Wait until `fd` is readable, a POSIX signal comes, or `timeout_sec` has passed.
 
-    Python's own waits count in whole milliseconds and round up.
+    Only the wait releases the GIL, as in Python's own; what follows need not get it again.
     """
-    timeout = _TimeSpec(*divmod(int(timeout_sec * 1e9), 1_000_000_000))
-    _libc.ppoll(ctypes.byref(_PollFd(fd, _POLLIN, 0)), 1, ctypes.byref(timeout), None)
+    timeout_ms = -1 if timeout_sec is None else int(timeout_sec * 1000)
+    _libc.poll(ctypes.byref(_PollFd(fd, _POLLIN, 0)), 1, timeout_ms)
 
 
 # Event callbacks of entities

@@ -63,13 +63,16 @@ class EventLoop:
             while self._goes_on(me):
                 if scheduler.unlooked:
                     self._look(me)
-                elif self._execute_ready(me) or scheduler.running:
-                    if poller.peek() or not self._is_idle():
+                    continue
+                if self._execute_ready(me) or scheduler.running:
+                    if not self._is_spinning() or poller.peek() or not self._is_idle():
                         continue
                     if scheduler.running:
                         workers.let_standby_sleep(me)
                 if workers.leader is me:
-                    poller.wait_if(self._is_idle, None)
+                    poller.wait_if(self._is_idle)
+                    if self._is_spinning():
+                        poller.peek()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
             workers.stop_leading(me)  # Whoever spins on starts another leader.
             self._on_error(error)
@@ -79,7 +82,11 @@ class EventLoop:
         """Tell whether `me` goes on leading: it waits a little for the next session."""
         if not self._is_spinning() and self.workers.leader is me:
             self.workers.let_standby_sleep(me)
-            self._parts.poller.wait_if(lambda: not self._is_spinning(), _LINGER_SEC)
+            # What comes meanwhile is taken in rclpy's order when somebody spins again.
+            scheduler = self._parts.scheduler
+            self._parts.poller.wait_for_wake_if(
+                lambda: not scheduler.is_spinning and not scheduler.is_closed, _LINGER_SEC
+            )
         return self.workers.is_leader(me, self._is_spinning)
 
     def _on_takeover(self) -> None:
@@ -92,7 +99,8 @@ class EventLoop:
         sessions = tuple(scheduler.unlooked)
         self._registry.refresh_if_stale()
         self._runner.resume_paused()
-        self._parts.poller.peek()
+        if any(session.admits_one for session in sessions):
+            self._parts.poller.peek()
         while self._execute_ready(me) and any(map(_is_waiting, sessions)):
             pass  # What was ready had nothing to take.
         if self.workers.leader is me:

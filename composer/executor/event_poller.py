@@ -16,13 +16,11 @@ from composer.executor.c_bindings import (
 from composer.executor.deadlines import Deadlines
 from composer.executor.event_fds import EventFds
 
-_MAX_EVENTS = 512
-
 
 class EventPoller:
     """Waits for events and deadlines, at a cost that depends only on how many have come.
 
-    All listeners have been called when `peek` or `wait_if` returns.
+    All listeners have been called when `peek` returns.
     """
 
     def __init__(self) -> None:
@@ -53,25 +51,25 @@ class EventPoller:
         self.deadlines.rearm_after_jumps()
         return bool(arrived)
 
-    def wait_if(self, is_idle: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Wait for events if `is_idle()`, else only look; a timeout of None is for ever.
+    def wait_if(self, is_idle: Callable[[], bool]) -> None:
+        """Wait if `is_idle()` until there is something for `peek`.
 
         Whoever makes `is_idle()` false meanwhile calls `wake`.
         """
+        self._wait_if(is_idle, self._epoll.fileno(), None)
+
+    def wait_for_wake_if(self, is_idle: Callable[[], bool], timeout_sec: float) -> None:
+        """Wait if `is_idle()` until `wake` is called or `timeout_sec` has passed."""
+        self._wait_if(is_idle, self._wake_fd, timeout_sec)
+
+    def _wait_if(self, is_idle: Callable[[], bool], fd: int, timeout_sec: float | None) -> None:
         me = get_ident()
         self._waiting_threads.add(me)
         try:
-            arrived = self._wait(timeout_sec if is_idle() else 0)
+            if is_idle():
+                wait_readable(fd, timeout_sec)
         finally:
             self._waiting_threads.discard(me)
-        self._dispatch(arrived)
-        self.deadlines.rearm_after_jumps()
-
-    def _wait(self, timeout_sec: float | None) -> list[tuple[int, int]]:
-        if timeout_sec:
-            wait_readable(self._epoll.fileno(), timeout_sec)
-            timeout_sec = 0
-        return self._epoll.poll(timeout_sec, _MAX_EVENTS)
 
     def _dispatch(self, arrived: list[tuple[int, int]]) -> None:
         if len(arrived) > 1:

@@ -134,6 +134,7 @@ class Scheduler:
         running: How many callbacks have begun and not ended.
         waiting: How many of these wait for others, and do not count against `max_running`.
         is_spinning: Whether callbacks may begin, because a session is open that admits them.
+        is_closed: Whether nothing begins any more.
         admitted: How many callbacks run of sessions that admit one.
         unlooked: The sessions that have not looked yet.
     """
@@ -147,7 +148,7 @@ class Scheduler:
         self.is_spinning = False
         self.admitted = 0
         self.unlooked: list[Session] = []
-        self._is_closed = False
+        self.is_closed = False
         self._unlimited: set[Session] = set()
         self._admitting: deque[Session] = deque()
         self._max_running = max_running
@@ -178,7 +179,7 @@ class Scheduler:
     def open_session(self, session: Session) -> None:
         """Let callbacks begin by `session`."""
         with self.lock:
-            if self._is_closed:
+            if self.is_closed:
                 return
             if session.admits_one:
                 self._admitting.append(session)
@@ -205,7 +206,7 @@ class Scheduler:
             self.unlooked = [session for session in self.unlooked if not session.has_looked]
 
     def _set_spinning(self) -> None:
-        self.is_spinning = not self._is_closed and bool(self._unlimited or self._admitting)
+        self.is_spinning = not self.is_closed and bool(self._unlimited or self._admitting)
 
     def group_of(self, callback_group: Any) -> Group:
         """Return the state of `callback_group`."""
@@ -292,7 +293,7 @@ class Scheduler:
         """Note that the callback of `session` has ended; another may begin if it has not run."""
         with self.lock:
             self.admitted -= 1
-            if has_run or self._is_closed or session.is_closed:
+            if has_run or self.is_closed or session.is_closed:
                 session.has_ended = True
             else:
                 session.work = None
@@ -328,12 +329,12 @@ class Scheduler:
     def close(self) -> None:
         """Start nothing any more."""
         with self.lock:
-            self._is_closed = True
+            self.is_closed = True
             self.is_spinning = False
 
     def reset_after_fork(self, running: int) -> None:
         """Start nothing any more; `running` of the running callbacks are in this process."""
-        self._is_closed = True
+        self.is_closed = True
         self.is_spinning = False
         self.running = running
         self.waiting = 0
