@@ -19,12 +19,18 @@ if TYPE_CHECKING:
 # Folders of a prefix with a file for each package, and for each package with interfaces.
 PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
 INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
+# The file in the prefix of a package that Composer built for a system, which installs nothing.
+BUILD_MANIFEST = 'composer_build.json'
 
 
 def ament_prefixes() -> list[Path]:
-    """Return the prefixes in the order in which they are searched: sourced ones first."""
-    sourced = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-    return list(dict.fromkeys([*(Path(entry) for entry in sourced if entry), Path(sys.prefix)]))
+    """Return the prefixes in the order in which they are searched: sourced ones first.
+
+    Those of packages that Composer built are left out: each system names its own.
+    """
+    entries = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    prefixes = dict.fromkeys(Path(entry) for entry in entries if entry)
+    return [each for each in prefixes if not os.path.exists(each / BUILD_MANIFEST)]  # noqa: PTH110
 
 
 def find_package(package: str, prefixes: Iterable[Path], index: str) -> Path | None:

@@ -14,7 +14,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer, GoalResponse
 from rclpy.parameter import Parameter
 
-from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.build.provision import import_packages, provide_packages
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
 
@@ -23,7 +23,7 @@ FOLDER = Path(__file__).resolve().parent.parent / 'interfaces'
 PACKAGES = ('example_interfaces', 'action_tutorials_interfaces')
 
 folders = {name: FOLDER / name for name in PACKAGES}
-provide_packages(load_packages(folders, InterfaceCatalogue()), print)
+import_packages(provide_packages(load_packages(folders, InterfaceCatalogue()), print))
 
 from action_msgs.msg import GoalInfo  # noqa: E402
 from action_msgs.srv import CancelGoal  # noqa: E402

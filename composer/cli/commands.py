@@ -304,23 +304,56 @@ def new_command(name: str) -> int:
 @cli.group('interfaces', invoke_without_command=True, subcommand_metavar=_SUBCOMMAND)
 @click.pass_context
 def interfaces_group(context: click.Context) -> int:
-    """Build, list and show interface packages."""
+    """Build, find, list and show interface packages."""
     return _help_without_command(context)
 
 
 @interfaces_group.command('build')
-@click.argument('file', type=click.Path(path_type=Path))
-def interfaces_build_command(file: Path) -> int:
-    """Build the packages of FILE that are not installed or built yet."""
+@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+def interfaces_build_command(files: tuple[Path, ...]) -> int:
+    """Build the packages of FILES that are not installed or built yet."""
     from composer.cli.interfaces import build
 
-    return build(file)
+    return build(files)
+
+
+@interfaces_group.command('path')
+@click.argument('files', nargs=-1, type=click.Path(path_type=Path))
+def interfaces_path_command(files: tuple[Path, ...]) -> int:
+    """Print where the packages of FILES are, and build them if need be.
+
+    Without FILES, print where all built packages are.
+    """
+    from composer.cli.interfaces import print_path
+
+    return print_path(files)
+
+
+@interfaces_group.command('env')
+@click.argument('files', nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    '--shell',
+    type=click.Choice(['sh', 'fish']),
+    default='sh',
+    show_default=True,
+    help='The shell that reads the commands; sh stands for bash, zsh and dash, too.',
+)
+def interfaces_env_command(files: tuple[Path, ...], shell: str) -> int:
+    """Print shell commands by which programs find the packages of FILES.
+
+    In bash and zsh: eval "$(composer interfaces env FILE)".
+    In fish: composer interfaces env --shell fish FILE | source.
+    Without FILES, programs find all built packages.
+    """
+    from composer.cli.interfaces import print_environment
+
+    return print_environment(files, shell)
 
 
 @interfaces_group.command('list')
 @click.argument('package', required=False)
 def interfaces_list_command(package: str | None) -> int:
-    """List all installed interfaces, or those of PACKAGE."""
+    """List all interfaces that are installed or built, or those of PACKAGE."""
     from composer.cli.interfaces import list_all
 
     return list_all(package)

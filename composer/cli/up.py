@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from typing import TYPE_CHECKING
 
 import click
@@ -14,7 +15,7 @@ from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.interfaces.declared_packages import provide_declared
+from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
@@ -77,18 +78,23 @@ def _run(
     *,
     ends_process: bool,
 ) -> int:
+    from composer.interfaces.search_paths import extend_processes, extend_variables
     from composer.runtime.behaviours.callables import project_on_path
+    from composer.runtime.environment import environment_set
     from composer.runtime.run import run_system
 
     system = context.system
-    provide_declared(context.interfaces, lambda line: click.echo(line, err=True))
-    with project_on_path(project_search_path(system.files)):
+    prefixes = import_declared(context.interfaces, lambda line: click.echo(line, err=True))
+    with (
+        environment_set(extend_variables(os.environ, prefixes)),
+        project_on_path(project_search_path(system.files)),
+    ):
         functions, findings = import_behaviours(context)
         # The check has already reported comments that silence nothing.
         if _report(leave_out_silenced(findings, system.positions.source)):
             return ExitCode.FAILED
         return run_system(
-            context.spec,
+            extend_processes(context.spec, prefixes),
             system.positions,
             functions,
             ros_arguments=ros_arguments,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from composer.diagnostics import Diagnostic
+    from composer.interfaces.build.provision import ProvidedPackage
     from composer.interfaces.definitions.package_folder import PackageDefinitions
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
@@ -70,11 +71,10 @@ def load_declared(system: LoadedSystem, installed: InterfaceCatalogue) -> Declar
     return DeclaredPackages(catalogue, needed, definitions, unreadable, [*findings, *errors])
 
 
-def provide_declared(declared: DeclaredPackages, progress: Callable[[str], None]) -> Sequence[str]:
-    """Make the packages that a file declares importable, and build those that are not installed.
-
-    Returns:
-        Their names.
+def provide_declared(
+    declared: DeclaredPackages, progress: Callable[[str], None]
+) -> Sequence[ProvidedPackage]:
+    """Find the packages that a file declares, and build those that are not installed.
 
     Raises:
         ComposerError: A package cannot be provided; the help says what to install or change.
@@ -89,7 +89,24 @@ def provide_declared(declared: DeclaredPackages, progress: Callable[[str], None]
     if definitions is None:
         definitions = load_packages(declared.folders, declared.catalogue)
     needed = [each for each in definitions if each.package in declared.folders]
-    return [provided.package for provided in provide_packages(needed, progress)]
+    return provide_packages(needed, progress)
+
+
+def import_declared(declared: DeclaredPackages, progress: Callable[[str], None]) -> list[Path]:
+    """Make the packages that a file declares importable; see `provide_declared`.
+
+    Returns:
+        The prefixes of those that are not installed, each after those that it uses.
+
+    Raises:
+        ComposerError: A package cannot be provided, or another Python module has its name.
+    """
+    provided = provide_declared(declared, progress)
+    if not provided:
+        return []
+    from composer.interfaces.build.provision import import_packages
+
+    return import_packages(provided)
 
 
 def _folders_of(spec: SystemSpec | None) -> dict[str, Path]:

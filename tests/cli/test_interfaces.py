@@ -1,5 +1,7 @@
 """`composer interfaces`: build, list and show interface packages."""
 
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.ament import INTERFACE_INDEX, PACKAGE_INDEX
 from composer.cli import main as cli
 
 pytestmark = pytest.mark.ros
@@ -61,6 +64,7 @@ string message
 def run(capsys, monkeypatch, tmp_path):
     """Return exit code, standard output and standard error of a command in an empty folder."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
 
     def run(*arguments):
         code = cli.run(list(map(str, arguments)))
@@ -112,7 +116,7 @@ def test_show_prints_the_comment_on_a_service(run):
     ],
 )
 def test_show_says_what_an_unknown_name_may_have_been_meant_to_be(run, name, advice):
-    message = f"error: no installed package has an interface '{name}'\n  help: {advice}\n"
+    message = f"error: no package that is installed or built has an interface '{name}'\n  help: {advice}\n"
     assert run('interfaces', 'show', name) == (1, '', message)
 
 
@@ -131,31 +135,115 @@ def test_list_prints_what_one_package_has(run):
 
 def test_list_of_an_unknown_package_suggests_another(run):
     message = (
-        "error: no interface package 'std_mgs' is installed\n  help: did you mean 'std_msgs'?\n"
+        "error: no interface package 'std_mgs' is installed or built\n"
+        "  help: did you mean 'std_msgs'?\n"
     )
     assert run('interfaces', 'list', 'std_mgs') == (1, '', message)
 
 
-def test_build_of_what_was_built_before_says_that_it_is_ready(run, interface_cache):
-    path = ROOT / 'configs' / 'self_contained.yaml'
-    # In a process of its own, for what is built can be imported from then on.
-    result = subprocess.run(
-        [sys.executable, '-m', 'composer', 'interfaces', 'build', path],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (result.returncode, result.stdout, result.stderr) == (
+BUILT = ['action_tutorials_interfaces', 'example_interfaces']
+FIBONACCI = ROOT / 'configs/fibonacci_client.yaml'
+SELF_CONTAINED = ROOT / 'configs/self_contained.yaml'
+
+
+@pytest.fixture
+def home(run, interface_cache, monkeypatch, tmp_path):
+    """Return a cache, at an odd path, with the packages of two shipped systems alone."""
+    monkeypatch.setenv('XDG_CACHE_HOME', str(interface_cache))
+    _, out, _ = run('interfaces', 'path', SELF_CONTAINED, FIBONACCI)
+    home = tmp_path / 'a "b" $HOME `c`; é \\ \\\' d'
+    for prefix in map(Path, out.splitlines()):
+        shutil.copytree(prefix, home / 'composer/interfaces' / prefix.name)
+    monkeypatch.setenv('XDG_CACHE_HOME', str(home))
+    return home
+
+
+def test_build_of_what_was_built_before_says_that_it_is_ready(run, home):
+    assert run('interfaces', 'build', SELF_CONTAINED, FIBONACCI, SELF_CONTAINED) == (
         0,
-        'example_interfaces: ready\n',
+        'example_interfaces: ready\naction_tutorials_interfaces: ready\n',
         '',
     )
 
 
+def test_path_prints_where_the_packages_of_files_are_or_all(run, home):
+    for files in ([SELF_CONTAINED, FIBONACCI], []):
+        code, out, err = run('interfaces', 'path', *files)
+        assert (code, err) == (0, '')
+        prefixes = sorted(map(Path, out.splitlines()))
+        assert [each.name.rpartition('-')[0] for each in prefixes] == BUILT
+        for prefix, package in zip(prefixes, BUILT, strict=True):
+            for file in ('package.xml', 'action/Fibonacci.action', 'action/Fibonacci.idl'):
+                assert (prefix / 'share' / package / file).is_file()
+            for index in (PACKAGE_INDEX, INTERFACE_INDEX):
+                assert (prefix / index / package).is_file()
+
+
+def test_list_and_show_know_what_was_built(run, home):
+    expected = 'example_interfaces/srv/AddTwoInts\nexample_interfaces/action/Fibonacci\n'
+    assert run('interfaces', 'list', 'example_interfaces') == (0, expected, '')
+    name = 'example_interfaces/srv/AddTwoInts'
+    expected = f'# {name}\n# Two summands.\nint64 a\nint64 b\n---\n# Their sum.\nint64 sum\n'
+    assert run('interfaces', 'show', name) == (0, expected, '')
+
+
+FIND = """
+import os
+from ament_index_python.packages import get_package_share_directory
+from action_tutorials_interfaces.action import Fibonacci
+print(get_package_share_directory('action_tutorials_interfaces'))
+print(os.environ['LD_LIBRARY_PATH'].split(':')[0])
+print(os.environ['PYTHONPATH'].split(':')[1])
+"""
+SHELLS = [each for each in ('sh', 'bash', 'zsh', 'fish') if shutil.which(each)]
+
+
+@pytest.mark.parametrize('shell', SHELLS)
+def test_a_shell_can_find_what_was_built(home, shell):
+    option = 'fish' if shell == 'fish' else 'sh'
+    command = f'"$PYTHON" -m composer interfaces env --shell {option} {FIBONACCI}'
+    command = f'{command} | source' if shell == 'fish' else f'eval "$({command})"'
+    variables = {'XDG_CACHE_HOME': str(home), 'PYTHON': sys.executable, 'PYTHONPATH': str(ROOT)}
+    result = subprocess.run(
+        [shutil.which(shell), '-c', f'{command}; "$PYTHON" -c "$FIND"'],
+        env=os.environ | variables | {'FIND': FIND},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    [prefix] = (home / 'composer/interfaces').glob('action_tutorials_interfaces-*')
+    assert (result.stdout.splitlines(), result.stderr) == (
+        [
+            f'{prefix}/share/action_tutorials_interfaces',
+            f'{prefix}/lib',
+            str(ROOT),
+        ],
+        '',
+    )
+
+
+def test_env_of_files_without_packages_is_empty(run):
+    for arguments in ([], [ROOT / 'configs/greeter.yaml']):
+        code, out, _ = run('interfaces', 'env', *arguments)
+        assert (code, out) == (0, '')
+
+
+def test_env_of_files_with_different_packages_of_one_name_is_refused(run):
+    write_system('int32 x\n')
+    Path('other/msg').mkdir(parents=True)
+    Path('other/msg/Thing.msg').write_text('int32 y\n')
+    Path('other.yaml').write_text(SYSTEM.replace('defs}', 'other}'))
+    message = (
+        "error: the files declare different packages 'my_defs'\n"
+        '  help: name only one of these files\n'
+    )
+    for command in ('path', 'env'):
+        assert run('interfaces', command, 'system.yaml', 'other.yaml') == (1, '', message)
+
+
 def test_build_of_a_file_without_packages_says_so(run):
     path = ROOT / 'configs' / 'greeter.yaml'
-    assert run('interfaces', 'build', path) == (0, f'{path} declares no interfaces\n', '')
+    assert run('interfaces', 'build', path) == (0, '', f'{path} declares no interfaces\n')
 
 
 def test_build_of_an_unreadable_file_says_why(run):

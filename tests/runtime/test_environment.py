@@ -67,6 +67,54 @@ print(code, before == dict(os.environ))
     assert result.stdout.splitlines()[-1] == '0 True'
 
 
+ADDER = """
+import rclpy
+from example_interfaces.srv import AddTwoInts
+
+rclpy.init()
+node = rclpy.create_node('peer')
+client = node.create_client(AddTwoInts, 'add')
+client.wait_for_service()
+future = client.call_async(AddTwoInts.Request(a=40, b=2))
+rclpy.spin_until_future_complete(node, future)
+print('sum', future.result().sum, flush=True)
+"""
+FINDER = """
+import os
+import example_interfaces
+
+prefix, place = os.environ['AMENT_PREFIX_PATH'].split(':')[0], os.environ['PYTHONPATH']
+print(place.replace(prefix, 'PREFIX'), os.environ['LD_LIBRARY_PATH'].startswith(f'{prefix}/lib'))
+"""
+WITH_INTERFACES = f"""
+version: 1
+interfaces: {{example_interfaces: {ROOT}/interfaces/example_interfaces}}
+nodes:
+  adder: {{services: {{add: {{type: example_interfaces/srv/AddTwoInts, behaviour: 'parts:add'}}}}}}
+processes:
+  peer: {{command: [python3, peer.py], cwd: .}}
+  finder: {{command: [python3, finder.py], cwd: ., env: {{PYTHONPATH: /own}}}}
+"""
+ADD = """
+from ament_index_python.packages import get_package_prefix
+
+def add(node, request):
+    node.logger.info(f'it is in {get_package_prefix("example_interfaces")}')
+    return request.a + request.b
+"""
+
+
+def test_processes_and_behaviours_find_the_interfaces_of_the_system(compose, interface_cache):
+    (compose.folder / 'peer.py').write_text(ADDER)
+    (compose.folder / 'finder.py').write_text(FINDER)
+    child = compose(WITH_INTERFACES, ADD)
+
+    child.wait_for_line('[peer] sum 42')
+    child.wait_for_line('[finder] PREFIX/python:/own True')
+    child.wait_for_line(f'it is in {interface_cache}/composer/interfaces/example_interfaces-')
+    assert child.stop() == 0
+
+
 def read(*names):
     return [os.environ.get(name) for name in names]
 

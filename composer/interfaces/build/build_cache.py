@@ -5,12 +5,13 @@
         example_interfaces-1f6a….partial/  an unfinished package
         example_interfaces-1f6a….lock      locked by the process that builds it
 
-A package is built in its partial folder, which is renamed at the end: a folder without `.partial`
-is complete. Generators and compilers inherit the lock: no other process builds the package while
-one of them still writes, even if the process that started them was killed. A partial folder whose
-lock is free is removed.
+A package is built in its partial folder, which is renamed at the end. A folder that does not fit
+its manifest is damaged, and built again. Generators and compilers inherit the lock: no other
+process builds the package while one of them still writes, even if the process that started them
+was killed. A partial folder whose lock is free is removed.
 """
 
+import errno
 import fcntl
 import hashlib
 import os
@@ -22,11 +23,13 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
 
+from composer.ament import BUILD_MANIFEST
 from composer.errors import ComposerError
+from composer.interfaces.build.manifest import is_intact, read_manifest, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 
 # Raise it whenever the builder builds something else from the same definitions.
-BUILDER_FORMAT = 1
+BUILDER_FORMAT = 2
 
 # Packages of ROS whose releases may change what is built, or what it needs.
 _VERSIONED_PACKAGES = (
@@ -38,6 +41,10 @@ _VERSIONED_PACKAGES = (
     'rosidl_typesupport_fastrtps_c',
     'rosidl_typesupport_introspection_c',
 )
+
+
+# What the system says if a disk, or the user's part of it, is full.
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class CacheError(ComposerError):
@@ -80,14 +87,27 @@ def compute_key(
         16 hexadecimal digits.
     """
     prefixes = tuple(prefixes)
-    digest = hashlib.sha256()
-    parts = [str(BUILDER_FORMAT), definitions.package, EXTENSION_SUFFIXES[0], _numpy_version()]
+    parts = [compute_environment_key(prefixes), definitions.package]
     parts += [f'{name} {key}' for name, key in sorted(used.items())]
     parts += [text for source in sorted(definitions.sources.items()) for text in source]
-    parts += map(str, prefixes)
     used_names = {reference.message.partition('/')[0] for reference in definitions.references}
-    names = (*_VERSIONED_PACKAGES, *sorted(used_names - {definitions.package}))
-    parts += [_package_version(name, prefixes) for name in names]
+    parts += [_package_version(name, prefixes) for name in sorted(used_names)]
+    return _hash(parts)
+
+
+def compute_environment_key(prefixes: Iterable[Path]) -> str:
+    """Compute the key of the ROS, the Python and the Composer that packages are built for.
+
+    Args:
+        prefixes: where ROS is installed.
+    """
+    prefixes = tuple(prefixes)
+    parts = [str(BUILDER_FORMAT), EXTENSION_SUFFIXES[0], _numpy_version(), *map(str, prefixes)]
+    return _hash([*parts, *(_package_version(name, prefixes) for name in _VERSIONED_PACKAGES)])
+
+
+def _hash(parts: Iterable[str]) -> str:
+    digest = hashlib.sha256()
     for part in parts:
         data = part.encode()
         digest.update(b'%d:%b' % (len(data), data))
@@ -96,55 +116,100 @@ def compute_key(
 
 def provide_cached(
     name: str,
+    environment: str,
     build: Callable[[BuildFolder], None],
-    waiting: Callable[[], None],
+    progress: Callable[[str], None],
 ) -> Path:
-    """Return the folder of a package in the cache; build the package if it is not there.
+    """Return the folder of a package in the cache; build it if it is not there or is damaged.
 
     Args:
         name: the name of the folder.
+        environment: the key of the ROS and Python that it is built for.
         build: fills the folder.
-        waiting: called before waiting for another process that builds the same package.
+        progress: told before waiting for another process that builds the same package, and if
+            the folder is damaged.
 
     Raises:
         CacheError: the cache cannot be written.
+        UntrustedFolderError: another user can change the folder.
     """
-    cache = find_cache()
-    place = cache / name
-    if place.is_dir():
-        return place
+    place = find_cache() / name
     try:
-        cache.mkdir(parents=True, exist_ok=True)
-        with _lock(place, waiting) as descriptor:
-            if not place.is_dir():
-                _fill(place, BuildFolder(_partial(place), descriptor), build)
+        if not is_intact(place):
+            _provide(place, environment, build, progress)
+        with suppress(OSError):
+            # The time of the last use, for `list_built`.
+            (place / BUILD_MANIFEST).touch()
     except OSError as error:
-        message = f'the cache of built interface packages cannot be written: {error}'
+        if error.errno in FULL:
+            message = f"there is no space left for built interface packages in '{place.parent}'"
+        else:
+            message = f'the cache of built interface packages cannot be written: {error}'
         advice = 'make room there, or name another folder in XDG_CACHE_HOME'
         raise CacheError(message, help=advice) from error
     return place
 
 
-def _fill(place: Path, folder: BuildFolder, build: Callable[[BuildFolder], None]) -> None:
-    _remove_leftovers(place.parent, place)
-    shutil.rmtree(folder.path, ignore_errors=True)
-    folder.path.mkdir()
-    try:
-        build(folder)
-        folder.path.rename(place)
-    finally:
-        shutil.rmtree(folder.path, ignore_errors=True)
+def list_built(prefixes: Iterable[Path]) -> dict[str, Path]:
+    """Return the folder of each package in the cache; of several builds, the last one used.
+
+    Args:
+        prefixes: where ROS is installed; what was built for another ROS is left out.
+
+    Raises:
+        UntrustedFolderError: another user can change a folder.
+    """
+    environment = compute_environment_key(prefixes)
+    found: list[tuple[int, Path]] = []
+    for manifest in find_cache().glob(f'*/{BUILD_MANIFEST}'):
+        with suppress(OSError, ValueError):
+            fits = read_manifest(manifest.parent).get('environment') == environment
+            if fits and is_intact(manifest.parent):
+                found.append((manifest.stat().st_mtime_ns, manifest.parent))
+    return {place.name.rpartition('-')[0]: place for _, place in sorted(found)}
+
+
+def _provide(
+    place: Path,
+    environment: str,
+    build: Callable[[BuildFolder], None],
+    progress: Callable[[str], None],
+) -> None:
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with _lock(place, progress) as descriptor:
+        if is_intact(place):
+            return
+        _remove_leftovers(place.parent, place)
+        partial = _partial(place)
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir(mode=0o755)
+        try:
+            if os.path.lexists(place):
+                progress('the build in the cache is damaged')
+            build(BuildFolder(partial, descriptor))
+            write_manifest(partial, place, environment)
+            _remove(place)
+            partial.rename(place)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
-def _lock(place: Path, waiting: Callable[[], None]) -> Iterator[int]:
+def _lock(place: Path, progress: Callable[[str], None]) -> Iterator[int]:
     """Hold the lock of a package; it is free when no process has its file open."""
     descriptor = os.open(_lock_file(place), os.O_RDWR | os.O_CREAT, 0o644)
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            waiting()
+            progress('waiting for another start that builds it')
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield descriptor
     finally:

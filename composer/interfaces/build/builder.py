@@ -5,15 +5,18 @@ The result is like an installed package: its libraries have sonames and find eac
 restart.
 """
 
+import errno
 import json
 import os
+import py_compile
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from composer.ament import INTERFACE_INDEX, find_package
+from composer.ament import INTERFACE_INDEX, PACKAGE_INDEX, find_package
 from composer.errors import ComposerError
+from composer.interfaces.build.build_cache import FULL
 from composer.interfaces.build.compilation import BuildPlan, plan_jobs, write_generation_arguments
 from composer.interfaces.build.jobs import JobError, run_jobs
 from composer.interfaces.build.toolchain import find_toolchain
@@ -21,6 +24,20 @@ from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.packages import used_packages
 
 _SHOWN_LINES = 20
+# With less space left on a disk, a program that failed may have failed for that: not all say so.
+_LEAST_BYTES = 1 << 20
+
+_PACKAGE_XML = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{package}</name>
+  <version>0.0.0</version>
+  <description>Built by Composer.</description>
+  <maintainer email="nobody@localhost">nobody</maintainer>
+  <license>unknown</license>
+{depends}  <member_of_group>rosidl_interface_packages</member_of_group>
+</package>
+"""
 
 
 class BuildError(ComposerError):
@@ -94,6 +111,7 @@ def build_package(
         BuildToolsMissingError: the system lacks something.
         DependencyMissingError: a used package is not installed.
         BuildError: a program failed.
+        OSError: a file cannot be written; with `ENOSPC` also if a program failed for that.
     """
     toolchain = find_toolchain(dependencies.prefixes)
     names = sorted(_all_used(definitions, dependencies))
@@ -113,12 +131,22 @@ def build_package(
         run_jobs(
             plan_jobs(plan),
             workers=plan.workers,
-            environment={**os.environ, 'LC_ALL': 'C.UTF-8', 'PYTHONHASHSEED': '0'},
+            environment={
+                **os.environ,
+                'LC_ALL': 'C.UTF-8',
+                'PYTHONHASHSEED': '0',
+                # What killed compilers leave is removed with the folder.
+                'TMPDIR': str(plan.build),
+            },
             descriptors=descriptors,
         )
     except JobError as error:
+        if _is_full(prefix, error.output):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
         raise BuildError(definitions.package, error) from error
     _write_index(plan)
+    _write_package_xml(plan, used_packages(definitions))
+    _compile_modules(plan)
     shutil.rmtree(plan.build)
 
 
@@ -151,9 +179,19 @@ def _write_definitions(definitions: PackageDefinitions, plan: BuildPlan) -> None
             path.write_text(content, encoding='utf-8')
 
 
+def _is_full(prefix: Path, output: str) -> bool:
+    """Return whether a program failed because a disk is full."""
+    disk = os.statvfs(prefix)
+    has_no_files = disk.f_files and not disk.f_favail
+    is_named = any(os.strerror(number) in output for number in FULL)
+    return bool(is_named or has_no_files or disk.f_bavail * disk.f_frsize < _LEAST_BYTES)
+
+
 def _write_index(plan: BuildPlan) -> None:
     """Enter the package into its prefix's resource index, by which it is found."""
-    index = plan.prefix / INTERFACE_INDEX
+    packages, index = plan.prefix / PACKAGE_INDEX, plan.prefix / INTERFACE_INDEX
+    packages.mkdir(parents=True)
+    (packages / plan.package).touch()
     index.mkdir(parents=True)
     entries = [
         f'{name}.{suffix}'
@@ -161,3 +199,18 @@ def _write_index(plan: BuildPlan) -> None:
         for suffix in ('idl', name.partition('/')[0])
     ]
     (index / plan.package).write_text('\n'.join(entries), encoding='utf-8')
+
+
+def _write_package_xml(plan: BuildPlan, used: Iterable[str]) -> None:
+    """Write the manifest of a ROS package."""
+    depends = ''.join(f'  <depend>{name}</depend>\n' for name in sorted(used))
+    text = _PACKAGE_XML.format(package=plan.package, depends=depends)
+    path = plan.prefix / 'share' / plan.package / 'package.xml'
+    path.write_text(text, encoding='utf-8')
+
+
+def _compile_modules(plan: BuildPlan) -> None:
+    """Compile the Python modules, since nothing is written into the package later."""
+    mode = py_compile.PycInvalidationMode.UNCHECKED_HASH
+    for path in sorted(plan.modules.rglob('*.py')):
+        py_compile.compile(str(path), doraise=True, invalidation_mode=mode)

@@ -1,4 +1,4 @@
-"""Make interface packages importable: installed ones, cached ones, and those built now."""
+"""Provide interface packages: installed ones, cached ones, and those built now."""
 
 import importlib
 import sys
@@ -9,9 +9,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
+from composer.ament import BUILD_MANIFEST, INTERFACE_INDEX, ament_prefixes, find_package
 from composer.errors import ComposerError
-from composer.interfaces.build.build_cache import BuildFolder, compute_key, provide_cached
+from composer.interfaces.build.build_cache import (
+    BuildFolder,
+    compute_environment_key,
+    compute_key,
+    provide_cached,
+)
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.packages import (
     used_packages,
@@ -26,7 +31,7 @@ class ModuleTakenError(ComposerError):
 
 @dataclass(frozen=True, slots=True)
 class ProvidedPackage:
-    """An interface package that can be imported.
+    """An interface package that is built.
 
     Attributes:
         package: its name.
@@ -38,12 +43,17 @@ class ProvidedPackage:
     prefix: Path
     origin: Origin
 
+    @property
+    def is_installed(self) -> bool:
+        """Whether it is installed; all others have a prefix of their own in the cache."""
+        return self.origin == 'installed'
+
 
 def provide_packages(
     packages: Iterable[PackageDefinitions],
     progress: Callable[[str], None],
 ) -> list[ProvidedPackage]:
-    """Make interface packages importable, and build those that are neither installed nor cached.
+    """Find interface packages, and build those that are neither installed nor cached.
 
     Args:
         packages: definitions without errors, each package after those that it uses.
@@ -54,7 +64,7 @@ def provide_packages(
         BuildToolsMissingError: the system has not all that a build needs.
         BuildError: a generator or compiler failed.
         CacheError: the cache cannot be written.
-        ModuleTakenError: another Python module has a package's name.
+        UntrustedFolderError: another user can change a package in the cache.
     """
     provider = _Provider(ament_prefixes(), progress)
     return [provider.provide(definitions) for definitions in packages]
@@ -93,10 +103,10 @@ class _Provider:
 
         place = provide_cached(
             f'{package}-{key}',
+            compute_environment_key(self._prefixes),
             build,
-            lambda: self._progress(f'{package}: waiting for another start that builds it'),
+            lambda line: self._progress(f'{package}: {line}'),
         )
-        make_importable(package, place)
         self._places[package], self._keys[package] = place, key
         return ProvidedPackage(package, place, origin)
 
@@ -117,13 +127,31 @@ class _Provider:
         self._progress(f'{definitions.package}: built in {duration_sec:.1f} s')
 
 
+def import_packages(provided: Iterable[ProvidedPackage]) -> list[Path]:
+    """Let Python import packages.
+
+    Returns:
+        The prefixes of those that are not installed.
+
+    Raises:
+        ModuleTakenError: another Python module has a package's name.
+    """
+    built = [each for each in provided if not each.is_installed]
+    for each in built:
+        make_importable(each.package, each.prefix)
+    return [each.prefix for each in built]
+
+
 def make_importable(package: str, prefix: Path) -> None:
     """Let Python import a package from a prefix.
+
+    Another build of it, to which `PYTHONPATH` leads in a shell that was set up for it, is left.
 
     Raises:
         ModuleTakenError: Python finds another module of that name first.
     """
     folder = prefix / 'python'
+    sys.path[:] = [each for each in sys.path if not _is_other_build(Path(each), folder, package)]
     if str(folder) not in sys.path:
         sys.path.append(str(folder))
         importlib.invalidate_caches()
@@ -138,6 +166,11 @@ def make_importable(package: str, prefix: Path) -> None:
             help='rename one of them; if the definitions changed since the package was imported, '
             'start again',
         )
+
+
+def _is_other_build(entry: Path, folder: Path, package: str) -> bool:
+    is_build = entry != folder and (entry.parent / BUILD_MANIFEST).exists()
+    return is_build and (entry / package).is_dir()
 
 
 def _find_origin(package: str) -> Path | None:

@@ -1,20 +1,25 @@
+import errno
 import fcntl
 import os
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from building import WriteDefinitions
 
-from composer.ament import ament_prefixes
+from composer.ament import BUILD_MANIFEST, ament_prefixes
 from composer.interfaces.build import build_cache
 from composer.interfaces.build.build_cache import (
     BuildFolder,
     CacheError,
+    compute_environment_key,
     compute_key,
+    list_built,
     provide_cached,
 )
+from composer.interfaces.build.manifest import UntrustedFolderError, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 
 
@@ -32,8 +37,16 @@ def refuse(_: BuildFolder) -> None:
     pytest.fail('built again')
 
 
-def no_wait() -> None:
-    pytest.fail('waited')
+def no_news(line: str) -> None:
+    pytest.fail(line)
+
+
+def provide(
+    name: str,
+    build: Callable[[BuildFolder], None],
+    progress: Callable[[str], None] = no_news,
+) -> Path:
+    return provide_cached(name, 'key', build, progress)
 
 
 def test_a_relative_cache_home_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,9 +55,9 @@ def test_a_relative_cache_home_does_not_count(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_package_is_built_once(home: Path) -> None:
-    place = provide_cached('one', build, no_wait)
+    place = provide('one', build)
     assert place == home / 'one'
-    assert provide_cached('one', refuse, no_wait) == place
+    assert provide('one', refuse) == place
     assert (place / 'file').read_text() == 'built'
     assert sorted(path.name for path in home.iterdir()) == ['one', 'one.lock']
 
@@ -55,9 +68,9 @@ def test_a_failed_build_leaves_nothing(home: Path) -> None:
         raise KeyError
 
     with pytest.raises(KeyError):
-        provide_cached('one', fail, no_wait)
+        provide('one', fail)
     assert [path.name for path in home.iterdir()] == ['one.lock']
-    provide_cached('one', build, no_wait)
+    provide('one', build)
 
 
 def test_what_a_killed_build_left_is_removed(home: Path) -> None:
@@ -66,8 +79,8 @@ def test_what_a_killed_build_left_is_removed(home: Path) -> None:
         (home / f'{name}.partial' / 'half').touch()
     with (home / 'living.lock').open('w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        place = provide_cached('one', build, no_wait)
-    assert [path.name for path in place.iterdir()] == ['file']
+        place = provide('one', build)
+    assert sorted(path.name for path in place.iterdir()) == [BUILD_MANIFEST, 'file']
     assert [path.name for path in home.glob('*.partial')] == ['living.partial']
 
 
@@ -76,11 +89,14 @@ def test_who_waits_for_a_build_uses_it(home: Path) -> None:
     lock = os.open(home / 'one.lock', os.O_RDWR | os.O_CREAT)
     fcntl.flock(lock, fcntl.LOCK_EX)
 
-    def finish_the_other_build() -> None:
-        (home / 'one').mkdir()
+    def finish_the_other_build(line: str) -> None:
+        assert line == 'waiting for another start that builds it'
+        place = home / 'one'
+        place.mkdir()
+        write_manifest(place, place, 'key')
         os.close(lock)
 
-    assert provide_cached('one', refuse, finish_the_other_build) == home / 'one'
+    assert provide('one', refuse, finish_the_other_build) == home / 'one'
 
 
 def test_a_lock_is_held_as_long_as_a_program_of_the_build_has_it(home: Path) -> None:
@@ -92,24 +108,80 @@ def test_a_lock_is_held_as_long_as_a_program_of_the_build_has_it(home: Path) -> 
         raise KeyError
 
     with pytest.raises(KeyError):
-        provide_cached('one', keep, no_wait)
-    waited = []
+        provide('one', keep)
+    lines = []
 
-    def end_the_program() -> None:
-        waited.append(True)
+    def end_the_program(line: str) -> None:
+        lines.append(line)
         os.close(kept)
 
-    assert provide_cached('one', build, end_the_program) == home / 'one'
-    assert waited == [True]
+    assert provide('one', build, end_the_program) == home / 'one'
+    assert lines == ['waiting for another start that builds it']
 
 
 def test_a_cache_that_cannot_be_written_is_an_error(home: Path) -> None:
     home.parent.parent.mkdir(parents=True)
     home.parent.write_text('in the way')
     with pytest.raises(CacheError) as caught:
-        provide_cached('one', build, no_wait)
+        provide('one', build)
     assert str(caught.value).startswith('the cache of built interface packages cannot be written')
     assert caught.value.help == 'make room there, or name another folder in XDG_CACHE_HOME'
+
+
+@pytest.mark.parametrize('number', [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_is_called_that(home: Path, number: int) -> None:
+    def fail(_: BuildFolder) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with pytest.raises(CacheError) as caught:
+        provide('one', fail)
+    assert str(caught.value) == f"there is no space left for built interface packages in '{home}'"
+    assert caught.value.help == 'make room there, or name another folder in XDG_CACHE_HOME'
+
+
+@pytest.mark.parametrize('damage', ['empty folder', 'cut off', 'a file', 'a link to nowhere'])
+def test_a_damaged_build_is_built_again(home: Path, damage: str) -> None:
+    place = provide('one', build)
+    if damage == 'cut off':
+        os.truncate(place / 'file', 3)
+    else:
+        shutil.rmtree(place)
+    if damage == 'empty folder':
+        place.mkdir()
+    elif damage == 'a file':
+        place.touch()
+    elif damage == 'a link to nowhere':
+        place.symlink_to('nowhere')
+    lines: list[str] = []
+    assert provide('one', build, lines.append) == place
+    assert lines == ['the build in the cache is damaged']
+    assert provide('one', refuse) == place
+    assert (place / 'file').read_text() == 'built'
+    assert sorted(path.name for path in home.iterdir()) == ['one', 'one.lock']
+
+
+def test_a_build_that_others_can_change_is_refused(home: Path) -> None:
+    (provide('one', build) / 'file').chmod(0o666)
+    with pytest.raises(UntrustedFolderError):
+        provide('one', refuse)
+
+
+def test_of_several_builds_the_last_used_is_listed(home: Path) -> None:
+    environment = compute_environment_key([])
+
+    def use(name: str, environment: str = environment) -> Path:
+        return provide_cached(name, environment, build, no_news)
+
+    place = use('robots-1')
+    assert list_built([]) == {'robots': place}
+    assert list_built([Path('/other/ros')]) == {}
+    later = use('robots-2')
+    use('robots-3', 'another ROS')
+    os.truncate(use('others-1') / 'file', 0)
+    os.utime(later / BUILD_MANIFEST, (1, 1))
+    assert list_built([]) == {'robots': place}
+    use('robots-2')
+    assert list_built([]) == {'robots': later}
 
 
 @pytest.fixture
@@ -176,3 +248,4 @@ def test_python_numpy_builder_and_used_builds_make_another_key(
             patch.setattr(build_cache, name, value)
             keys.add(compute_key(definitions, prefixes, {}))
     assert len(keys) == 5
+    assert compute_environment_key(prefixes) != compute_environment_key([])

@@ -69,12 +69,13 @@ USED = {'msg/Wheel.msg': 'float64 radius 0.5\nstd_msgs/Header header\n'}
 PROVIDE = """
 import sys
 from pathlib import Path
-from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.build.provision import import_packages, provide_packages
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
 names = sys.argv[1].split(',')
 folders = dict(zip(names, map(Path, sys.argv[2:])))
 provided = provide_packages(load_packages(folders, InterfaceCatalogue()), print)
+import_packages(provided)
 """
 PROVIDE_AND_LOCATE = PROVIDE + 'print(provided[-1].prefix)'
 

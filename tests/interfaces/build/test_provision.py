@@ -22,12 +22,14 @@ pytestmark = pytest.mark.ros
 PROVIDE = """
 import sys
 from pathlib import Path
-from composer.interfaces.build.provision import provide_packages
+from composer.interfaces.build.provision import import_packages, provide_packages
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
 folders = {name: Path(folder) for name, folder in zip(sys.argv[1::2], sys.argv[2::2])}
 definitions = load_packages(folders, InterfaceCatalogue())
-for each in provide_packages(definitions, lambda line: print(line, flush=True)):
+provided = provide_packages(definitions, lambda line: print(line, flush=True))
+import_packages(provided)
+for each in provided:
     print(each.package, each.origin)
 """
 StartProvider = Callable[[Path, Path], subprocess.Popen[str]]
