@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable
-from contextlib import nullcontext
 from typing import Any
 
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -10,7 +9,6 @@ from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
 from composer.executor import ComposerExecutor
-from composer.runtime.behaviours.switch_interval import short_switch_interval
 
 _FINITE_WAIT_SEC = 0.05
 
@@ -27,12 +25,7 @@ def start_spinning(name: str, nodes: list[Any]) -> Any:
     executor = MAKERS[name]()
     for node in nodes:
         executor.add_node(node)
-
-    def target() -> None:
-        """Spin as a system does, if the executor is Composer's."""
-        with short_switch_interval if name == 'composer' else nullcontext():
-            executor.spin()
-
+    target = executor.spin
     if name == 'events':
 
         def target() -> None:

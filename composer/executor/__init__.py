@@ -28,7 +28,8 @@ The way of a message:
 Beside that way: `deadlines` makes timers ready, `wait_set_thread` all that rcl has no event
 callbacks for, and `entity_registry` keeps the sources in step with the entities of the nodes.
 `spinner` puts these parts together for `composer_executor`, whose methods are rclpy's, and
-`after_fork` says what a forked child does with all this.
+`after_fork` says what a forked child does with all this. A guest of theirs is `switch_interval`:
+how long a computing callback may hold up the others.
 
 Locks are held for moments, and nothing is called under them but the next in this order:
 `entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_fds`.

@@ -17,6 +17,7 @@ from composer.executor.event_loop import ImmediateCallback
 from composer.executor.scheduler import ScheduledTask
 from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import Spinner
+from composer.executor.switch_interval import short_switch_interval
 
 _MAX_THREADS = 256
 
@@ -31,6 +32,8 @@ class ComposerExecutor(MultiThreadedExecutor):
     - `spin_once` waits up to 50 ms for the end of the callback that it began.
     - `shutdown` waits for running callbacks, as rclpy documents; but not for those that call it.
     - Several threads may spin at the same time, and callbacks may, whatever `num_threads` is.
+    - While `spin` and `spin_until_future_complete` run, `sys.getswitchinterval()` of the process
+      is at most 1 ms: see `switch_interval`.
 
     Args:
         num_threads: How many callbacks may run at the same time; None for as many as block.
@@ -119,7 +122,8 @@ class ComposerExecutor(MultiThreadedExecutor):
 
         An exception of a callback is raised here; spinning can be resumed after it.
         """
-        self._spinner.spin(lambda: False, None)
+        with short_switch_interval:
+            self._spinner.spin(lambda: False, None)
 
     def spin_until_future_complete(
         self,
@@ -130,7 +134,7 @@ class ComposerExecutor(MultiThreadedExecutor):
         if timeout_sec == 0:
             self.spin_once_until_future_complete(future, 0)
             return
-        with self._watching(future) as is_watched:
+        with short_switch_interval, self._watching(future) as is_watched:
             self._spinner.spin(_is_over(future), timeout_sec, is_watched=is_watched)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:

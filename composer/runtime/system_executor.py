@@ -12,7 +12,6 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
-from composer.runtime.behaviours.switch_interval import short_switch_interval
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -86,8 +85,7 @@ class SystemExecutor(ComposerExecutor):
     def _spin_on(self) -> None:
         while not self._is_shutdown and self.context.ok():
             try:
-                with short_switch_interval:
-                    self.spin()
+                self.spin()
             except (ShutdownException, ExternalShutdownException):
                 return
             except BaseException as error:  # noqa: BLE001 - one error must not end all nodes

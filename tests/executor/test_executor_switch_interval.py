@@ -6,8 +6,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.runtime.behaviours.switch_interval import INTERVAL_SEC, ShortSwitchInterval
-from composer.runtime.system_executor import SystemExecutor
+from composer.executor.switch_interval import INTERVAL_SEC, ShortSwitchInterval
 
 DEADLINE_SEC = 40.0
 
@@ -47,14 +46,8 @@ def test_an_interval_that_was_set_meanwhile_is_not_changed():
 
 
 @pytest.mark.ros
-def test_callbacks_of_a_system_run_with_the_short_interval_and_its_end_restores_it(
-    context, wait_for
-):
-    executor = SystemExecutor(context, None, pytest.fail)
-    seen = []
-    executor.create_task(lambda: seen.append(sys.getswitchinterval()))
-    executor.start()
-    wait_for(lambda: seen, 'the end of the task')
-    assert seen == [INTERVAL_SEC]
-    executor.stop(DEADLINE_SEC)
-    wait_for(lambda: sys.getswitchinterval() == 0.005, 'the end of the thread that spins')
+def test_callbacks_run_with_the_short_interval_and_the_end_of_spin_restores_it(executor):
+    task = executor.create_task(sys.getswitchinterval)
+    executor.spin_until_future_complete(task, DEADLINE_SEC)
+    assert task.result() == INTERVAL_SEC
+    assert sys.getswitchinterval() == 0.005
