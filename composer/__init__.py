@@ -7,21 +7,27 @@ Attributes:
     up: Runs the system that a file declares; returns the exit code.
 """
 
-from composer.api import check, load, up
-from composer.errors import (
-    ActionNotAvailableError,
-    CallError,
-    CallTimeoutError,
-    ComposerError,
-    GoalError,
-    GoalRejectedError,
-    GoalTimeoutError,
-    ParametersRefusedError,
-    ServiceFailedError,
-    ServiceNotAvailableError,
-    SystemStoppingError,
-)
-from composer.runtime.nodes.behaviour_node import Node
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from composer.api import check, load, up
+    from composer.errors import (
+        ActionNotAvailableError,
+        CallError,
+        CallTimeoutError,
+        ComposerError,
+        GoalError,
+        GoalRejectedError,
+        GoalTimeoutError,
+        ParametersRefusedError,
+        ServiceFailedError,
+        ServiceNotAvailableError,
+        SystemStoppingError,
+    )
+    from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
     'ActionNotAvailableError',
@@ -40,3 +46,18 @@ __all__ = [
     'load',
     'up',
 ]
+
+_MODULES = {
+    'Node': 'composer.runtime.nodes.behaviour_node',
+    **dict.fromkeys(('check', 'load', 'up'), 'composer.api'),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: `composer.signals` must be there at once."""
+    if name not in __all__:
+        message = f'module {__name__!r} has no attribute {name!r}'
+        raise AttributeError(message)
+    value = getattr(import_module(_MODULES.get(name, 'composer.errors')), name)
+    globals()[name] = value
+    return value

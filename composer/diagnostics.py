@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
 from composer.rules import Severity, load_rule
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from typing import Unpack
 
 
-# Nobody reads more of one file, and to find a hundred thousand would take minutes.
-MAX_FINDINGS = 1000
 _LONGEST = 2000
 
 
@@ -159,9 +158,12 @@ def diagnostic_at(span: Span, rule: str, message: str, **remarks: Unpack[Remarks
 def _printable(text: str) -> str:
     if len(text) > _LONGEST:
         text = f'{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}'
-    if text.isprintable():
-        return text
-    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+    return escape(text)
+
+
+def errors_first(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return findings with the errors before the warnings: only the first may be shown."""
+    return sorted(diagnostics, key=lambda each: each.severity is not Severity.ERROR)
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:

@@ -12,7 +12,19 @@ import composer
 PACKAGE = Path(composer.__file__).parent
 # From low to high: a room imports from itself and from rooms above it in this list.
 ROOMS = (
-    *('errors', 'version', 'spelling', 'names', 'ament', 'entity_kinds', 'rules', 'diagnostics'),
+    *(
+        'errors',
+        'signals',
+        'version',
+        'spelling',
+        'terminal',
+        'input_limits',
+        'names',
+        'ament',
+        'entity_kinds',
+        'rules',
+        'diagnostics',
+    ),
     *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
     *('python_source', 'checks', 'reports', 'drawing', 'executor', 'processes', 'runtime'),
     *('cli', 'api', '__init__', '__main__'),
@@ -20,6 +32,7 @@ ROOMS = (
 # Of these names there are several, which are the same thing in several rooms.
 SHARED_NAMES = {
     '__init__.py',
+    'environment.py',  # variables, and their checks
     'names.py',  # the rules for names, and their checks
     'parameters.py',  # their checks, and their life in a node
     'qos.py',  # profiles and policies, and their checks

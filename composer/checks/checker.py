@@ -18,19 +18,17 @@ from composer.checks.connections.typos import check_typos
 from composer.checks.connections.unconnected import check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
+from composer.checks.environment import check_environment
 from composer.checks.ignore_comments import apply_ignore_comments
 from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
-from composer.checks.processes import (
-    check_environment,
-    check_executables,
-    check_processes,
-)
+from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import check_publish, check_qos, check_types
-from composer.diagnostics import MAX_FINDINGS
+from composer.diagnostics import errors_first
+from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
 from composer.language.pipeline import load_system
@@ -131,8 +129,8 @@ def check_in_context(
 def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
     if len(findings) <= MAX_FINDINGS:
         return findings
-    last = replace(findings[MAX_FINDINGS - 1], help=_MORE)
-    return [*findings[: MAX_FINDINGS - 1], last]
+    shown = sorted(errors_first(findings)[:MAX_FINDINGS], key=lambda finding: finding.sort_key)
+    return [*shown[:-1], replace(shown[-1], help=_MORE)]
 
 
 def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:

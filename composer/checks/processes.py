@@ -1,10 +1,10 @@
-"""Processes, and the environment."""
+"""External processes."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.ament import ament_prefixes, list_executables, list_packages
+from composer.ament import list_executables, list_packages
 from composer.checks.names import check_rules
 from composer.names import find_namespace_problem, find_node_name_problem
 from composer.spelling import suggest
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ProcessSpec
-
-_RMW_INDEX = 'share/ament_index/resource_index/rmw_typesupport'
-# What of that index are no middlewares themselves.
-_NO_RMW = ('rmw_implementation',)
-# The highest domain whose ports exist (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html).
-_MAX_DOMAIN = 232
 
 
 def check_processes(context: CheckContext) -> Iterator[Diagnostic]:
@@ -71,31 +65,3 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
             f"'{process.package}' has no executable '{process.executable}'",
             help=suggest(process.executable, names, 'it has', 'it has none'),
         )
-
-
-def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check the values of the variables that ROS reads."""
-    environment = context.spec.environment
-    domain = environment.get('ROS_DOMAIN_ID')
-    if domain is not None and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
-        yield context.at_value(
-            ('environment', 'ROS_DOMAIN_ID'),
-            'bad-environment',
-            f'ROS_DOMAIN_ID is a number from 0 to {_MAX_DOMAIN}, not {domain!r}',
-        )
-    middleware = environment.get('RMW_IMPLEMENTATION')
-    installed = installed_middlewares()
-    if middleware is not None and installed and middleware not in installed:
-        yield context.at_value(
-            ('environment', 'RMW_IMPLEMENTATION'),
-            'bad-environment',
-            f"no middleware '{middleware}' is installed",
-            help=suggest(middleware, installed, 'there are'),
-        )
-
-
-def installed_middlewares() -> list[str]:
-    """Return the RMW implementations that ROS can load; none without ROS."""
-    folders = [prefix / _RMW_INDEX for prefix in ament_prefixes()]
-    names = {entry.name for folder in folders if folder.is_dir() for entry in folder.iterdir()}
-    return sorted(names.difference(_NO_RMW))

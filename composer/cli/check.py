@@ -13,12 +13,12 @@ from composer.checks.checker import check_system
 from composer.cli.file_selection import select_files
 from composer.cli.output import wants_colour, write_file
 from composer.errors import ExitCode, UsageError
+from composer.input_limits import MAX_FILE_BYTES
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system, load_system_text
 from composer.reports import render_report
 from composer.reports.report import CheckedFile, Report
 from composer.reports.text import render_files, summarize
-from composer.yaml_text.reader import MAX_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -105,7 +105,7 @@ def _import_check() -> ImportCheck:
 def _load(path: Path, options: CheckOptions) -> LoadedSystem:
     if str(path) != _STANDARD_INPUT:
         return load_system(path)
-    return load_system_text(sys.stdin.buffer.read(MAX_BYTES + 1), Path(options.stdin_name))
+    return load_system_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), Path(options.stdin_name))
 
 
 def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic
 from composer.entity_kinds import WORK_KEYS
+from composer.input_limits import UnreadableFileError, read_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -77,9 +78,8 @@ def looks_like_system(path: Path) -> bool:
     parameter files.
     """
     try:
-        with path.open('rb') as file:
-            text = file.read(_MAX_BYTES_READ).decode('utf-8-sig', errors='replace')
-    except OSError:
+        text = read_file(path)[:_MAX_BYTES_READ].decode('utf-8-sig', errors='replace')
+    except UnreadableFileError:
         return True  # reading it for the check will report the error
     if re.search(rf'^#.*\$schema=\S*{re.escape(_SCHEMA)}', text, re.MULTILINE):
         return True
@@ -127,8 +127,8 @@ def _walk(folder: Path) -> Iterator[Path]:
             name for name in folders if not name.startswith('.') and name not in _SKIPPED_FOLDERS
         )
         paths = (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
-        # Reading a pipe would block.
-        yield from (path for path in paths if not path.is_fifo())
+        # A pipe or a device is nobody's system.
+        yield from (path for path in paths if path.is_file() or not path.exists())
 
 
 def _explain_nothing(word: str) -> Diagnostic:

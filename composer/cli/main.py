@@ -4,26 +4,32 @@ from __future__ import annotations
 
 import faulthandler
 import io
+import os
 import platform
 import sys
 import traceback
 from contextlib import suppress
+from typing import TypeGuard
 
 import click
 
+from composer import signals
 from composer.cli.commands import cli
 from composer.errors import ComposerError, ExitCode, UsageError
+from composer.terminal import escape_lines
 
 _LONGEST_EXIT_SEC = 10.0
 
 
 def main() -> None:
     """Run the command line of this process, and exit with its code."""
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         # File names and YAML may have characters that the terminal's encoding lacks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
-    code = run(sys.argv[1:])
+    code = _flush(run(sys.argv[1:]))
+    signals.end_with(code)
     # Threads and `atexit` functions of behaviours must not keep the process alive.
     with suppress(RuntimeError, ValueError):
         faulthandler.dump_traceback_later(_LONGEST_EXIT_SEC, exit=True)
@@ -41,16 +47,18 @@ def run(arguments: list[str]) -> int:
         _print_error(*_translate(error))
         return ExitCode.USAGE
     except (KeyboardInterrupt, click.Abort):
-        return ExitCode.FAILED
+        return ExitCode.INTERRUPTED
     except ComposerError as error:
         _print_error(str(error), error.help)
         return ExitCode.USAGE if isinstance(error, UsageError) else ExitCode.FAILED
-    except BrokenPipeError:
-        # The reader of our output has gone, as `head` does.
-        sys.stderr.close()
+    except SystemExit:
+        # Of click: the reader of our output has gone, as `head` does.
         return ExitCode.FAILED
-    except Exception:  # noqa: BLE001 - all that is left is a bug in Composer
-        click.echo(_bug_report(arguments), err=True)
+    except Exception as error:  # noqa: BLE001 - all that is left is a bug in Composer
+        if _is_of_output(error):
+            _print_error(f'cannot write the output: {error.strerror}', None)
+            return ExitCode.FAILED
+        _print(_bug_report(arguments))
         return ExitCode.BUG
 
 
@@ -76,9 +84,48 @@ def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _print_error(message: str, help: str | None) -> None:  # noqa: A002 - the word that is printed
-    click.echo(f'error: {message}', err=True)
-    if help:
-        click.echo(f'  help: {help}', err=True)
+    text = f'error: {message}\nhelp: {help}' if help else f'error: {message}'
+    _print(escape_lines(text))
+
+
+def _print(text: str) -> None:
+    # Nobody can be told that standard error cannot be written either.
+    with suppress(OSError):
+        click.echo(text, err=True)
+
+
+def _open_closed_streams() -> None:
+    """Open the null device for each standard stream that a shell has closed, as `>&-` does.
+
+    Else the next file or socket would get its number, and be written to by all that prints.
+    """
+    for descriptor, name in enumerate(('stdin', 'stdout', 'stderr')):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            # The lowest number that is free is this one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+            stream = open(descriptor, 'w' if descriptor else 'r', encoding='utf-8')  # noqa: PTH123, SIM115 - open until the end
+            setattr(sys, name, stream)
+
+
+def _flush(code: int) -> int:
+    """Write what behaviours have printed; return the exit code."""
+    for name in ('stdout', 'stderr'):
+        try:
+            getattr(sys, name).flush()
+        except (OSError, ValueError) as error:
+            if isinstance(error, OSError):
+                code = code or ExitCode.FAILED
+            # Python would try again at the exit, and complain.
+            setattr(sys, name, None)
+    return code
+
+
+def _is_of_output(error: Exception) -> TypeGuard[OSError]:
+    """Return whether an error is one of standard output or error, as where the disk is full."""
+    frames = list(traceback.walk_tb(error.__traceback__))
+    return isinstance(error, OSError) and frames[-1][0].f_code is click.echo.__code__
 
 
 def _translate(error: click.ClickException) -> tuple[str, str]:

@@ -10,6 +10,7 @@ import click
 
 from composer.errors import ComposerError
 from composer.reports.text import render_finding
+from composer.terminal import colour_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,12 +20,10 @@ if TYPE_CHECKING:
 
 
 def wants_colour(*, is_error: bool = False) -> bool:
-    """Return whether standard output (or error) is a terminal that may be coloured.
-
-    Source: https://no-color.org
-    """
+    """Return whether standard output (or error) is to be coloured."""
+    wanted = colour_of(os.environ)
     stream = sys.stderr if is_error else sys.stdout
-    return stream.isatty() and not os.environ.get('NO_COLOR') and os.environ.get('TERM') != 'dumb'
+    return stream.isatty() if wanted is None else wanted
 
 
 def show_findings(findings: Iterable[Diagnostic]) -> None:

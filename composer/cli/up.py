@@ -63,11 +63,20 @@ def up(
     if importlib.util.find_spec('rclpy') is None:
         message = 'cannot run without ROS 2: this Python has no rclpy'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
-    from composer.runtime.environment import check_middleware, environment_set
+    # These import nothing of ROS, which reads its environment when it is imported.
+    from composer.runtime.environment import (
+        check_log_folder,
+        check_middleware,
+        check_shell,
+        environment_set,
+        find_colour,
+    )
 
-    # ROS reads it when it is imported.
-    with environment_set(context.spec.environment):
-        check_middleware(context.spec.environment)
+    variables = context.spec.environment
+    with environment_set({**find_colour(), **variables}):
+        check_shell(variables)
+        check_log_folder(ros_arguments)
+        check_middleware(os.environ)
         return _run(context, ros_arguments, log_levels, ends_process=ends_process)
 
 

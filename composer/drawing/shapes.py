@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from composer.drawing.picture import sends
 from composer.drawing.qos_labels import describe_policies
-from composer.reports.text import escape
 from composer.rules import Severity
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

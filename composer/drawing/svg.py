@@ -11,7 +11,7 @@ from composer.drawing.graphviz import lay_out
 from composer.drawing.qos_labels import describe_policies
 from composer.drawing.shapes import tokens_of
 from composer.names import join_names
-from composer.reports.text import escape
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

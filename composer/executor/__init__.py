@@ -25,8 +25,9 @@ The way of a message:
 6. If the callback awaits something, the rest of it comes back through the scheduler as a task
    (`event_loop`).
 
-Beside that way: `deadlines` makes timers ready, `wait_set_thread` all that rcl has no event
-callbacks for, and `entity_registry` keeps the sources in step with the entities of the nodes.
+Beside that way: `deadlines` makes timers ready, `qos_events` QoS events, `wait_set_thread` all
+else that is not announced, and `entity_registry` keeps the sources in step with the entities of
+the nodes.
 `spinner` puts these parts together for `composer_executor`, whose methods are rclpy's, and
 `after_fork` says what a forked child does with all this. A guest of theirs is `switch_interval`:
 how long a computing callback may hold up the others.
@@ -38,6 +39,6 @@ Callbacks, takes and waits run under none.
 
 from composer.executor.composer_executor import ComposerExecutor
 from composer.executor.sources.event_source import MissedCounts
-from composer.executor.wait_set_thread import checked_seldom
+from composer.executor.sources.qos_events import checked_seldom
 
 __all__ = ['ComposerExecutor', 'MissedCounts', 'checked_seldom']

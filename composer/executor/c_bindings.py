@@ -165,6 +165,8 @@ class _WaitSet(ctypes.Structure):
         ('client_count', ctypes.c_size_t),
         ('services', ctypes.POINTER(ctypes.c_void_p)),
         ('service_count', ctypes.c_size_t),
+        ('events', ctypes.POINTER(ctypes.c_void_p)),
+        ('event_count', ctypes.c_size_t),
     )
 
 
@@ -211,8 +213,7 @@ _rmw_guard_condition = _rmw_handle_function('rcl_guard_condition_get_rmw_handle'
 _rmw_subscription = _rmw_handle_function('rcl_subscription_get_rmw_handle')
 _rmw_service = _rmw_handle_function('rcl_service_get_rmw_handle')
 _rmw_client = _rmw_handle_function('rcl_client_get_rmw_handle')
-rmw_event = _rmw_handle_function('rcl_event_get_rmw_handle')
-"""Return the address of the `rmw_event_t` of the `rcl_event_t` at an address."""
+_rmw_event = _rmw_handle_function('rcl_event_get_rmw_handle')
 
 _rcl_holding_gil.rcl_trigger_guard_condition.argtypes = (ctypes.c_void_p,)
 _rcl.rmw_create_wait_set.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
@@ -224,6 +225,11 @@ _rcl.rmw_wait.argtypes = (*[ctypes.POINTER(_Entities)] * 5, ctypes.c_void_p, cty
 def _data_of(rmw_entity: int) -> int:
     data: int = _RmwEntity.from_address(rmw_entity).data
     return data
+
+
+def find_rmw_event(wait_set: Any) -> int:
+    """Return the address of the `rmw_event_t` of the only QoS event in `wait_set`."""
+    return _rmw_event(_WaitSet.from_address(wait_set.pointer).events[0])
 
 
 class Readiness:

@@ -14,7 +14,7 @@ from rclpy.task import Future, Task
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
-from composer.executor.scheduler import ScheduledTask
+from composer.executor.scheduler import ExecutorTask, ScheduledTask
 from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
@@ -57,9 +57,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         if type(callback) is ImmediateCallback:
             callback(*args)
             return None
-        task: Any = Task(callback, args, kwargs, executor=self)
+        task: Any = ExecutorTask(callback, args, kwargs, executor=self)
         self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
+
+    def _call_task_in_next_spin(self, task: Any) -> None:
+        """Do nothing: since rclpy 7.1.9, a task that yields calls this, and is resumed anyway."""
 
     def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> DelayedCall:
         """Add a callback like `create_task`, `delay_sec` from now; it can be cancelled."""
@@ -159,7 +162,7 @@ class ComposerExecutor(MultiThreadedExecutor):
         future.add_done_callback(callback)
         try:
             # Any other class may compute whether it is done, or call when nobody listens.
-            yield type(future) not in (Future, Task)
+            yield type(future) not in (Future, Task, ExecutorTask)
         finally:
             with suppress(AttributeError):  # As that of concurrent.futures.
                 future.remove_done_callback(callback)

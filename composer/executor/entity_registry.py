@@ -3,10 +3,11 @@
 import threading
 from contextlib import suppress
 from time import monotonic
-from typing import Any
+from typing import Any, TypeGuard
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
+from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 
 from composer.executor.sources.entity_sources import (
@@ -16,9 +17,12 @@ from composer.executor.sources.entity_sources import (
     TimerSource,
 )
 from composer.executor.sources.event_source import EventSource, ExecutorParts
+from composer.executor.sources.qos_events import is_checked_seldom
 from composer.executor.sources.waitable_sources import (
     ActionSource,
     GuardConditionSource,
+    QosEventSource,
+    SeldomQosEventSource,
     WaitableSource,
     WaitSetSource,
 )
@@ -69,15 +73,12 @@ class EntityRegistry:
             self.is_stale = False
             nodes = self._parts.executor.get_nodes()
             begin = monotonic()
-            changed = False
             for node in self._nodes.keys() - set(nodes):
                 self.drop(node)
             for node in nodes:
-                changed |= self._refresh_node(node)
+                self._refresh_node(node)
             end = monotonic()
             self._rest_until = end + _REST_FACTOR * (end - begin)
-        if changed:
-            self._wait_set_thread.check_events_soon()
 
     def source_of(self, node: Any, entity: Any) -> EventSource | None:
         """Return the source of an entity of `node`, None if the executor does not listen to it."""
@@ -96,7 +97,7 @@ class EntityRegistry:
         """Forget the sources: the parent process listens to the entities."""
         self._nodes = {}
 
-    def _refresh_node(self, node: Any) -> bool:
+    def _refresh_node(self, node: Any) -> None:
         seen = self._nodes.setdefault(node, _NodeEntities())
         lists = (
             tuple(node.timers),
@@ -107,7 +108,7 @@ class EntityRegistry:
             tuple(node.waitables),
         )
         if lists == seen.lists:
-            return False
+            return
         seen.lists = lists
         classes = (
             TimerSource,
@@ -130,15 +131,14 @@ class EntityRegistry:
                     source = source_class(entity, node, self._parts)
                     self._open(source)
                     seen.sources[entity] = source
-        return True
 
     def _open(self, source: EventSource) -> None:
         source.open()
-        if isinstance(source, WaitSetSource):
+        if _is_waited_for(source):
             self._wait_set_thread.add(source)
 
     def _close(self, source: EventSource) -> None:
-        if isinstance(source, WaitSetSource):
+        if _is_waited_for(source):
             self._wait_set_thread.remove(source)
         source.close()
 
@@ -146,4 +146,11 @@ class EntityRegistry:
 def _class_for(waitable: Any) -> type[EventSource]:
     if isinstance(waitable, ActionServer | ActionClient):
         return ActionSource
+    if type(waitable) is EventHandler:
+        is_seldom = is_checked_seldom(waitable.callback)
+        return SeldomQosEventSource if is_seldom else QosEventSource
     return WaitableSource
+
+
+def _is_waited_for(source: EventSource) -> TypeGuard[WaitSetSource]:
+    return isinstance(source, WaitSetSource) and not isinstance(source, SeldomQosEventSource)

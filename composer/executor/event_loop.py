@@ -12,11 +12,11 @@ from contextlib import suppress
 from time import monotonic
 from typing import Any
 
-from rclpy.task import Future, Task
+from rclpy.task import Future
 
 from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
-from composer.executor.scheduler import ScheduledTask, Session
+from composer.executor.scheduler import ExecutorTask, ScheduledTask, Session
 from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
 
@@ -240,7 +240,7 @@ class CallbackRunner:
             coroutine.send(None)
         except StopIteration:
             return False
-        self._suspend(ScheduledTask(Task(coroutine, executor=self._executor), source))
+        self._suspend(ScheduledTask(ExecutorTask(coroutine, executor=self._executor), source))
         return True
 
     def _execute_task(self, scheduled: ScheduledTask) -> None:

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 import rclpy.timer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
+from rclpy.task import Task
 
 from composer.executor.event_fds import UNKNOWN_COUNT
 
@@ -88,6 +89,13 @@ class QueuedSource(Protocol):
     queued: bool
     pending: int
     revision: int
+
+
+class ExecutorTask(Task):
+    """A task that the executor resumes; since rclpy 7.1.9, other tasks arrange that themselves."""
+
+    def _add_resume_callback(self, future: Any, executor: Any) -> None:
+        """Leave it to the executor."""
 
 
 class ScheduledTask:

@@ -1,58 +1,38 @@
 """A thread with a wait set, for what rcl has no event callbacks for.
 
 It waits for SIGINT and SIGTERM (through rclpy's guard condition), the nodes' guard conditions and
-waitables of unknown kinds. It does not wait for QoS events, because a wait set with an event of a
-subscription wakes up for each of its messages. It checks them from time to time: often in general,
-but seldom those with rclpy's default callbacks, which log incompatible QoS, and with callbacks
-marked `checked_seldom`; these are checked soon after entities were created or destroyed. An entity
-that was ready is left out of the wait set until it has run.
+waitables of unknown kinds and QoS events, but not for those of which `qos_events` takes care. An
+entity that was ready is left out of the wait set until it has run. A wait set with a QoS event of
+a subscription wakes up for each of its messages, too; then the events are left out for a moment.
 """
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from time import monotonic
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
-from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 from rclpy.waitable import NumberOfEntities
 
 from composer.executor.sources.waitable_sources import (
     GuardConditionSource,
+    QosEventSource,
     WaitableSource,
     WaitSetSource,
     create_wait_set,
-    is_ready,
     sizes_of,
 )
 
 _UNUSED_SEC = 1.0
-_SOON_SEC = 0.01
-_SOON_INTERVAL_SEC = 0.2
-_SOON_TIMES = 3
-_REST_FACTOR = 10
 _FLUSH_SEC = 1.0
+_PAUSE_SEC = 0.008
+_MAX_EVENTS_SHARE = 0.02
 # rclpy triggers its guard condition before it shuts the contexts down, in a thread that may be
 # kept waiting in between (rclpy's signal_handler.cpp): for so long after a POSIX signal, the
 # context is checked again and again.
 _SIGNAL_SEC = 10.0
 _SIGNAL_POLL_SEC = 0.005
-
-_Callback = TypeVar('_Callback', bound=Callable[..., Any])
-
-
-def checked_seldom(callback: _Callback) -> _Callback:
-    """Mark a callback of QoS events that need not run at once; a decorator."""
-    marked: Any = callback
-    marked.is_checked_seldom = True
-    return callback
-
-
-def _is_checked_seldom(callback: Any) -> bool:
-    # The module defines rclpy's default callbacks.
-    is_default = getattr(callback, '__module__', '') == 'rclpy.event_handler'
-    return is_default or getattr(callback, 'is_checked_seldom', False)
 
 
 class Owner(Protocol):
@@ -66,47 +46,6 @@ class Owner(Protocol):
 
     def is_context_valid(self) -> bool:
         """Tell whether the context has not been shut down."""
-
-
-class _QosEventChecks:
-    """QoS events that are checked one by one, at an interval that keeps the cost low.
-
-    Args:
-        min_sec: The shortest interval.
-        max_sec: The longest interval.
-        share: The share of the time that checks may take.
-    """
-
-    def __init__(self, min_sec: float, max_sec: float, share: float) -> None:
-        self.sources: set[WaitSetSource] = set()
-        self.due = 0.0
-        self._not_before = 0.0
-        self._soon_left = 0
-        self._min_sec = min_sec
-        self._max_sec = max_sec
-        self._share = share
-
-    def run(self, wait_set: Any) -> None:
-        """Queue the events that have happened."""
-        begin = monotonic()
-        for source in tuple(self.sources):
-            if source.entity._executor_event or not source.alive:  # noqa: SLF001
-                continue
-            with suppress(InvalidHandle), source.entity:
-                if is_ready(source.entity, wait_set):
-                    source.set_ready()
-        end = monotonic()
-        self._not_before = end + _REST_FACTOR * (end - begin)
-        pause = min(self._max_sec, max(self._min_sec, (end - begin) / self._share))
-        if self._soon_left:
-            self._soon_left -= 1
-            pause = min(pause, _SOON_INTERVAL_SEC)
-        self.due = max(end + pause, self._not_before)
-
-    def run_soon(self) -> None:
-        """Check a few times in the next moments, without using more than a tenth of the time."""
-        self._soon_left = _SOON_TIMES
-        self.due = min(self.due, max(monotonic() + _SOON_SEC, self._not_before))
 
 
 class WaitSetThread:
@@ -132,25 +71,21 @@ class WaitSetThread:
         self._closing = False
         self._users: set[object] = set()
         self._waited_for: set[WaitSetSource] = set()
-        self._often = _QosEventChecks(0.02, 1.0, 0.01)
-        self._seldom = _QosEventChecks(0.1, 30.0, 0.002)
         self._signalled_until = 0.0
+        self._events_from = 0.0
         self._wait_set: tuple[tuple[int, ...], Any] | None = None
 
     def add(self, source: WaitSetSource) -> None:
-        """Wait for the entity of `source`, or check it from time to time."""
-        if not isinstance(source.entity, EventHandler):
-            source.on_taken = self.wake
+        """Wait for the entity of `source`."""
+        source.on_taken = self.wake
         with self._lock:
-            self._sources_like(source).add(source)
+            self._waited_for.add(source)
         self.wake()
 
     def remove(self, source: WaitSetSource) -> None:
         """Undo `add`; when this returns, the thread does not wait for the entity."""
         with self._lock:
-            self._sources_like(source).discard(source)
-        if isinstance(source.entity, EventHandler):
-            return
+            self._waited_for.discard(source)
         self.flush()
 
     def add_user(self, user: object) -> None:
@@ -181,14 +116,6 @@ class WaitSetThread:
         if self._thread is not None:
             with suppress(InvalidHandle):
                 self._guard.trigger()
-
-    def check_events_soon(self) -> None:
-        """Check all QoS events a few times in the next moments: entities have come or gone."""
-        used = [checks for checks in (self._seldom, self._often) if checks.sources]
-        for checks in used:
-            checks.run_soon()
-        if used:
-            self.wake()
 
     def flush(self) -> None:
         """Return when all that was triggered before is queued."""
@@ -223,12 +150,6 @@ class WaitSetThread:
         self._closing = True
         self._thread = None
 
-    def _sources_like(self, source: WaitSetSource) -> set[WaitSetSource]:
-        if not isinstance(source.entity, EventHandler):
-            return self._waited_for
-        callback = source.entity.callback
-        return (self._seldom if _is_checked_seldom(callback) else self._often).sources
-
     def _run(self) -> None:
         try:
             self._wait_and_check()
@@ -258,34 +179,47 @@ class WaitSetThread:
                     return
             # `flush` is waiting, and its wake-up may have ended the wait before this one.
             self._wait(0 if requests > self._flushes else _UNUSED_SEC if unused else None)
-            self._check_events()
             if requests > self._flushes:
                 with self._flushed:
                     self._flushes = requests
                     self._flushed.notify_all()
 
     def _wait(self, max_sec: float | None) -> None:
+        begin = monotonic()
+        pause_sec = self._events_from - begin
+        if pause_sec > 0:
+            max_sec = pause_sec if max_sec is None else min(max_sec, pause_sec)
         timeout_sec = self._timeout_sec(max_sec)
-        timeout_ns = -1 if timeout_sec is None else int(timeout_sec * 1e9)
         with ExitStack() as held, suppress(InvalidHandle):
             held.enter_context(self._guard.handle)
             held.enter_context(self._sigint_guard.handle)
-            sources = []
-            for source in tuple(self._waited_for):
-                with suppress(InvalidHandle):
-                    if source.alive and not source.entity._executor_event:  # noqa: SLF001
-                        held.enter_context(_handle_of(source))
-                        sources.append(source)
+            sources = self._hold_sources(held, with_events=pause_sec <= 0)
             wait_set = self._fill_wait_set(sources)
             held.enter_context(wait_set)
-            wait_set.wait(timeout_ns)
+            waits_since = monotonic()
+            wait_set.wait(-1 if timeout_sec is None else int(timeout_sec * 1e9))
+            woken = monotonic()
             triggered = set(wait_set.get_ready_entities('guard_condition'))
-            for source in sources:
-                if _was_ready(source, wait_set, triggered):
-                    source.set_ready()
+            ready = [source for source in sources if _was_ready(source, wait_set, triggered)]
+            for source in ready:
+                source.set_ready()
             if self._sigint_guard.handle.pointer in triggered:
                 self._signalled_until = monotonic() + _SIGNAL_SEC
                 self._owner.wake()
+            if not (ready or triggered) and any(isinstance(s, QosEventSource) for s in sources):
+                cost_sec = waits_since - begin + monotonic() - woken
+                self._events_from = woken + max(_PAUSE_SEC, cost_sec / _MAX_EVENTS_SHARE)
+
+    def _hold_sources(self, held: ExitStack, *, with_events: bool) -> list[WaitSetSource]:
+        """Return the sources to wait for, whose entities are not destroyed while `held`."""
+        sources = []
+        for source in tuple(self._waited_for):
+            if (with_events or not isinstance(source, QosEventSource)) and source.alive:
+                with suppress(InvalidHandle):
+                    if not source.entity._executor_event:  # noqa: SLF001
+                        held.enter_context(_handle_of(source))
+                        sources.append(source)
+        return sources
 
     def _fill_wait_set(self, sources: Iterable[WaitSetSource]) -> Any:
         """Return a wait set with the thread's guard conditions and `sources` in it."""
@@ -311,27 +245,9 @@ class WaitSetThread:
         return wait_set
 
     def _timeout_sec(self, max_sec: float | None) -> float | None:
-        now = monotonic()
-        ends = [c.due for c in (self._often, self._seldom) if c.sources]
-        if max_sec is not None:
-            ends.append(now + max_sec)
-        if now < self._signalled_until:
-            ends.append(now + _SIGNAL_POLL_SEC)
-        return max(0.0, min(ends) - now) if ends else None
-
-    def _check_events(self) -> None:
-        now = monotonic()
-        due = [
-            checks
-            for checks in (self._often, self._seldom)
-            if checks.sources and checks.due <= now
-        ]
-        if not due:
-            return
-        with suppress(InvalidHandle):
-            wait_set = create_wait_set((0, 0, 0, 0, 0, 1), self._context)
-            for checks in due:
-                checks.run(wait_set)
+        if monotonic() < self._signalled_until:
+            return _SIGNAL_POLL_SEC if max_sec is None else min(max_sec, _SIGNAL_POLL_SEC)
+        return max_sec
 
 
 def _handle_of(source: WaitSetSource) -> Any:

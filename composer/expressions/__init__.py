@@ -5,9 +5,8 @@ Importing jinja2 takes as long as a small check: only files that have expression
 
 from __future__ import annotations
 
-# The sections whose entries may be repeated, and how many they may have unless a file says more.
+# The sections whose entries may be repeated.
 SECTIONS = ('nodes', 'include', 'processes')
-MAX_ENTRIES = 10_000
 
 # The words that an expression does not read as names.
 _RESERVED = frozenset(

@@ -6,11 +6,16 @@ and in all below it; an entry that is left out is still held against the schema.
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from jinja2 import TemplateRuntimeError
+
 from composer.diagnostics import diagnostic_at
-from composer.expressions import MAX_ENTRIES, SECTIONS, is_variable_name
+from composer.expressions import SECTIONS, is_variable_name
 from composer.expressions.templates import TemplateEvaluator
+from composer.input_limits import MAX_ENTRIES, MAX_VALUES
+from composer.yaml_text.document import count_values
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -30,8 +35,10 @@ def expand_document(
     values: Mapping[str, Any],
     samples: Collection[str] = (),
     origins: Mapping[str, str] | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Any] | None:
     """Return data with all expressions evaluated, and entries repeated or left out.
+
+    If there are more entries than a file may have, the finding says so, and the result is `None`.
 
     Args:
         document: The document that the data are from; what is learnt on the way goes there.
@@ -47,7 +54,10 @@ def expand_document(
     for section in SECTIONS:
         if isinstance(data.get(section), dict):
             expansion = _Expansion(evaluator, section, limit)
-            filled[section] = expansion.expand(data[section])
+            try:
+                filled[section] = expansion.expand(data[section])
+            except _TooManyError:
+                return None
         elif section in data:
             filled[section] = evaluator.evaluate(data[section], (section,))
     return filled
@@ -59,6 +69,10 @@ def _limit_of(data: Mapping[str, Any]) -> int:
     return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
 
 
+class _TooManyError(Exception):
+    """There are more entries than a file may have, and that has been reported."""
+
+
 class _Expansion:
     """Expands the entries of one section."""
 
@@ -68,11 +82,14 @@ class _Expansion:
         self._section = section
         self._limit = limit
         self._entries: dict[str, Any] = {}
+        self._count = 0
+        self._values = 0
         self._branches: dict[Key, Branch] | None = None
 
     def expand(self, data: dict[str, Any]) -> dict[str, Any]:
         for written, entry in data.items():
             if not _is_conditional(entry):
+                self._count += 1
                 self._add(self._evaluator, written, entry, is_left_out=False, is_repeated=False)
                 continue
             path = (self._section, written)
@@ -83,10 +100,12 @@ class _Expansion:
                 self._document.dropped.add(path)
                 continue
             before = len(self._document.diagnostics)
-            for evaluator in self._scopes(entry.get(_FOREACH, {}), (*path, _FOREACH)):
-                if len(self._entries) >= self._limit:
-                    self._report_limit(path)
-                    return self._entries
+            scopes = self._list_scopes(entry.get(_FOREACH, {}), (*path, _FOREACH))
+            self._values += len(scopes) * count_values(body)
+            if self._values > MAX_VALUES:
+                self._report_limit((*path, _FOREACH), f'{MAX_VALUES:,} keys and values')
+                raise _TooManyError
+            for evaluator in scopes:
                 holds = self._holds(evaluator, entry.get(_WHEN, True), (*path, _WHEN))
                 self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
                 before = -1
@@ -126,6 +145,20 @@ class _Expansion:
             self._branches = self._evaluator.positions.branches((self._section,))
         self._evaluator.positions.graft(path, self._branches[written])
 
+    def _list_scopes(self, foreach: Any, path: DataPath) -> list[TemplateEvaluator]:
+        """Return all scopes of an entry; raise if there are more than entries are allowed."""
+        room = max(self._limit - self._count, 0)
+        try:
+            scopes = list(islice(self._scopes(foreach, path), room + 1))
+        except TemplateRuntimeError as error:
+            self._report(path, str(error))
+            raise _TooManyError from error
+        self._count += len(scopes)
+        if len(scopes) > room:
+            self._report_limit(path, f'{self._limit:,} entries')
+            raise _TooManyError
+        return scopes
+
     def _scopes(
         self, foreach: Any, path: DataPath, evaluator: TemplateEvaluator | None = None
     ) -> Iterator[TemplateEvaluator]:
@@ -142,6 +175,7 @@ class _Expansion:
         if not is_variable_name(name):
             self._report(at, f"'{name}' cannot be used as a name in expressions")
             return
+        evaluator.spend_on_values(count_values(foreach[name]))
         values = evaluator.evaluate(foreach[name], at)
         is_sample = evaluator.is_sampled(at)
         if not isinstance(values, list):
@@ -151,6 +185,7 @@ class _Expansion:
             values, is_sample = [_SAMPLE], True
         rest = {other: foreach[other] for other in others}
         for value in values:
+            evaluator.spend_on_values(1)
             inner = evaluator.within(name, value, _FOREACH, is_sample=is_sample)
             yield from self._scopes(rest, path, inner)
 
@@ -181,12 +216,12 @@ class _Expansion:
             )
         )
 
-    def _report_limit(self, path: DataPath) -> None:
+    def _report_limit(self, path: DataPath, what: str) -> None:
         self._document.diagnostics.append(
             diagnostic_at(
-                self._evaluator.positions.key((*path, _FOREACH)),
+                self._evaluator.positions.key(path),
                 'too-many-entries',
-                f'{self._section} has more than {self._limit:,} entries',
+                f'{self._section} has more than {what}',
                 help="raise 'max_nodes' at the top of the file if that is intended",
             )
         )

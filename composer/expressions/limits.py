@@ -25,6 +25,8 @@ _WORK_OF_FILE = 50_000_000
 _WORK_OF_STEP = 50
 _WORK_OF_PARSING = 500
 _WORK_OF_SCANNING = 1500
+_WORK_OF_LOOP = 500
+_WORK_OF_VALUE = 10
 # What an item of a list counts, beside its text.
 _SIZE_OF_ITEM = 8
 
@@ -52,6 +54,10 @@ class Budget:
     def spend_on_parsing(self, code: str) -> None:
         """Count the parsing of an expression."""
         self._spend_of_file(_WORK_OF_PARSING * (1 + len(code) // 25))
+
+    def spend_on_values(self, count: int) -> None:
+        """Count a loop over values, or a copy of them."""
+        self._spend_of_file(_WORK_OF_LOOP + _WORK_OF_VALUE * count)
 
     def spend(self, *values: Any) -> None:
         """Count a step that reads or writes values.

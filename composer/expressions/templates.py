@@ -7,6 +7,7 @@ text. Names that are not in scope are errors. Source: https://jinja.palletsproje
 
 from __future__ import annotations
 
+import os
 import re
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -62,6 +63,14 @@ class TemplateEvaluator:
         self._values = values
         self._samples = frozenset(samples)
         self._sandbox = Sandbox()
+
+    def spend_on_values(self, count: int) -> None:
+        """Count the work that a loop of `foreach` takes for so many values.
+
+        Raises:
+            TemplateRuntimeError: There is no work left.
+        """
+        self._sandbox.budget.spend_on_values(count)
 
     def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> TemplateEvaluator:
         """Return an evaluator with one more name in scope, for the same document."""
@@ -138,7 +147,7 @@ class TemplateEvaluator:
         return ''.join([*parts, text[start:]])
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
-        scope = {'here': str(span.source.folder.resolve()), **self._values}
+        scope = {'here': os.path.realpath(span.source.folder), **self._values}
         return _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
 
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:

@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final, Literal, TypeAlias, cast
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package, locate_packages
+from composer.input_limits import UnreadableFileError, read_file
 from composer.interfaces.descriptions import InterfaceDescription
 from composer.interfaces.type_descriptions import TypeDescriptionError, parse_type_description
 
@@ -87,8 +88,8 @@ class InterfaceCatalogue:
             return None
         path = prefix.joinpath('share', *parts[:2], f'{parts[2]}.json')
         try:
-            return parse_type_description(json.loads(path.read_bytes()))
-        except (OSError, ValueError, TypeDescriptionError):
+            return parse_type_description(json.loads(read_file(path)))
+        except (UnreadableFileError, ValueError, RecursionError, TypeDescriptionError):
             return None
 
     def _prefix_of(self, package: str) -> Path | None:
@@ -110,7 +111,7 @@ class InterfaceCatalogue:
         prefix = self._prefix_of(package)
         if prefix is None:
             return
-        for line in (prefix / INTERFACE_INDEX / package).read_text(encoding='utf-8').splitlines():
-            entry = PurePosixPath(line)
+        for line in read_file(prefix / INTERFACE_INDEX / package).splitlines():
+            entry = PurePosixPath(line.decode(errors='replace'))
             if entry.parent.name == kind and entry.suffix in {'.idl', f'.{kind}'}:
                 yield f'{package}/{kind}/{entry.stem}'

@@ -201,7 +201,7 @@ def describe_arguments(declared: Mapping[str, ArgumentSpec]) -> str:
     """Return the arguments that a file declares, as the help of an error."""
     if not declared:
         return 'the file declares no arguments'
-    return 'the file declares\n' + '\n'.join(f'    {argument}' for argument in declared.values())
+    return 'the file declares\n' + '\n'.join(f'  {argument}' for argument in declared.values())
 
 
 def _assign_words(

@@ -51,7 +51,8 @@ def evaluate_expressions(system: LoadedSystem) -> None:
     given, before = system.given, len(system.diagnostics)
     origins = {name: _origin(name, system) for name in given.values}
     expanded = expand_document(system, rest, given.values, given.samples, origins)
-    system.data = expanded | declarations
+    # Of a file with too many entries nothing is left.
+    system.data = None if expanded is None else expanded | declarations
     if not isinstance(data.get('args', {}), dict):
         # Nothing is known of the arguments, not even their names.
         found = system.diagnostics[before:]

@@ -67,6 +67,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
     if system.data is not None:
         _load_file(system, partial(values_from_words, words=words))
         Includer(system, _load_file).include_all()
+    if system.data is not None:
         parse_specs(system)
     return system
 
@@ -75,6 +76,8 @@ def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
     """Take a file, included or not, through the steps that concern it alone."""
     give_arguments(system, give_values)
     evaluate_expressions(system)
+    if system.data is None:
+        return
     check_structure(system)
     resolve_paths(system)
     apply_defaults(system)

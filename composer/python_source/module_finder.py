@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -37,7 +38,7 @@ def project_search_path(configs: Iterable[Path]) -> list[Path]:
     These are the current folder, then the folder of each file and its parents up to the one with a
     `pyproject.toml` or `.git`; if there is none, only the folder of the file.
     """
-    folders = dict.fromkeys(config.resolve().parent for config in configs)
+    folders = dict.fromkeys(Path(os.path.realpath(config)).parent for config in configs)
     chains = (each for folder in folders for each in _lineage(folder))
     return list(dict.fromkeys([Path.cwd(), *chains]))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.reports.report import relative_path
-from composer.reports.text import escape
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic

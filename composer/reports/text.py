@@ -9,6 +9,7 @@ import click
 
 from composer.reports.report import count_severities
 from composer.rules import Severity
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
@@ -69,16 +70,6 @@ def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
     if finding.help:
         lines.append(f'  {style("help:", fg="cyan")} {escape(finding.help)}')
     return '\n'.join(lines)
-
-
-def escape(text: str) -> str:
-    """Return a text on one line; control characters, which a terminal obeys, become escapes."""
-    if text.isprintable():
-        return text
-    return ''.join(
-        character if character.isprintable() else character.encode('unicode_escape').decode()
-        for character in text
-    )
 
 
 def _plain(text: str, **_style: object) -> str:

@@ -1,17 +1,28 @@
-"""The environment variables of a file: set before ROS is imported, and restored at the end."""
+"""The environment variables of a file: set before ROS is imported, and restored at the end.
+
+Those of the shell are checked as those of the file were.
+"""
 
 from __future__ import annotations
 
 import os
+import socket
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.checks.environment import find_environment_problems
 from composer.errors import StartError
+from composer.terminal import colour_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
 _MIDDLEWARE = 'RMW_IMPLEMENTATION'
+_COLOUR = 'RCUTILS_COLORIZED_OUTPUT'
+_PEERS = 'ROS_STATIC_PEERS'
+_KEYSTORE = 'ROS_SECURITY_KEYSTORE'
+_NO_LOG_FILES = '--disable-external-lib-logs'
 
 
 @contextmanager
@@ -27,6 +38,76 @@ def environment_set(variables: Mapping[str, str]) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def find_colour() -> dict[str, str]:
+    """Return the variable that tells ROS whether to colour its log, if the shell says so."""
+    wanted = colour_of(os.environ)
+    if wanted is None or os.environ.get(_COLOUR):
+        return {}
+    return {_COLOUR: str(int(wanted))}
+
+
+def check_shell(of_file: Mapping[str, str]) -> None:
+    """Check the variables that ROS reads and that the shell has set.
+
+    Args:
+        of_file: Those of the file, which have been checked.
+
+    Raises:
+        StartError: ROS cannot use one of them.
+    """
+    of_shell = {name: value for name, value in os.environ.items() if name not in of_file}
+    for _, message, advice in find_environment_problems(of_shell):
+        text = f'{message} (as the shell has set it)'
+        raise StartError(text, help=advice)
+    for peer in filter(None, os.environ.get(_PEERS, '').split(';')):
+        try:
+            socket.getaddrinfo(peer, None)
+        except (OSError, UnicodeError) as error:
+            message = f"{_PEERS}: the host '{peer}' cannot be found: {error}"
+            raise StartError(message) from error
+    keystore = os.environ.get(_KEYSTORE)
+    if os.environ.get('ROS_SECURITY_ENABLE') == 'true' and keystore:
+        enclaves = Path(keystore) / 'enclaves'
+        if not enclaves.is_dir():
+            message = f"{_KEYSTORE}: there is no folder '{enclaves}'"
+            raise StartError(message)
+
+
+def check_log_folder(ros_arguments: Sequence[str]) -> None:
+    """Create the folder of ROS's log files if it does not exist, as ROS does.
+
+    Raises:
+        StartError: It cannot be created or written to.
+    """
+    if _NO_LOG_FILES in ros_arguments:
+        return
+    name, text = _find_log_folder()
+    home = os.environ.get('HOME')
+    problem: str | None = 'HOME is not set'
+    if home or not text.startswith('~'):
+        folder = Path(text.replace('~', home or '', 1) if text.startswith('~') else text)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            problem = None if os.access(folder, os.W_OK | os.X_OK) else 'it cannot be written to'
+        except OSError as error:
+            problem = error.strerror
+    if problem:
+        message = f"ROS cannot keep its log files in '{text}' ({name}): {problem}"
+        raise StartError(message, help='set ROS_LOG_DIR to a folder that can be written to')
+
+
+def _find_log_folder() -> tuple[str, str]:
+    """Return the variable that names the folder of ROS's log files, and the folder.
+
+    Source: `rcl_logging_get_logging_directory` of `rcl_logging_interface`.
+    """
+    if folder := os.environ.get('ROS_LOG_DIR'):
+        return 'ROS_LOG_DIR', folder
+    if home := os.environ.get('ROS_HOME'):
+        return 'ROS_HOME', f'{home}/log'
+    return 'HOME', '~/.ros/log'
 
 
 def check_middleware(variables: Mapping[str, str]) -> None:

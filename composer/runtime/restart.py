@@ -104,7 +104,7 @@ class NodeRestarter:
                 system_logger.error(f'restart: {error}')
                 self._system.act_on_error(full_name, 'restart')
                 return
-        system_logger.warn(f"node '{old.spec.key}' was restarted")
+        system_logger.warning(f"node '{old.spec.key}' was restarted")
 
     def _end(self, node: LiveNode) -> bool:
         """Remove a node; return whether a new one may take its place."""
@@ -120,7 +120,7 @@ class NodeRestarter:
         executor.remove_node(node.ros)
         node.destroy()
         if not node.ros.wait_until_gone(_GONE_SEC):
-            system_logger.warn(
+            system_logger.warning(
                 f"node '{name}': something still holds an entity of the node from before its "
                 'restart, so its log may be missing on /rosout'
             )

@@ -22,6 +22,13 @@ _STOP_ALL = {
 }
 
 
+class _SystemContext(Context):
+    """A context whose nodes the system destroys."""
+
+    def track_node(self, node: Any) -> None:
+        """Do not destroy `node` at the shutdown, as rclpy does since version 9."""
+
+
 def create_ros_context(ros_arguments: Sequence[str]) -> Context:
     """Return an initialized context, which only the system itself may shut down.
 
@@ -32,7 +39,7 @@ def create_ros_context(ros_arguments: Sequence[str]) -> Context:
         UsageError: ROS does not accept them, or they rename all nodes.
         StartError: ROS 2 cannot start.
     """
-    context = Context()
+    context = _SystemContext()
     _init(context, ros_arguments)
     reserve(context, 'the context', 'shutdown', 'try_shutdown', 'destroy')
     return context

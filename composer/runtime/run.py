@@ -7,9 +7,11 @@ import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from composer import signals
 from composer.errors import ComposerError, ExitCode
 from composer.runtime import forced_exit, forked_children
 from composer.runtime.logs import log_levels, system_logger
+from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
 
 if TYPE_CHECKING:
@@ -38,7 +40,8 @@ def run_system(
     The first SIGINT or SIGTERM stops the system, a second one ends the process at once with exit
     code 1, and a third one does so even if no Python code can run. SIGHUP stops the system, too,
     unless it was ignored before, as by `nohup`; further ones change nothing. If a behaviour does
-    not end, this ends the process with the exit code, since its thread cannot be ended.
+    not end, this ends the process with the exit code, since its thread cannot be ended. A SIGINT
+    before the system is up gives the exit code 130.
 
     Args:
         ends_process: Whether the process exits afterwards: that is how a large system ends fast.
@@ -50,50 +53,57 @@ def run_system(
         StartError: The system could not start.
         UsageError: The ROS arguments are wrong.
     """
-    with log_levels(list(spec.nodes.values()), log_level_requests):
+    stop = StopRequest()
+    with (
+        log_levels(list(spec.nodes.values()), log_level_requests),
+        _handling_signals(stop, spec),
+    ):
         system = System(
             spec,
             positions,
             functions,
             ros_arguments,
             log_level_requests,
+            stop_request=stop,
             ends_process=ends_process,
         )
-        with _handling_signals(system, spec):
+        try:
+            system.start()
             try:
-                system.start()
-                try:
-                    system.wait()
-                finally:
-                    # Also if a signal handler of a behaviour raised an error in this thread.
-                    forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
-                    code, ended = system.stop()
-            except ComposerError as error:
-                if system.has_ended:
-                    raise
-                system_logger.error(str(error))
-                code, ended = ExitCode.FAILED, False
+                system.wait()
             finally:
-                forced_exit.cancel()
+                # Also if a signal handler of a behaviour raised an error in this thread.
+                forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
+                code, ended = system.stop()
+        except ComposerError as error:
+            code, ended = ExitCode.FAILED, False
+            if system.has_ended:
+                signals.end_with(code)
+                raise
+            system_logger.error(str(error))
+        finally:
+            forced_exit.cancel()
+        signals.end_with(code)
     if not ended:
         forced_exit.leave(code)
     return code
 
 
 @contextmanager
-def _handling_signals(system: System, spec: SystemSpec) -> Iterator[None]:
+def _handling_signals(stop: StopRequest, spec: SystemSpec) -> Iterator[None]:
     # Python handles signals in the main thread alone; elsewhere the caller keeps them.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def handle(number: int, _frame: FrameType | None) -> None:
-        if system.stop_requested:
+        if stop.is_set:
             if number == _HANG_UP:
                 return
-            system.kill_processes()
+            stop.kill_processes()
             forced_exit.leave(ExitCode.FAILED)
-        system.request_stop()
+        is_early = number == signal.SIGINT and not stop.system_is_up
+        stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
         forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
         for each in _SIGNALS:
             forced_exit.let_kernel_act_after_next(each)
@@ -102,7 +112,7 @@ def _handling_signals(system: System, spec: SystemSpec) -> Iterator[None]:
     if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
         handled.append(_HANG_UP)
     before: dict[int, Any] = {number: signal.signal(number, handle) for number in handled}
-    forked_children.signal_handlers.update(before)
+    forked_children.signal_handlers.update(before | signals.previous)
     try:
         yield
     finally:

@@ -19,12 +19,16 @@ class StopRequest:
 
     Attributes:
         is_set: Whether it was made.
-        code: The exit code: the first one that was not 0.
+        code: The exit code: the first one of a failure, if there is any.
+        system_is_up: Whether all of the system has started.
+        kill_processes: Kills all external processes at once; a signal handler may call it.
     """
 
     def __init__(self) -> None:
         self.is_set = False
         self.code: int = ExitCode.DONE
+        self.system_is_up = False
+        self.kill_processes: Callable[[], None] = lambda: None
         self._callbacks: dict[Callable[[], None], None] = {}
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
 
@@ -41,16 +45,21 @@ class StopRequest:
         self._wake_ups.put(None)
 
     def set_code(self, code: int) -> None:
-        """Set the exit code, unless there is one that is not 0."""
-        if self.code == ExitCode.DONE:
+        """Set the exit code, unless there is one of a failure."""
+        if self.code in (ExitCode.DONE, ExitCode.INTERRUPTED):
             self.code = code
 
-    def wait(self) -> None:
-        """Wait until it is made; for one thread."""
+    def wait(self, meanwhile: Callable[[], None]) -> None:
+        """Wait until it is made; for one thread.
+
+        Args:
+            meanwhile: Called now and then.
+        """
         while not self.is_set:
             # A signal that comes right before the wait begins does not interrupt it.
             with suppress(queue.Empty):
                 self._wake_ups.get(timeout=_POLL_SEC)
+            meanwhile()
 
     @contextmanager
     def waking(self, wake: Callable[[], None]) -> Iterator[bool]:

@@ -12,7 +12,7 @@ from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
-from composer.runtime.logs import system_logger
+from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
@@ -44,6 +44,7 @@ class System:
         functions: The behaviours, by their names.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
+        stop_request: The request to stop it; by default a new one.
         ends_process: Whether the process exits after the stop. Nothing may use ROS then.
 
     Attributes:
@@ -59,13 +60,14 @@ class System:
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
+        stop_request: StopRequest | None = None,
         ends_process: bool = False,
     ) -> None:
         self._spec = spec
         self._ends_process = ends_process
         self.has_ended = False
         self._begun = monotonic()
-        self._stop_request = StopRequest()
+        self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
@@ -90,6 +92,7 @@ class System:
             ros_arguments,
             log_levels,
         )
+        self._stop_request.kill_processes = self._processes.kill_all
 
     def _create_handle(
         self,
@@ -128,10 +131,6 @@ class System:
         """
         self._stop_request.make(code)
 
-    def kill_processes(self) -> None:
-        """Kill all external processes; a signal handler may call it before it ends this one."""
-        self._processes.kill_all()
-
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
@@ -163,12 +162,13 @@ class System:
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        self._stop_request.system_is_up = True
         self._starter.open(prompt)
         self._parameter_services.begin()
 
     def wait(self) -> None:
-        """Wait until a stop is requested."""
-        self._stop_request.wait()
+        """Wait until a stop is requested, or nobody reads the output any more."""
+        self._stop_request.wait(self._stop_if_unread)
 
     def stop(self) -> tuple[int, bool]:
         """Stop the system.
@@ -230,7 +230,7 @@ class System:
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:
-            system_logger.warn(f'/diagnostics is not published: {error}')
+            system_logger.warning(f'/diagnostics is not published: {error}')
         else:
             self._diagnostics_publisher = publisher
 
@@ -244,6 +244,11 @@ class System:
 
     def _endpoints(self) -> list[TopicEndpoint]:
         return [end for node in list(self._nodes.values()) for end in node.endpoints]
+
+    def _stop_if_unread(self) -> None:
+        if not self.stop_requested and is_output_unread():
+            system_logger.error('nobody reads the output any more, so the system ends')
+            self.request_stop(ExitCode.FAILED)
 
     def _on_lost(self) -> None:
         if not self.stop_requested:

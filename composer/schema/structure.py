@@ -11,7 +11,7 @@ from functools import cache
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import MAX_FINDINGS
+from composer.input_limits import MAX_FINDINGS
 from composer.schema import schema_path
 from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain

@@ -35,6 +35,13 @@ class Document:
     notes: dict[DataPath, str] = field(default_factory=dict)
 
 
+def count_values(data: Any) -> int:
+    """Return how many keys and values there are in data, itself included."""
+    if isinstance(data, dict):
+        return 1 + len(data) + sum(map(count_values, data.values()))
+    return 1 + sum(map(count_values, data)) if isinstance(data, list) else 1
+
+
 def copy_data(data: Any) -> Any:
     """Return a copy in which nothing is shared: aliases and a file included twice share data."""
     if isinstance(data, dict):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
+from composer.input_limits import MAX_DEPTH, MAX_VALUES
 from composer.yaml_text.scalars import (
     TAG_MAP,
     TAG_SEQ,
@@ -14,8 +15,6 @@ from composer.yaml_text.scalars import (
     short_tag,
 )
 from composer.yaml_text.tree import (
-    MAX_DEPTH,
-    MAX_VALUES,
     CompositionError,
     MappingNode,
     ScalarNode,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, SourceFile
+from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, format_size, read_file
 from composer.yaml_text.document import Document
 from composer.yaml_text.plain_data import construct_data
 from composer.yaml_text.positions import SourceMap
@@ -12,9 +13,6 @@ from composer.yaml_text.tree import CompositionError, compose_tree
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-# A file of a thousand nodes with five thousand entities has one megabyte.
-MAX_BYTES = 10_000_000
 
 
 def read_document(path: Path, name: str | None = None) -> Document:
@@ -35,17 +33,15 @@ def read_document(path: Path, name: str | None = None) -> Document:
 def read_content(path: Path, name: str) -> bytes | Diagnostic:
     """Return the content of a file, or why it cannot be read."""
     try:
-        with path.open('rb') as file:
-            return file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        return _unreadable(name, f'cannot read the file: {reason}')
+        return read_file(path)
+    except UnreadableFileError as error:
+        return _unreadable(name, str(error))
 
 
 def decode_content(content: bytes, name: str) -> str | Diagnostic:
     """Return the text of a file, or why it cannot be used: it must be UTF-8, and not too large."""
-    if len(content) > MAX_BYTES:
-        return _unreadable(name, f'the file is larger than {MAX_BYTES / 1e6:.0f} MB')
+    if len(content) > MAX_FILE_BYTES:
+        return _unreadable(name, f'the file is larger than {format_size(MAX_FILE_BYTES)}')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as error:

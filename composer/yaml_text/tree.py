@@ -8,11 +8,7 @@ from typing import Any, NoReturn, TypeAlias
 import yaml
 
 from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
-
-# No system needs more; the bound keeps all later walks over the data safe from deep recursion.
-MAX_DEPTH = 100
-# Five times what a file of a thousand nodes with five thousand entities has.
-MAX_VALUES = 300_000
+from composer.input_limits import MAX_DEPTH, MAX_VALUES
 
 _QUOTES = ("'", '"')
 

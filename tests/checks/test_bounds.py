@@ -3,7 +3,7 @@
 import pytest
 
 from composer.checks.checker import check_system
-from composer.diagnostics import MAX_FINDINGS
+from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system_text
 

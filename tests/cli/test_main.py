@@ -285,7 +285,7 @@ def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
         (ComposerError('it broke', help='mend it'), 1, 'error: it broke\n  help: mend it\n'),
         (ComposerError('it broke'), 1, 'error: it broke\n'),
         (UsageError('not so', help='but so'), 2, 'error: not so\n  help: but so\n'),
-        (KeyboardInterrupt(), 1, '\n'),
+        (KeyboardInterrupt(), 130, '\n'),
     ],
 )
 def test_what_is_raised_on_purpose_becomes_an_exit_code(run, monkeypatch, raised, code, said):

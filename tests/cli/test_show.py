@@ -92,7 +92,7 @@ def test_it_says_where_each_value_comes_from(robot, capsys):
 def test_it_lists_the_arguments(robot, capsys):
     assert run(['show', 'robot.yaml', '--args']) == 0
     assert capsys.readouterr().out == (
-        'the file declares\n    arms (integer, default 2)\n    side (string, default left)\n'
+        'the file declares\n  arms (integer, default 2)\n  side (string, default left)\n'
     )
 
 

@@ -9,10 +9,11 @@ from composer.cli import main as cli
 ROOT = Path(__file__).resolve().parents[2]
 
 CALCULATOR_ARGUMENTS = """the file declares
-    a (integer, required): The first number.
-    b (integer, required): The second number.
-    operation (string, one of '', add, subtract, default ''): What the server does; empty for no change.
+  a (integer, required): The first number.
+  b (integer, required): The second number.
+  operation (string, one of '', add, subtract, default ''): What the server does; empty for no change.
 """
+INDENTED = CALCULATOR_ARGUMENTS.replace('\n  ', '\n    ')
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def test_words_that_do_not_fit_are_an_error_of_usage_that_shows_the_declared_one
         2,
         '',
         "error: there is no argument 'c'; 'a': expected an integer, got 'ten'; 'b' is missing; "
-        f"'operation': 'divide' is not one of '', add, subtract\n  help: {CALCULATOR_ARGUMENTS}",
+        f"'operation': 'divide' is not one of '', add, subtract\n  help: {INDENTED}",
     )
 
 

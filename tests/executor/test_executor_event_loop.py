@@ -58,6 +58,25 @@ def test_tasks_await_each_other(node: Any, executor: Any) -> None:
     assert two.result() == 'first second'
 
 
+def test_only_the_executor_resumes_a_task(node: Any, executor: Any) -> None:
+    """Since rclpy 7.1.9, a task calls these two when its coroutine yields."""
+    future = Future(executor=executor)
+
+    async def wait() -> None:
+        await future
+
+    task = executor.create_task(wait)
+    executor.spin_once(timeout_sec=0)
+    executor._call_task_in_next_spin(task)
+    task._add_resume_callback(future, executor)
+    assert len(future._callbacks) == 1
+    executor.spin_once(timeout_sec=0)
+    assert not task.done()
+    future.set_result(None)
+    executor.spin_until_future_complete(task, DEADLINE_SEC)
+    assert task.done()
+
+
 @pytest.mark.parametrize('asynchronous', [False, True])
 def test_a_task_runs_with_its_arguments(node: Any, executor: Any, asynchronous) -> None:
     def function(a: int, b: int) -> int:

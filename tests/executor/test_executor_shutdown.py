@@ -23,6 +23,7 @@ from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
 from std_msgs.msg import Empty
 
 from composer.executor import ComposerExecutor
+from composer.executor.c_bindings import Readiness
 from composer.executor.spinner import Notifier
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -149,6 +150,7 @@ def test_signals_end_spin(name: str, how: str, start_program: Any) -> None:
     program = f"""
 import rclpy, time
 from composer.executor import ComposerExecutor
+from composer.executor.c_bindings import Readiness
 from composer.executor.spinner import Notifier
 rclpy.init()
 node = rclpy.create_node('node')
@@ -249,19 +251,16 @@ def test_spin_once_ends_when_the_context_or_executor_ended_right_before_it_waits
     assert not thread.is_alive()
 
 
-def test_spin_ends_when_a_signal_ends_the_context_while_events_are_checked(
+def test_spin_ends_when_a_signal_ends_the_context_while_events_are_asked_for(
     node: Any, executor: Any, context: Context, monkeypatch: Any
 ) -> None:
-    wait_set_thread = executor._spinner.wait_set_thread
-    check_events = wait_set_thread._check_events
+    list_happened = Readiness.list_happened
 
-    def check_in_vain() -> None:
-        if wait_set_thread._seldom.sources:
-            context.handle.shutdown()  # As rclpy's handler of signals does it.
-            wait_set_thread._seldom.due = 0.0
-        check_events()
+    def ask_in_vain(readiness: Any, events: Any) -> Any:
+        context.handle.shutdown()  # As rclpy's handler of signals does it.
+        return list_happened(readiness, events)
 
-    monkeypatch.setattr(wait_set_thread, '_check_events', check_in_vain)
+    monkeypatch.setattr(Readiness, 'list_happened', ask_in_vain)
     node.create_subscription(Empty, 'looked_at', lambda _: None, 1)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()

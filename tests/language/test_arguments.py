@@ -20,11 +20,11 @@ nodes: {}
 """
 
 DECLARED = """the file declares
-    name (string, required): Whose it is.
-    count (integer, default 3)
-    rate (double, default 1.0)
-    loud (bool, default false): Whether it shouts.
-    mode (string, one of '', fast, very slow, default '')"""
+  name (string, required): Whose it is.
+  count (integer, default 3)
+  rate (double, default 1.0)
+  loud (bool, default false): Whether it shouts.
+  mode (string, one of '', fast, very slow, default '')"""
 
 
 def values(*words, text=ARGUMENTS):

@@ -9,8 +9,16 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.checks.environment import find_environment_problems
+from composer.cli.output import wants_colour
 from composer.errors import StartError
-from composer.runtime.environment import check_middleware, environment_set
+from composer.runtime.environment import (
+    check_log_folder,
+    check_middleware,
+    check_shell,
+    environment_set,
+    find_colour,
+)
 
 pytestmark = pytest.mark.ros
 
@@ -148,3 +156,78 @@ def test_another_middleware_than_the_one_loaded_before_is_said():
         f"RMW_IMPLEMENTATION is 'rmw_other_cpp', but this process has loaded '{loaded}' before"
     )
     assert caught.value.help == 'a process has one middleware: run this system in another'
+
+
+UNUSABLE = {
+    ('ROS_DOMAIN_ID', '300'): "ROS_DOMAIN_ID is a number from 0 to 232, not '300'",
+    ('RMW_IMPLEMENTATION', 'rmw_none'): "no middleware 'rmw_none' is installed",
+    ('RCUTILS_COLORIZED_OUTPUT', 'yes'): "RCUTILS_COLORIZED_OUTPUT is 0 or 1, not 'yes'",
+    ('ROS_SECURITY_ENABLE', 'yes'): "ROS_SECURITY_ENABLE is true or false, not 'yes'",
+    ('ROS_STATIC_PEERS', 'x' * 256): 'a peer in ROS_STATIC_PEERS has at most 255 characters',
+}
+
+
+@pytest.mark.parametrize(('name', 'value'), UNUSABLE)
+def test_variables_of_the_shell_are_checked_as_those_of_the_file(monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(StartError) as caught:
+        check_shell({})
+    assert str(caught.value) == f'{UNUSABLE[name, value]} (as the shell has set it)'
+    (problem,) = find_environment_problems({name: value})
+    assert problem[:2] == (name, UNUSABLE[name, value])
+
+
+@pytest.mark.parametrize(
+    ('variables', 'folder', 'problem'),
+    [
+        ({'ROS_LOG_DIR': 'file'}, "'file' (ROS_LOG_DIR)", 'File exists'),
+        ({'ROS_LOG_DIR': '/proc/new'}, "'/proc/new' (ROS_LOG_DIR)", 'No such file or directory'),
+        ({'ROS_HOME': 'file'}, "'file/log' (ROS_HOME)", 'Not a directory'),
+        ({'HOME': ''}, "'~/.ros/log' (HOME)", 'HOME is not set'),
+        ({'HOME': 'file'}, "'~/.ros/log' (HOME)", 'Not a directory'),
+    ],
+)
+def test_a_folder_for_the_log_that_cannot_be_is_an_error(
+    monkeypatch, tmp_path, variables, folder, problem
+):
+    monkeypatch.chdir(tmp_path)
+    Path('file').touch()
+    for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME'):
+        monkeypatch.setenv(name, variables.get(name, ''))
+    with pytest.raises(StartError) as caught:
+        check_log_folder([])
+    assert str(caught.value) == f'ROS cannot keep its log files in {folder}: {problem}'
+    check_log_folder(['--disable-external-lib-logs'])
+
+
+def test_a_wrong_variable_is_an_error_before_anything_starts(compose, monkeypatch):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'subnet')
+    child = compose(SYSTEM.format(domain=1), CODE)
+
+    assert child.wait() == 1
+    assert child.lines == [
+        'error: ROS_AUTOMATIC_DISCOVERY_RANGE is SUBNET or LOCALHOST or OFF or SYSTEM_DEFAULT, '
+        "not 'subnet' (as the shell has set it)",
+        "  help: did you mean 'SUBNET'?",
+    ]
+
+
+@pytest.mark.parametrize(
+    ('variables', 'colour'),
+    [
+        ({'FORCE_COLOR': '1', 'TERM': 'dumb'}, True),
+        ({'FORCE_COLOR': '1', 'NO_COLOR': '1'}, False),
+        ({'TERM': 'dumb'}, False),
+        ({'TERM': 'xterm'}, None),
+    ],
+)
+def test_the_log_has_colours_as_the_shell_asks_for(monkeypatch, variables, colour):
+    for name in ('FORCE_COLOR', 'NO_COLOR', 'TERM', 'RCUTILS_COLORIZED_OUTPUT'):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    expected = {} if colour is None else {'RCUTILS_COLORIZED_OUTPUT': str(int(colour))}
+    assert find_colour() == expected
+    assert wants_colour() == bool(colour)
+    monkeypatch.setenv('RCUTILS_COLORIZED_OUTPUT', '1')
+    assert find_colour() == {}

@@ -42,7 +42,7 @@ def hear(node, message):
 # there before belongs to others, be it that they were killed.
 port = 7400 + 250 * int(os.environ['ROS_DOMAIN_ID'])
 ports = '|'.join(f'port{number}' for number in range(port, port + 250))
-own = re.compile(f'/dev/shm/(?:sem[.])?fastrtps_(?:[0-9a-f]{{16}}|{ports})(?:_el|_mutex)?')
+own = re.compile(f'/dev/shm/(?:sem[.])?fast(?:rtps|dds)_(?:[0-9a-f]{{16}}|{ports})(?:_el|_mutex)?')
 before = {f'/dev/shm/{name}' for name in os.listdir('/dev/shm')}
 files = set()
 

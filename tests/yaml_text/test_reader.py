@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 import composer
 from composer.checks.checker import check_system
+from composer.input_limits import MAX_FILE_BYTES
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system, load_system_text
 from composer.reports.text import render_finding
-from composer.yaml_text.reader import MAX_BYTES, parse_document, read_document
+from composer.yaml_text.reader import parse_document, read_document
 
 SHIPPED = sorted((Path(composer.__file__).parents[1] / 'configs').glob('*.yaml'))
 CATALOGUE = InterfaceCatalogue()
@@ -380,7 +381,7 @@ def test_a_file_of_fifty_megabytes_is_refused(tmp_path):
 def test_a_file_of_the_largest_size_is_read(tmp_path):
     path = tmp_path / 'big.yaml'
     text = b'version: 1\nnodes: {}\n#'
-    path.write_bytes(text + b'x' * (MAX_BYTES - len(text)))
+    path.write_bytes(text + b'x' * (MAX_FILE_BYTES - len(text)))
     assert read_document(path).data == {'version': 1, 'nodes': {}}
 
 

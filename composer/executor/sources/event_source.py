@@ -10,6 +10,7 @@ from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT, EventFd
 from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Group, Scheduler
+from composer.executor.sources.qos_events import QosEventPoll
 
 NOTHING = object()
 """What `EventSource.run` returns when there was nothing to take."""
@@ -57,6 +58,7 @@ class ExecutorParts:
         self.poller = EventPoller()
         self.event_fds = self.poller.event_fds
         self.deadlines = self.poller.deadlines
+        self.qos_event_poll = QosEventPoll(self.deadlines, self.readiness, self.event_fds.lock)
         self.scheduler = Scheduler(max_running, self.poller.wake, self._has_node)
 
     def _has_node(self, node: Any) -> bool:

@@ -126,7 +126,7 @@ class ActionSource(EventSource):
 
 
 class WaitSetSource(EventSource):
-    """An entity whose events only a wait set can see; the wait set thread queues it.
+    """An entity without event callbacks; the wait set thread or a poll queues it.
 
     The entity's `_executor_event` is True from then until it is taken, as in rclpy.
 
@@ -191,6 +191,43 @@ class WaitableSource(WaitSetSource):
         finally:
             self._forget_event()
         return _execute_waitable(self.entity, data, self.parts.executor)
+
+
+class QosEventSource(WaitableSource):
+    """A QoS event for which the wait set thread waits."""
+
+    __slots__ = ()
+
+
+class SeldomQosEventSource(WaitableSource):
+    """A QoS event that need not be handled at once; `QosEventPoll` queues it."""
+
+    __slots__ = ('rmw_event',)
+
+    def open(self) -> None:
+        """See the base class."""
+        super().open()
+        with self.entity:
+            wait_set = _create_wait_set_of(self.entity, self.parts.executor.context)
+            self.rmw_event = c_bindings.find_rmw_event(wait_set)
+        self.parts.qos_event_poll.add(self)
+
+    def close(self) -> None:
+        """See the base class."""
+        super().close()
+        self.parts.qos_event_poll.remove(self)
+
+    def set_ready(self) -> None:
+        """See the base class."""
+        self.entity.is_ready(_HasHappened())  # Otherwise it takes nothing.
+        super().set_ready()
+
+
+class _HasHappened:
+    """A wait set as it looks to a QoS event that has happened."""
+
+    def is_ready(self, _kind: str, _index: int) -> bool:
+        return True
 
 
 def create_wait_set(sizes: tuple[int, ...], context: Any) -> Any:

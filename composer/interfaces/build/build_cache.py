@@ -27,6 +27,7 @@ from composer.ament import BUILD_MANIFEST
 from composer.errors import ComposerError
 from composer.interfaces.build.manifest import is_intact, read_manifest, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.signals import interrupting
 
 # Raise it whenever the builder builds something else from the same definitions.
 BUILDER_FORMAT = 2
@@ -136,7 +137,8 @@ def provide_cached(
     place = find_cache() / name
     try:
         if not is_intact(place):
-            _provide(place, environment, build, progress)
+            with interrupting():
+                _provide(place, environment, build, progress)
         with suppress(OSError):
             # The time of the last use, for `list_built`.
             (place / BUILD_MANIFEST).touch()

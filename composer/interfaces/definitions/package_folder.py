@@ -10,6 +10,12 @@ from pathlib import Path
 from typing import Final
 
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
+from composer.input_limits import (
+    MAX_DEFINITION_BYTES,
+    MAX_PACKAGE_BYTES,
+    UnreadableFileError,
+    read_file,
+)
 from composer.interfaces.definitions.definition_parser import (
     DefinitionSyntaxError,
     load_parser,
@@ -92,6 +98,7 @@ class _Reading:
     interfaces: dict[str, InterfaceDescription] = field(default_factory=dict)
     references: list[TypeReference] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    bytes_left: int = MAX_PACKAGE_BYTES
 
 
 def load_definitions(package: str, folder: Path) -> PackageDefinitions:
@@ -158,11 +165,11 @@ def _read_file(reading: _Reading, path: Path) -> None:
 
 def _read_text(reading: _Reading, path: Path) -> str:
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        message = f'cannot be read: {error.strerror}'
-        reading.diagnostics.append(_about_file(path, 'unreadable', message))
+        data = read_file(path, min(MAX_DEFINITION_BYTES, reading.bytes_left))
+    except UnreadableFileError as error:
+        reading.diagnostics.append(_about_file(path, 'unreadable', str(error)))
         return ''
+    reading.bytes_left -= len(data)
     try:
         return data.decode()
     except UnicodeDecodeError as error:

@@ -130,10 +130,17 @@ def _locate_file(text: str, place: Span) -> Path:
         PathError: There is no such file.
     """
     path = resolve_path(text, place.source.folder)
-    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises for names that are too long
+    if not _is_there(path):
         message = f"there is no file '{shown_path(path)}'"
         raise PathError(message, help=suggest(path.name, list_neighbours(path), 'there are'))
     return path
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether there is something to read, although reading may fail."""
+    # The functions of pathlib raise for names that are too long.
+    leads_back = os.path.islink(path) and not os.path.exists(os.path.realpath(path))  # noqa: PTH110, PTH114
+    return (os.path.exists(path) or leads_back) and not os.path.isdir(path)  # noqa: PTH110, PTH112
 
 
 def _allowed(namespace: str) -> str:

@@ -6,11 +6,13 @@ include says beside (`namespace`, `remap`) applies to all that comes out of it.
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import diagnostic_at
-from composer.expressions import MAX_ENTRIES, SECTIONS
+from composer.diagnostics import diagnostic_at, errors_first
+from composer.expressions import SECTIONS
+from composer.input_limits import MAX_ENTRIES, MAX_FINDINGS, MAX_INCLUDE_DEPTH, MAX_VALUES
 from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
@@ -18,13 +20,29 @@ from composer.language.loaded_system import LoadedSystem
 from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
     from typing import Any
 
     from composer.diagnostics import Diagnostic
     from composer.language.arguments import GiveValues
     from composer.yaml_text.document import Document
+
+
+# How often an entry may be merged on average: once for each file around it.
+_MOST_MERGED = 2
+
+
+class _TooLargeError(Exception):
+    """The system has too many entries.
+
+    Attributes:
+        findings: What says so.
+    """
+
+    def __init__(self, findings: Iterable[Diagnostic]) -> None:
+        super().__init__()
+        self.findings = list(findings)
 
 
 class Includer:
@@ -42,23 +60,29 @@ class Includer:
     ) -> None:
         self._system = system
         self._load_file = load_file
-        self._documents: dict[Path, Document] = {}
+        self._documents: dict[str, Document] = {}
         self._limit = system.entries.get('max_nodes', MAX_ENTRIES)
         self._inclusions = 0
+        # Entries that were merged, once for each file around them.
+        self._merged = 0
+        self._values = 0
         # Entries and includes that were read although they are left out.
         self._left_out = 0
 
     def include_all(self) -> None:
         """Add all that the file includes to it."""
-        self._include(self._system, (self._system.path,), is_left_out=False)
+        try:
+            self._include(self._system, (_real(self._system.path),), is_left_out=False)
+        except _TooLargeError as error:
+            self._system.diagnostics += error.findings
+            # The rest would take long, and its findings may have no other cause.
+            self._system.data = None
 
-    def _include(
-        self, system: LoadedSystem, stack: tuple[Path, ...], *, is_left_out: bool
-    ) -> None:
+    def _include(self, system: LoadedSystem, stack: tuple[str, ...], *, is_left_out: bool) -> None:
         """Add what a file includes to it.
 
         Args:
-            stack: The file, and those that it is included in, innermost first.
+            stack: The file, and those that it is included in, innermost first, without links.
             is_left_out: Whether it is read for its errors alone.
         """
         entries = system.entries.pop('include', {})
@@ -67,64 +91,80 @@ class Includer:
             aside = is_left_out or entry.is_left_out
             if aside and self._left_out > self._limit:
                 break
+            self._inclusions += not aside
+            self._check_size(entry)
             part = self._read(entry, stack, is_left_out=aside)
             if part is None:
                 system.dropped.add(entry.at)
                 continue
-            system.diagnostics += [each.with_related((entry.here,)) for each in part.diagnostics]
+            system.diagnostics += _found_in(part, entry)
             if entry.is_left_out:
                 part.leave_out_all()
             merger.add(Inclusion(part, entry, entry.find_namespace()))
+            brought = 1 + sum(len(part.entries.get(each, ())) for each in SECTIONS)
+            self._values += len(part.positions.values)
             if aside:
-                self._left_out += 1 + sum(len(part.entries.get(each, ())) for each in SECTIONS)
-            elif self._is_too_large(entry):
-                break
+                self._left_out += brought
+            else:
+                self._merged += brought
+            self._check_size(entry)
 
-    def _is_too_large(self, entry: IncludeEntry) -> bool:
-        """Return whether a system has grown beyond its limit; report it once."""
-        if self._inclusions > self._limit:
-            return True
-        self._inclusions += 1
+    def _check_size(self, entry: IncludeEntry) -> None:
+        """Raise if the system has grown beyond its limit."""
         counts = {each: _count_used(entry.system, each, self._limit) for each in SECTIONS}
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
-        if counts[section] <= self._limit:
-            return False
-        self._inclusions = self._limit + 1
-        message = f'{section} has more than {self._limit:,} entries in all files together'
+        most_entries = _MOST_MERGED * max(self._limit, MAX_ENTRIES)
+        most_values = _MOST_MERGED * MAX_VALUES
+        if counts[section] > self._limit:
+            message = f'{section} has more than {self._limit:,} entries in all files together'
+        elif self._merged > most_entries:
+            message = f'includes in includes bring more than {most_entries:,} entries'
+        elif self._values > most_values:
+            message = f'the includes bring more than {most_values:,} keys and values'
+        else:
+            return
         help_text = "raise 'max_nodes' at the top of the file if that is intended"
-        entry.report('too-many-entries', message, help_text)
-        return True
+        finding = diagnostic_at(entry.span, 'too-many-entries', message, help=help_text)
+        raise _TooLargeError([finding])
 
     def _read(
-        self, entry: IncludeEntry, stack: tuple[Path, ...], *, is_left_out: bool
+        self, entry: IncludeEntry, stack: tuple[str, ...], *, is_left_out: bool
     ) -> LoadedSystem | None:
         """Return what an include brings; report it if nothing can be read, and return `None`."""
         path = entry.find_file()
         if path is None:
             return None
-        if path.resolve() in [each.resolve() for each in stack]:
+        real = _real(path)
+        if real in stack:
             entry.report('include-cycle', f"'{entry.file}' includes itself")
             return None
-        part = LoadedSystem.of(self._document(path), path)
+        if len(stack) > MAX_INCLUDE_DEPTH:
+            message = f'files include each other more than {MAX_INCLUDE_DEPTH} levels deep'
+            entry.report('too-deep', message)
+            return None
+        part = LoadedSystem.of(self._document(path, real), path)
         if part.data is None:
-            entry.system.diagnostics += [
-                each.with_related((entry.here,)) for each in part.diagnostics
-            ]
+            entry.system.diagnostics += _found_in(part, entry)
             return None
         self._load_file(part, partial(values_from_include, place=entry))
+        if part.data is None:
+            raise _TooLargeError(_found_in(part, entry))
         if not is_left_out:
             part.diagnostics += self._find_unset(part)
         # An included file may ask for more; one that asks for nothing changes nothing.
         self._limit = max(self._limit, part.entries.get('max_nodes', 0))
-        self._include(part, (path, *stack), is_left_out=is_left_out)
+        try:
+            self._include(part, (real, *stack), is_left_out=is_left_out)
+        except _TooLargeError as error:
+            others = (each.with_related((entry.here,)) for each in error.findings)
+            raise _TooLargeError([*_found_in(part, entry), *others]) from error
         return part
 
-    def _document(self, path: Path) -> Document:
-        resolved = path.resolve()
-        if resolved not in self._documents:
-            self._documents[resolved] = read_document(path, shown_path(path))
-        return self._documents[resolved]
+    def _document(self, path: Path, real: str) -> Document:
+        if real not in self._documents:
+            self._documents[real] = read_document(path, shown_path(path))
+        return self._documents[real]
 
     def _find_unset(self, part: LoadedSystem) -> Iterator[Diagnostic]:
         """Yield warnings of environment variables that only the started file could set."""
@@ -137,6 +177,18 @@ class Includer:
                     f"'{name}' is not set: only the environment of the main file counts",
                     help="set it in that file, or for a process under 'env'",
                 )
+
+
+def _found_in(part: LoadedSystem, entry: IncludeEntry) -> list[Diagnostic]:
+    """Return the findings of an included file for the file around it, as many as are shown."""
+    room = max(MAX_FINDINGS + 1 - len(entry.system.diagnostics), 0)
+    first = errors_first(part.diagnostics)[:room]
+    return [each.with_related((entry.here,)) for each in first]
+
+
+def _real(path: Path) -> str:
+    # As Path.resolve, but for links that lead back to themselves.
+    return os.path.realpath(path)
 
 
 def _used_first(entries: Mapping[str, dict[str, Any]], system: LoadedSystem) -> list[IncludeEntry]:

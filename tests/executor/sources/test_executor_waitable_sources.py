@@ -22,7 +22,7 @@ from spinning import DEADLINE_SEC, spinning, wait_for
 from std_msgs.msg import Empty
 from test_msgs.action import Fibonacci
 
-from composer.executor import wait_set_thread
+from composer.executor import checked_seldom, wait_set_thread
 from composer.executor.wait_set_thread import WaitSetThread
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -296,3 +296,82 @@ def test_an_action_server_may_be_destroyed_by_its_goal(
         wait_for(sent.done)
         assert sent.result().accepted
     assert not errors
+
+
+class _Waits:
+    """Counts the waits of an executor's wait set thread."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.count = 0
+        wait = WaitSetThread._wait
+
+        def count_wait(thread: Any, max_sec: float | None) -> None:
+            self.count += 1
+            wait(thread, max_sec)
+
+        monkeypatch.setattr(WaitSetThread, '_wait', count_wait)
+
+
+def test_a_qos_event_is_waited_for_and_not_asked_for(
+    node: Any, executor: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits = _Waits(monkeypatch)
+    matched: list[int] = []
+    for number in range(200):
+        callbacks = SubscriptionEventCallbacks(
+            matched=lambda _, number=number: matched.append(number), use_default_callbacks=False
+        )
+        node.create_subscription(
+            Empty, f'topic_{number}', lambda _: None, 1, event_callbacks=callbacks
+        )
+    with spinning(executor):
+        for number in range(0, 200, 20):
+            node.create_publisher(Empty, f'topic_{number}', 1)
+            wait_for(lambda number=number: number in matched)
+        # Nothing else happens, so it waits.
+        wait_for(lambda: _is_constant(lambda: waits.count))
+    assert matched == list(range(0, 200, 20))
+
+
+def _is_constant(read: Callable[[], int]) -> bool:
+    before = read()
+    time.sleep(0.3)
+    return read() == before
+
+
+def test_qos_events_do_not_cost_a_wake_up_for_each_message(
+    node: Any, executor: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wait_set_thread, '_PAUSE_SEC', 10 * DEADLINE_SEC)
+    waits = _Waits(monkeypatch)
+    got: list[int] = []
+    callbacks = SubscriptionEventCallbacks(liveliness=lambda _: None)
+    node.create_subscription(Empty, 'busy', lambda _: got.append(1), 1, event_callbacks=callbacks)
+    publisher = node.create_publisher(Empty, 'busy', 1)
+    with spinning(executor):
+        wait_for(lambda: publisher.get_subscription_count() == 1)
+        wait_for(lambda: _is_constant(lambda: waits.count))
+        before = waits.count
+        for count in range(1, 100):
+            publisher.publish(Empty())
+            wait_for(lambda count=count: len(got) == count)
+        assert waits.count - before < 10
+
+
+def test_thousands_of_default_events_are_asked_for_in_turn(node: Any, executor: Any) -> None:
+    warned: list[int] = []
+    best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+    @checked_seldom
+    def note(_: Any) -> None:
+        warned.append(1)
+
+    for number in range(150):
+        callbacks = SubscriptionEventCallbacks(incompatible_qos=note)
+        node.create_subscription(
+            Empty, f'topic_{number}', lambda _: None, 1, event_callbacks=callbacks
+        )
+    with spinning(executor):
+        for number in (0, 149):
+            node.create_publisher(Empty, f'topic_{number}', best_effort)
+        wait_for(lambda: len(warned) == 2)

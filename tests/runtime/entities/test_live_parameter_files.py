@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 import rclpy
+import rclpy.node
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
@@ -122,10 +123,12 @@ def load_by_rcl(context, *paths, name='arm', namespace='/robot'):
     """Return what rclpy reads for a node, `None` if rcl refuses a file."""
     node_class = rclpy.node._rclpy.Node
     arguments = [part for path in paths for part in ('--params-file', str(path))]
+    profile = getattr(rclpy.qos, 'qos_profile_rosout_default', None)  # Since rclpy 9.
+    rosout = [] if profile is None else [profile.get_c_qos_profile()]
     with context.handle:
         try:
             handle = node_class(
-                name, namespace, context.handle, ['--ros-args', *arguments], False, False
+                name, namespace, context.handle, ['--ros-args', *arguments], False, False, *rosout
             )
         except rclpy.node._rclpy.RCLInvalidROSArgsError:
             return None

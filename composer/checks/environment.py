@@ -1,0 +1,74 @@
+"""The environment variables that ROS reads: those of a file, and those of the shell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.ament import ament_prefixes
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+
+_RMW_INDEX = 'share/ament_index/resource_index/rmw_typesupport'
+# What of that index are no middlewares themselves.
+_NO_RMW = ('rmw_implementation',)
+_MIDDLEWARES = ('RMW_IMPLEMENTATION', 'RCL_ASSERT_RMW_ID_MATCHES')
+# The highest domain whose ports exist (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html).
+_MAX_DOMAIN = 232
+# With any other value ROS complains, loses its log, or does without what is asked for (`logging.c`
+# of rcutils, `security.c` of rcl, `discovery_options.c` of rmw).
+_CHOICES = {
+    'RCUTILS_COLORIZED_OUTPUT': ('0', '1'),
+    'RCUTILS_LOGGING_BUFFERED_STREAM': ('0', '1'),
+    'RCUTILS_LOGGING_USE_STDOUT': ('0', '1'),
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': ('SUBNET', 'LOCALHOST', 'OFF', 'SYSTEM_DEFAULT'),
+    'ROS_LOCALHOST_ONLY': ('0', '1'),
+    'ROS_SECURITY_ENABLE': ('true', 'false'),
+    'ROS_SECURITY_STRATEGY': ('Enforce', 'Permissive'),
+}
+_LONGEST_PEER = 255
+
+
+def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check the values that a file gives to the variables that ROS reads."""
+    for name, message, advice in find_environment_problems(context.spec.environment):
+        yield context.at_value(('environment', name), 'bad-environment', message, help=advice)
+
+
+def find_environment_problems(
+    variables: Mapping[str, str],
+) -> Iterator[tuple[str, str, str | None]]:
+    """Yield the variables that ROS cannot use, each with a message and help.
+
+    Variables that are empty count as not set, as they do for ROS.
+    """
+    domain = variables.get('ROS_DOMAIN_ID')
+    if domain and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
+        message = f'ROS_DOMAIN_ID is a number from 0 to {_MAX_DOMAIN}, not {domain!r}'
+        yield 'ROS_DOMAIN_ID', message, None
+    installed = installed_middlewares()
+    for name in _MIDDLEWARES:
+        middleware = variables.get(name)
+        if middleware and installed and middleware not in installed:
+            message = f"no middleware '{middleware}' is installed"
+            message = message if name == _MIDDLEWARES[0] else f'{name}: {message}'
+            yield name, message, suggest(middleware, installed, 'there are')
+    for name, choices in _CHOICES.items():
+        value = variables.get(name)
+        if value and value not in choices:
+            yield name, f'{name} is {" or ".join(choices)}, not {value!r}', suggest(value, choices)
+    for peer in variables.get('ROS_STATIC_PEERS', '').split(';'):
+        if len(peer) > _LONGEST_PEER:
+            message = f'a peer in ROS_STATIC_PEERS has at most {_LONGEST_PEER} characters'
+            yield 'ROS_STATIC_PEERS', message, None
+
+
+def installed_middlewares() -> list[str]:
+    """Return the RMW implementations that ROS can load; none without ROS."""
+    folders = [prefix / _RMW_INDEX for prefix in ament_prefixes()]
+    names = {entry.name for folder in folders if folder.is_dir() for entry in folder.iterdir()}
+    return sorted(names.difference(_NO_RMW))

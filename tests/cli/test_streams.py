@@ -1,0 +1,66 @@
+"""Standard streams that a shell has closed, or that take nothing, for every command."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.running import ROOT
+
+BAD = 'composer/rules/bad-key/bad.yaml'
+# Each with the exit code where all streams are open.
+COMMANDS = {
+    'check configs/greeter.yaml': 0,
+    f'check --format json {BAD}': 1,
+    f'up {BAD}': 1,
+    'show configs/greeter.yaml': 0,
+    'graph configs/greeter.yaml': 0,
+    'explain': 0,
+    '--help': 0,
+    'unknown': 2,
+}
+FULL = 'error: cannot write the output: No space left on device\n'
+
+
+@pytest.fixture(scope='module')
+def run_all():
+    """Run all commands with a redirection; return exit code and output of each."""
+
+    def run_all(redirection):
+        script = ''.join(
+            f'"$0" -m composer {command} {redirection}; echo "=== $?"; echo "===" >&2\n'
+            for command in COMMANDS
+        )
+        result = subprocess.run(
+            ['sh', '-c', script, sys.executable],
+            cwd=ROOT,
+            env=os.environ | {'PYTHONPATH': str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=200,
+            check=True,
+        )
+        codes = [line for line in result.stdout.splitlines() if line.startswith('=== ')]
+        errors = result.stderr.split('===\n')
+        assert not [text for text in errors if 'bug' in text or 'Traceback' in text]
+        return [int(code.removeprefix('=== ')) for code in codes], errors[:-1]
+
+    return run_all
+
+
+@pytest.mark.parametrize('redirection', ['>&-', '2>&-', '<&-', '>&- 2>&- <&-', '2>/dev/full'])
+def test_without_a_stream_the_exit_code_is_the_same(run_all, redirection):
+    codes, _ = run_all(redirection)
+    if redirection == '2>/dev/full':
+        # What is said there cannot be said.
+        assert [bool(code) for code in codes] == [bool(code) for code in COMMANDS.values()]
+    else:
+        assert codes == list(COMMANDS.values())
+
+
+def test_a_full_standard_output_is_an_ordinary_error(run_all):
+    codes, errors = run_all('>/dev/full')
+    written = [command not in (f'up {BAD}', 'unknown') for command in COMMANDS]
+    assert codes == [2 if command == 'unknown' else 1 for command in COMMANDS]
+    assert [FULL in error for error in errors] == written
