@@ -112,7 +112,7 @@ began = threading.Semaphore(0)
 def work(number):
     began.release()
     time.sleep(0.5)
-    print(number, flush=True)
+    print(f'{number} ', end='', flush=True)
 for number in range(20):
     executor.create_task(work, number)
 threading.Thread(target=executor.spin, daemon=True).start()
