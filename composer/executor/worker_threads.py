@@ -19,7 +19,7 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from composer.executor.after_fork import end_child
-from composer.executor.c_bindings import TimerFd
+from composer.executor.descriptors import LostDescriptorError, TimerFd
 
 if TYPE_CHECKING:
     from composer.executor.scheduler import Session
@@ -197,7 +197,7 @@ class WorkerThreads:
         if not self._timer_is_set or now > self._put_off_at:
             self._timer_is_set = True
             self._put_off_at = now + TAKEOVER_SEC / 2
-            self._timer.expire_in(_TAKEOVER_NS)
+            self._wake_in(_TAKEOVER_NS)
 
     def let_standby_sleep(self, worker: Worker) -> None:
         """Disarm the standby's timer: `worker` leads and will wait, and others want the GIL."""
@@ -297,7 +297,14 @@ class WorkerThreads:
         if self._standby is not None:
             self._timer_is_set = True
             self._put_off_at = math.inf
-            self._timer.expire_in(1)
+            self._wake_in(1)
+
+    def _wake_in(self, delay_ns: int) -> None:
+        """Wake the standby in `delay_ns`; what prevents it ends the spin."""
+        try:
+            self._timer.expire_in(delay_ns)
+        except LostDescriptorError as error:
+            self._report(error)
 
     def _stand_by(self, me: Worker) -> None:
         while True:
@@ -328,5 +335,5 @@ class WorkerThreads:
         if left <= 0:
             return True
         self._timer_is_set = True
-        self._timer.expire_in(int(left * 1e9))
+        self._wake_in(int(left * 1e9))
         return False

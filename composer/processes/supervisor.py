@@ -24,9 +24,8 @@ from composer.processes.reaper_client import ReaperConnection
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from rclpy.impl.rcutils_logger import RcutilsLogger
-
     from composer.language.specs import ProcessSpec
+    from composer.terminal import EscapingLogger
 
 # How long the last output of a process is waited for.
 _LAST_OUTPUT_SEC = 1.0
@@ -52,7 +51,7 @@ class ProcessSupervisor:
     def __init__(
         self,
         specs: Iterable[ProcessSpec],
-        logger: RcutilsLogger,
+        logger: EscapingLogger,
         end_system: Callable[[int], None],
         timeout_sec: float,
         ros_arguments: Sequence[str] = (),
@@ -215,7 +214,6 @@ class ProcessSupervisor:
                 self._end_system(ExitCode.FAILED)
 
     def _log(self, text: str, *, is_error: bool) -> None:
-        # A logger of rclpy accepts only one level from each line of code.
         if is_error:
             self._logger.error(text)
         else:

@@ -13,11 +13,11 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
+from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -74,7 +74,9 @@ class System:
             self._context, spec.threads, log=system_logger.error, on_lost=self._on_lost
         )
         reserve(self._executor, 'the executor', 'shutdown')
-        self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
+        self._hang_watcher = HangWatcher(
+            lambda: list(self._nodes.values()), _limits(spec), self._executor.errors
+        )
         self._graph_watcher = GraphWatcher(self._endpoints)
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._handle = self._create_handle(positions, functions, ros_arguments)
@@ -161,8 +163,9 @@ class System:
             return
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
-        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
+        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
         self._parameter_services.begin()
 
@@ -186,6 +189,7 @@ class System:
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
             node.errors.flush()
+        self._executor.errors.flush()
         if ended:
             self._end_graph()
         self.has_ended = ended

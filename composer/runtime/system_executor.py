@@ -12,6 +12,7 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
+from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -36,6 +37,9 @@ class SystemExecutor(ComposerExecutor):
             others; `None` for no limit.
         log: Takes the text of an error outside all behaviours, after which the executor goes on.
         on_lost: Called when the context was shut down before `stop`.
+
+    Attributes:
+        errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
@@ -49,7 +53,7 @@ class SystemExecutor(ComposerExecutor):
             # rclpy warns of a single thread, but means its own executors.
             warnings.simplefilter('ignore', UserWarning)
             super().__init__(threads, context=context)
-        self._log = log
+        self.errors = ErrorReporter(log)
         self._on_lost = on_lost
         self._is_stopped = False
         self._thread = threading.Thread(
@@ -75,7 +79,7 @@ class SystemExecutor(ComposerExecutor):
         if not isinstance(error, NoResponseError):
             # An error raised here would end the thread that spins.
             with suppress(Exception):
-                self._log(format_internal_error(error))
+                self.errors.report('a callback', error, format_internal_error)
 
     def _keep_spinning(self) -> None:
         self._spin_on()

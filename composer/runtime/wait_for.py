@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from composer.errors import StartError
 from composer.names import expand_name, remap_name
-from composer.runtime.ros_graph import RosGraph, create_graph_node, describe_graph
+from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -14,7 +14,7 @@ from spinning import spinning, wait_for
 from std_msgs.msg import Empty
 
 from composer.executor import event_fds
-from composer.executor.c_bindings import write_eventfd
+from composer.executor.descriptors import write_eventfd
 from composer.executor.event_poller import EventPoller
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.

@@ -108,15 +108,20 @@ class HangWatcher(Watcher):
     Args:
         nodes: Returns the present nodes.
         limits_sec: The limits of all entities.
+        errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
-        self, nodes: Callable[[], Iterable[WatchedNode]], limits_sec: Iterable[float | None]
+        self,
+        nodes: Callable[[], Iterable[WatchedNode]],
+        limits_sec: Iterable[float | None],
+        errors: ErrorReporter,
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
         pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
         super().__init__('composer-watch', self._check_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
         self._nodes = nodes
+        self._errors = errors
 
     def _check_calls(self) -> None:
         for node in self._nodes():
@@ -124,3 +129,4 @@ class HangWatcher(Watcher):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
                     limit.check(node.running, token, RunningCall(*entry))
             node.errors.flush_old()
+        self._errors.flush_old()

@@ -17,6 +17,7 @@ from composer.executor import checked_seldom
 from composer.language.qos_conflicts import find_qos_conflicts
 from composer.runtime.health.watcher import Watcher
 from composer.runtime.messages.qos_profiles import read_policies
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -113,7 +114,7 @@ class TopicEndpoint:
     def _report(self, name: str, reason: str) -> None:
         what = 'sends nothing to' if self._publishes else 'gets nothing from'
         owner = f"{self._noun} '{self._spec.name}' ({self._place})"
-        self.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
+        EscapingLogger(self.ros.get_logger()).warning(f"{owner} {what} '{name}': {reason}")
 
     def _find_reason(self, end: TopicEndpointInfo) -> str | None:
         """Return why another end cannot match this one, `None` if it can."""

@@ -31,6 +31,7 @@ from composer.runtime.nodes.callback_groups import (
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -155,7 +156,7 @@ class LiveNode:
                 return
             if health is not None:
                 health.note_error(error)
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
@@ -188,7 +189,7 @@ class LiveNode:
         def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             if failed is not None:
                 failed(error)
 
@@ -266,7 +267,7 @@ class LiveNode:
 
     def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
         if owner not in self.limits:
-            warn = self.ros.get_logger().warning
+            warn = EscapingLogger(self.ros.get_logger()).warning
             self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
 
@@ -288,7 +289,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         system,
         ros,
         behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
-        errors=ErrorReporter(ros.get_logger().error),
+        errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
         entities=entities,
         waits=waits,
         background=background,

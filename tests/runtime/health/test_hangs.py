@@ -133,7 +133,7 @@ def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends
 
     for name, functions in HANGING.items():
         lines = stack_after(child, reports[name]).splitlines()
-        stack = [text for text in lines if text.startswith('  File')]
+        stack = [text for text in lines if text.startswith('    File')]
         assert [text.rpartition(' in ')[2] for text in stack if 'parts.py' in text] == functions
         assert 'composer/' not in stack[0]
     assert len(child.matching('has been running for')) == len(HANGING)
