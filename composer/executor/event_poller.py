@@ -10,7 +10,6 @@ from time import monotonic
 from composer.executor.after_fork import replace_descriptors
 from composer.executor.deadlines import Deadlines
 from composer.executor.descriptors import (
-    EPOLL,
     TIMER,
     LostDescriptorError,
     peek_epoll,
