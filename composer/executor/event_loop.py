@@ -100,6 +100,7 @@ class EventLoop:
         self._registry.refresh_if_stale()
         self._runner.resume_paused()
         if any(session.admits_one for session in sessions):
+            self._registry.flush()
             self._parts.poller.peek()
         while self._execute_ready(me) and any(map(_is_waiting, sessions)):
             pass  # What was ready had nothing to take.

@@ -158,8 +158,6 @@ class Spinner:
         with self._executor.waiting():
             try:
                 self.wait_set_thread.add_user(session)
-                if session.admits_one:
-                    self.wait_set_thread.flush_if_used()
                 if is_watched:
                     self._loop.watchers.add(session)
                 self.scheduler.open_session(session)
