@@ -39,7 +39,6 @@ Callbacks, takes and waits run under none.
 
 from composer.executor.composer_executor import ComposerExecutor
 from composer.executor.descriptors import LostDescriptorError
-from composer.executor.sources.event_source import MissedCounts
 from composer.executor.sources.qos_events import checked_seldom
 
-__all__ = ['ComposerExecutor', 'LostDescriptorError', 'MissedCounts', 'checked_seldom']
+__all__ = ['ComposerExecutor', 'LostDescriptorError', 'checked_seldom']

@@ -15,9 +15,13 @@ from rclpy.task import Future, Task
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
 from composer.executor.scheduler import ExecutorTask, ScheduledTask
+<<<<<<< HEAD
 from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
+=======
+from composer.executor.spinner import GRACE_SEC, Spinner
+>>>>>>> main
 
 _MAX_THREADS = 256
 
@@ -106,13 +110,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.scheduler.retry_suspended()
         self.wake()
 
-    def missed_counts(self, node: Any, entity: Any) -> MissedCounts:
-        """Return what a subscription or timer of `node` missed because callbacks took too long.
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Have `observer` told of what comes to a subscription or a timer of `node`.
 
-        Counting begins when the executor listens to the entity; before, it has missed nothing.
+        It is a guest: a `QueueObserver` or a `TickObserver` (`sources.entity_sources`).
         """
-        source = self._spinner.registry.source_of(node, entity)
-        return MissedCounts() if source is None else source.missed_counts()
+        self._spinner.registry.observe(node, entity, observer)
 
     def wake(self) -> None:
         """Look again at the entities, their groups, the context and what is waited for."""

@@ -94,14 +94,24 @@ class RunningCalls:
     Attributes:
         entries: The calls, by tokens; `None` for work that has no stack of its own.
         tokens: The token of the next entry.
+        last: Whose call ended last, and when it had begun, by `time.monotonic_ns`.
         has_listeners: Whether somebody must be told when an entry is removed.
     """
 
-    __slots__ = ('_changed', '_end_listeners', '_waiters', 'entries', 'has_listeners', 'tokens')
+    __slots__ = (
+        '_changed',
+        '_end_listeners',
+        '_waiters',
+        'entries',
+        'has_listeners',
+        'last',
+        'tokens',
+    )
 
     def __init__(self) -> None:
         self.entries: dict[int, _CallEntry | None] = {}
         self.tokens = itertools.count()
+        self.last: tuple[Owner, int] | None = None
         self.has_listeners = False
         self._waiters = 0
         self._end_listeners: dict[int, Callable[[], None]] = {}

@@ -22,6 +22,7 @@ from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
+from composer.runtime.health.missed import count_missed
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     Gate,
@@ -239,7 +240,7 @@ class LiveNode:
         """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
-            health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
+            health.follow(count_missed(self.system.executor, self.ros, entity))
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""
