@@ -15,13 +15,8 @@ from rclpy.task import Future, Task
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
 from composer.executor.scheduler import ExecutorTask, ScheduledTask
-<<<<<<< HEAD
-from composer.executor.sources.event_source import MissedCounts
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
-=======
-from composer.executor.spinner import GRACE_SEC, Spinner
->>>>>>> main
 
 _MAX_THREADS = 256
 
