@@ -69,6 +69,10 @@ class EntityRegistry:
         if self.is_stale:
             self.refresh()
 
+    def flush(self) -> None:
+        """Return when what only the wait set thread sees is queued, if it was triggered before."""
+        self._wait_set_thread.flush_if_used()
+
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
         with self._lock:
