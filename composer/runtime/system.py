@@ -103,6 +103,7 @@ class System:
             spec.shutdown_timeout_sec,
             ros_arguments,
             log_levels,
+            is_alone=not spec.nodes,
         )
         self._stop_request.kill_processes = self._processes.kill_all
 
@@ -177,6 +178,7 @@ class System:
         self._stop_request.system_is_up = True
         system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
+        self._processes.tell_ends()
         self._parameter_services.begin()
 
     def wait(self) -> None:
@@ -214,7 +216,7 @@ class System:
         if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
-            node.errors.flush()
+            node.flush_counts()
         self._executor.errors.flush()
         if ended:
             self._end_graph()

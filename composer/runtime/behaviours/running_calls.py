@@ -8,11 +8,16 @@ from dataclasses import dataclass
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from composer.runtime.behaviours.stacks import format_coroutine, format_thread
+from composer.runtime.behaviours.stacks import (
+    coroutine_codes,
+    format_coroutine,
+    format_thread,
+    thread_codes,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import CoroutineType
+    from collections.abc import Callable, Iterator
+    from types import CodeType, CoroutineType
 
 
 class Progress:
@@ -74,6 +79,12 @@ class RunningCall:
         if self.progress is None:
             return self.begun_ns
         return max(self.begun_ns, self.progress.resumed_ns)
+
+    def codes(self) -> Iterator[CodeType]:
+        """Yield the code of each call that it is in now."""
+        if self.coroutine is not None:
+            return coroutine_codes(self.coroutine)
+        return thread_codes(self.thread or 0)
 
     def format_stack(self) -> str:
         """Return where it is now, innermost call last."""
