@@ -64,7 +64,7 @@ class ErrorReporter:
             else:
                 count.shown.add(kind)
                 earlier = f'{_format_count(who, count)}\n' if count.unreported else ''
-                text = f'{earlier}{who} raised {summary}\n{format_error(error)}'
+                text = f'{earlier}{who} raised {summary}\n{format_error(error)}'.rstrip()
             count.last_line = now
         self._log(text)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.running_calls import RunningCall
+from composer.runtime.behaviours.waits import CODES_OF_ABSENCE
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -63,6 +64,9 @@ class HangLimit:
         now_ns = monotonic_ns()
         ran_sec = (now_ns - call.since_ns) * 1e-9
         if self.after_sec is None or ran_sec < self.after_sec:
+            return
+        if any(code in CODES_OF_ABSENCE for code in call.codes()):
+            # What it waits for is logged instead.
             return
         if now_ns * 1e-9 < self._quiet_until:
             self._skipped.add(token)
