@@ -46,7 +46,19 @@ _KINDS = {
 
 
 class UnreadableFileError(ComposerError):
-    """A file does not exist, cannot be read, is no regular file, or is too large."""
+    """A file does not exist, cannot be read, is no regular file, or is too large.
+
+    Attributes:
+        is_too_large: Whether only its size is the reason.
+    """
+
+    is_too_large = False
+
+
+class FileTooLargeError(UnreadableFileError):
+    """A file is larger than what is read."""
+
+    is_too_large = True
 
 
 def read_file(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
@@ -87,5 +99,5 @@ def _open_without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
 
 
-def _too_large(limit: int) -> UnreadableFileError:
-    return UnreadableFileError(f'the file is larger than {format_size(limit)}')
+def _too_large(limit: int) -> FileTooLargeError:
+    return FileTooLargeError(f'the file is larger than {format_size(limit)}')

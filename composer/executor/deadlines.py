@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from rclpy.clock import JumpThreshold, ROSClock
 from rclpy.duration import Duration
 
-from composer.executor.c_bindings import TimerFd
+from composer.executor.descriptors import TimerFd
 
 _ANY_JUMP = JumpThreshold(
     min_forward=Duration(nanoseconds=1),

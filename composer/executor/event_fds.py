@@ -22,7 +22,7 @@ from typing import Protocol
 
 from rclpy.exceptions import InvalidHandle
 
-from composer.executor.c_bindings import ExecutorError, read_eventfd
+from composer.executor.descriptors import EPOLL, ExecutorError, LostDescriptorError, read_eventfd
 
 UNKNOWN_COUNT = 1 << 62
 """A number of events that means: take until there is nothing left."""
@@ -67,6 +67,7 @@ class EventFd:
 
     Attributes:
         is_shared: Whether there may be several listeners; each is told of the events of all.
+        is_lost: Whether the descriptor may be somebody else's, who has closed or replaced it.
         was_used: Whether events have come since it was last looked at.
     """
 
@@ -74,6 +75,7 @@ class EventFd:
         self.fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self.rank = rank
         self.is_shared = is_shared
+        self.is_lost = False
         self.was_used = True
         self.listeners: list[Listener] = []
         self._leaving: list[Listener] = []
@@ -129,6 +131,18 @@ class _OwnEventFds:
 
 
 _own_event_fds = _OwnEventFds()
+
+
+def check_watched(epoll: select.epoll, fd: int, what: str) -> None:
+    """Check that `epoll` still watches what it was given as `fd`.
+
+    Raises:
+        LostDescriptorError: Somebody has closed or replaced one of the two.
+    """
+    try:
+        epoll.modify(fd, select.EPOLLIN)
+    except OSError as error:
+        raise LostDescriptorError(what, fd) from error
 
 
 class EventFds:
@@ -192,6 +206,19 @@ class EventFds:
         listener.on_events(UNKNOWN_COUNT)
         if silent is not None:
             silent.on_events(UNKNOWN_COUNT)
+
+    def check(self) -> None:
+        """Check that nobody has closed or replaced one.
+
+        Raises:
+            LostDescriptorError: Somebody has.
+        """
+        if self.lock.acquire(blocking=False):
+            try:
+                for fd in self.by_number:
+                    check_watched(self._epoll, fd, 'an eventfd')
+            finally:
+                self.lock.release()
 
     def close(self) -> None:
         """Close those that nobody can write to any more."""
@@ -270,15 +297,22 @@ class EventFds:
 
     def _create(self, rank: int, *, is_shared: bool) -> EventFd:
         event_fd = EventFd(rank, is_shared=is_shared)
+        try:
+            self._epoll.register(event_fd.fd, select.EPOLLIN)
+        except OSError as error:
+            os.close(event_fd.fd)
+            raise LostDescriptorError(EPOLL, self._epoll.fileno()) from error
         self.by_number[event_fd.fd] = event_fd
-        self._epoll.register(event_fd.fd, select.EPOLLIN)
         return event_fd
 
     def _leave(self, event_fd: EventFd) -> None:
         """Close `event_fd`, or put it aside until nobody can write to it, if nobody listens."""
         if event_fd.listeners or self.by_number.pop(event_fd.fd, None) is None:
             return
-        self._epoll.unregister(event_fd.fd)
+        try:
+            self._epoll.unregister(event_fd.fd)
+        except OSError:
+            event_fd.is_lost = True
         if event_fd.is_shared:
             for shared in self._shared.values():
                 if event_fd in shared:
@@ -292,7 +326,7 @@ class EventFds:
     def _close_left(self) -> None:
         left, self._left = self._left, []
         for event_fd in left:
-            if event_fd.is_unused():
-                os.close(event_fd.fd)
-            else:
+            if not event_fd.is_unused():
                 self._left.append(event_fd)
+            elif not event_fd.is_lost:
+                os.close(event_fd.fd)

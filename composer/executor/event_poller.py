@@ -5,30 +5,35 @@ import select
 from collections.abc import Callable
 from contextlib import suppress
 from threading import get_ident
+from time import monotonic
 
 from composer.executor.after_fork import replace_descriptors
-from composer.executor.c_bindings import (
+from composer.executor.deadlines import Deadlines
+from composer.executor.descriptors import (
+    TIMER,
+    LostDescriptorError,
     peek_epoll,
     read_eventfd,
     wait_readable,
     write_eventfd,
 )
-from composer.executor.deadlines import Deadlines
-from composer.executor.event_fds import EventFds
+from composer.executor.event_fds import EventFds, check_watched
 
-_MAX_EVENTS = 512
+_CHECK_SEC = 1.0
 
 
 class EventPoller:
     """Waits for events and deadlines, at a cost that depends only on how many have come.
 
-    All listeners have been called when `peek` or `wait_if` returns.
+    All listeners have been called when `peek` returns. It raises `LostDescriptorError` if somebody
+    has closed or replaced a descriptor, a second later at most.
     """
 
     def __init__(self) -> None:
         self._epoll = select.epoll()
         self.event_fds = EventFds(self._epoll)
         self._waiting_threads: set[int] = set()
+        self._next_check = 0.0
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._epoll.register(self._wake_fd, select.EPOLLIN)
         self.deadlines = Deadlines(self.wake)
@@ -51,27 +56,37 @@ class EventPoller:
             # A wake-up for the leader may have been among them: a former leader looks here too.
             self.wake()
         self.deadlines.rearm_after_jumps()
+        if monotonic() >= self._next_check:
+            self._check()
         return bool(arrived)
 
-    def wait_if(self, is_idle: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Wait for events if `is_idle()`, else only look; a timeout of None is for ever.
+    def wait_if(self, is_idle: Callable[[], bool]) -> None:
+        """Wait if `is_idle()` until there is something for `peek`, for at most a second.
 
         Whoever makes `is_idle()` false meanwhile calls `wake`.
         """
+        self._wait_if(is_idle, self._epoll.fileno(), _CHECK_SEC)
+
+    def wait_for_wake_if(self, is_idle: Callable[[], bool], timeout_sec: float) -> None:
+        """Wait if `is_idle()` until `wake` is called or `timeout_sec` has passed."""
+        self._wait_if(is_idle, self._wake_fd, timeout_sec)
+
+    def _wait_if(self, is_idle: Callable[[], bool], fd: int, timeout_sec: float) -> None:
         me = get_ident()
         self._waiting_threads.add(me)
         try:
-            arrived = self._wait(timeout_sec if is_idle() else 0)
+            if is_idle():
+                wait_readable(fd, timeout_sec)
         finally:
             self._waiting_threads.discard(me)
-        self._dispatch(arrived)
-        self.deadlines.rearm_after_jumps()
 
-    def _wait(self, timeout_sec: float | None) -> list[tuple[int, int]]:
-        if timeout_sec:
-            wait_readable(self._epoll.fileno(), timeout_sec)
-            timeout_sec = 0
-        return self._epoll.poll(timeout_sec, _MAX_EVENTS)
+    def _check(self) -> None:
+        """Check that nobody has closed a descriptor: no event would come, and no word of it."""
+        self._next_check = monotonic() + _CHECK_SEC
+        with suppress(ValueError):  # The epoll is closed.
+            check_watched(self._epoll, self._wake_fd, 'an eventfd')
+            check_watched(self._epoll, self.deadlines.timer.fd, TIMER)
+            self.event_fds.check()
 
     def _dispatch(self, arrived: list[tuple[int, int]]) -> None:
         if len(arrived) > 1:
@@ -106,8 +121,18 @@ class EventPoller:
         """Close the descriptors; nothing else may be called after that."""
         if self._epoll.closed:
             return
+        try:
+            self._check()
+        except LostDescriptorError:
+            # They may be somebody else's now, whom it would hurt to close them.
+            _lost.append(self._epoll)
+            self.deadlines.timer.close()
+            return
         self.event_fds.close()
         self._epoll.close()
         wake_fd, self._wake_fd = self._wake_fd, -1
         os.close(wake_fd)
         self.deadlines.timer.close()
+
+
+_lost: list[select.epoll] = []  # A finalizer would close it.

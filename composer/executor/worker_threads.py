@@ -16,16 +16,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import get_ident
 from time import monotonic, sleep
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from composer.executor.after_fork import end_child
-from composer.executor.c_bindings import TimerFd
+from composer.executor.descriptors import LostDescriptorError, TimerFd
+
+if TYPE_CHECKING:
+    from composer.executor.scheduler import Session
 
 TAKEOVER_SEC = 0.001
 """How long a callback of the leader may take before the standby takes over."""
 
 _TAKEOVER_NS = int(TAKEOVER_SEC * 1e9)
 _MAX_IDLE_SEC = 2.0
+_MAX_IDLE_NS = int(_MAX_IDLE_SEC * 1e9)
 _POLL_SEC = 0.0005
 
 
@@ -34,10 +38,12 @@ class Worker:
 
     Attributes:
         busy_since: When its callback began (monotonic); 0 if it runs none.
+        session: The session of its callback, if that admits one callback.
     """
 
     def __init__(self, threads: 'WorkerThreads', job: Callable[['Worker'], None]) -> None:
         self.busy_since = 0.0
+        self.session: Session | None = None
         self.job: Callable[[Worker], None] | None = job
         self.has_job = threading.Lock()
         self.has_job.acquire()
@@ -76,6 +82,7 @@ class WorkerThreads:
 
     Args:
         lead: The job of the leader.
+        on_takeover: Called when a standby becomes the leader, because a callback takes long.
         report: Receives what was thrown into a thread from outside while it had no callback.
 
     Attributes:
@@ -84,13 +91,17 @@ class WorkerThreads:
     """
 
     def __init__(
-        self, lead: Callable[[Worker], None], report: Callable[[BaseException], None]
+        self,
+        lead: Callable[[Worker], None],
+        on_takeover: Callable[[], None],
+        report: Callable[[BaseException], None],
     ) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
         self.is_forked = False
         self._standby: Worker | None = None
         self._lead = lead
+        self._on_takeover = on_takeover
         self._report = report
         self._timer = TimerFd(blocking=True)
         self._timer_is_set = False
@@ -134,7 +145,13 @@ class WorkerThreads:
         return True
 
     def start(self) -> None:
-        """Make sure that there are a leader and a standby."""
+        """Make sure that there are a leader and a standby.
+
+        Raises:
+            RuntimeError: The process may have no more threads.
+        """
+        if self.leader is not None and self._standby is not None:
+            return
         with self.lock:
             if self._ending:
                 return
@@ -151,15 +168,28 @@ class WorkerThreads:
                 return False
             if is_wanted():
                 return True
-            self.leader = None
-            worker.busy_since = 0.0
-            self._wake_standby()
+            self._end_leading(worker)
             return False
 
-    def run(self, job: Callable[[Worker], None]) -> None:
-        """Have a worker do `job`."""
+    def stop_leading(self, worker: Worker) -> None:
+        """Let nobody lead if `worker` does."""
         with self.lock:
-            self._give(job)
+            if self.leader is worker:
+                self._end_leading(worker)
+
+    def _end_leading(self, worker: Worker) -> None:
+        self.leader = None
+        worker.busy_since = 0.0
+        if self._ending:
+            self._wake_standby()
+        elif self._standby is not None:
+            # It stays for the next leader, but not for long.
+            self._timer_is_set = False
+            self._timer.expire_in(_MAX_IDLE_NS)
+
+    def is_alone(self) -> bool:
+        """Tell whether nobody stands by."""
+        return self._standby is None
 
     def begin_callback(self, worker: Worker) -> None:
         """Note that `worker`, the leader, begins a callback."""
@@ -167,7 +197,7 @@ class WorkerThreads:
         if not self._timer_is_set or now > self._put_off_at:
             self._timer_is_set = True
             self._put_off_at = now + TAKEOVER_SEC / 2
-            self._timer.expire_in(_TAKEOVER_NS)
+            self._wake_in(_TAKEOVER_NS)
 
     def let_standby_sleep(self, worker: Worker) -> None:
         """Disarm the standby's timer: `worker` leads and will wait, and others want the GIL."""
@@ -267,7 +297,14 @@ class WorkerThreads:
         if self._standby is not None:
             self._timer_is_set = True
             self._put_off_at = math.inf
-            self._timer.expire_in(1)
+            self._wake_in(1)
+
+    def _wake_in(self, delay_ns: int) -> None:
+        """Wake the standby in `delay_ns`; what prevents it ends the spin."""
+        try:
+            self._timer.expire_in(delay_ns)
+        except LostDescriptorError as error:
+            self._report(error)
 
     def _stand_by(self, me: Worker) -> None:
         while True:
@@ -286,6 +323,7 @@ class WorkerThreads:
                         self._takeover.release()
                         self._takeover = None
                     break
+        self._on_takeover()
         self._lead(me)
 
     def _is_late(self, leader: Any) -> bool:
@@ -297,5 +335,5 @@ class WorkerThreads:
         if left <= 0:
             return True
         self._timer_is_set = True
-        self._timer.expire_in(int(left * 1e9))
+        self._wake_in(int(left * 1e9))
         return False

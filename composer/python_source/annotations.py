@@ -49,7 +49,7 @@ def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> 
     if isinstance(expression, ast.Constant) and isinstance(expression.value, str):
         try:
             expression = ast.parse(expression.value, mode='eval').body
-        except (SyntaxError, ValueError):
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
             return Annotation()
     if isinstance(expression, ast.Subscript):
         return _read_subscript(expression)
@@ -73,12 +73,11 @@ def _read_subscript(expression: ast.Subscript) -> Annotation:
 
 def _dotted(expression: ast.expr | None) -> str:
     """Return a dotted name such as `a.b.c`, or an empty text."""
-    if isinstance(expression, ast.Name):
-        return expression.id
-    if isinstance(expression, ast.Attribute):
-        before = _dotted(expression.value)
-        return f'{before}.{expression.attr}' if before else ''
-    return ''
+    parts: list[str] = []
+    while isinstance(expression, ast.Attribute):
+        parts.append(expression.attr)
+        expression = expression.value
+    return '.'.join([expression.id, *reversed(parts)]) if isinstance(expression, ast.Name) else ''
 
 
 def _interface(name: str) -> str | None:

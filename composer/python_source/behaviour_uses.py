@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # How deep helpers of helpers are followed: recursive ones have no end.
 _DEEPEST = 8
+# How many uses of helpers are followed in all: those of functions that call each other multiply.
+_MOST_FOLLOWED = 300_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ class UseReader:
     def __init__(self, modules: ModuleFinder) -> None:
         self._modules = modules
         self._read: dict[tuple[object, ...], BehaviourUses] = {}
+        self._followed = 0
 
     def uses_of(self, binding: Binding) -> BehaviourUses:
         """Return what a behaviour does with its node; if that is unknown, all kinds are open."""
@@ -103,8 +106,11 @@ class UseReader:
         found = [FoundUse(use, Span(file, use.line, use.column, use.length)) for use in own.uses]
         open_kinds, reads_others = own.open_kinds, own.reads_others
         reaches_ros = own.reaches_ros
-        for passed in own.passes:
+        for passed in dict.fromkeys(own.passes):
             inner = self._uses(module, passed.function, passed.position, 0, callers)
+            self._followed += len(inner.found)
+            if self._followed > _MOST_FOLLOWED:
+                return _UNKNOWN
             is_late = self._is_coroutine(module, passed.function) and not passed.is_awaited
             found += [_as_passed(each, passed, is_late=is_late) for each in inner.found]
             open_kinds |= inner.open_kinds
@@ -137,6 +143,8 @@ def _read(
 
 
 def _as_passed(found: FoundUse, passed: NodePass, *, is_late: bool) -> FoundUse:
+    if passed.is_certain and not passed.is_guarded and passed.waits and not is_late:
+        return found
     use = found.use
     use = replace(
         use,

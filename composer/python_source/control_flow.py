@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from composer.python_source.local_names import depends_on_file, list_arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Iterator
 
-    from composer.python_source.modules import FunctionNode
+    from composer.python_source.syntax import FunctionNode
 
 # What `node.publish('x')` raises for a name that is not declared, and what catches it.
 _CATCHING = {
@@ -28,6 +28,9 @@ _JUMPS = (ast.Return, ast.Raise, ast.Continue, ast.Break)
 
 class ControlFlowVisitor(ast.NodeVisitor):
     """Walks the body of a function, and tracks the conditions of the current place.
+
+    Its methods yield the nodes to visit, each of which is visited before the method goes on: no
+    function is too deep for it.
 
     Args:
         node_name: The parameter that is the node.
@@ -51,81 +54,96 @@ class ControlFlowVisitor(ast.NodeVisitor):
         self.depth = 0
         self._chosen = chosen
         self._called = called
+        self._jumps = 0
 
-    def visit_If(self, node: ast.If) -> None:
+    def visit_all(self, nodes: Iterable[ast.AST]) -> None:
+        """Visit nodes, and all that is in them."""
+        visits = [iter(nodes)]
+        while visits:
+            node = next(visits[-1], None)
+            if node is None:
+                visits.pop()
+                continue
+            self._jumps += isinstance(node, _JUMPS)
+            visit = getattr(self, f'visit_{type(node).__name__}', ast.iter_child_nodes)
+            visits.append(iter(visit(node) or ()))
+
+    def visit_If(self, node: ast.If) -> Iterator[ast.AST]:
         """A condition that depends on the file makes its branches uncertain.
 
         After a jump in a branch, all that follows is uncertain too.
         """
-        self._visit_choice(node.test, [*node.body, *node.orelse])
+        yield from self._visit_choice(node.test, [*node.body, *node.orelse])
 
-    def visit_While(self, node: ast.While) -> None:
+    def visit_While(self, node: ast.While) -> Iterator[ast.AST]:
         """See `visit_If`."""
-        self._visit_choice(node.test, [*node.body, *node.orelse], is_loop=True)
+        yield from self._visit_choice(node.test, [*node.body, *node.orelse], is_loop=True)
 
-    def visit_For(self, node: ast.For) -> None:
+    def visit_For(self, node: ast.For) -> Iterator[ast.AST]:
         """See `visit_If`."""
-        self._visit_choice(node.iter, [*node.body, *node.orelse], is_loop=True)
+        yield from self._visit_choice(node.iter, [*node.body, *node.orelse], is_loop=True)
 
-    def visit_Match(self, node: ast.Match) -> None:
+    def visit_Match(self, node: ast.Match) -> Iterator[ast.AST]:
         """See `visit_If`."""
         guards = [case.guard for case in node.cases if case.guard]
-        self._visit_choice(node.subject, [*guards, *(s for c in node.cases for s in c.body)])
+        yield from self._visit_choice(
+            node.subject, [*guards, *(s for c in node.cases for s in c.body)]
+        )
 
-    def visit_IfExp(self, node: ast.IfExp) -> None:
+    def visit_IfExp(self, node: ast.IfExp) -> Iterator[ast.AST]:
         """See `visit_If`."""
-        self._visit_choice(node.test, [node.body, node.orelse])
+        yield from self._visit_choice(node.test, [node.body, node.orelse])
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> None:
+    def visit_BoolOp(self, node: ast.BoolOp) -> Iterator[ast.AST]:
         """See `visit_If`."""
-        self._visit_choice(node.values[0], node.values[1:])
+        yield from self._visit_choice(node.values[0], node.values[1:])
 
-    def visit_Assert(self, node: ast.Assert) -> None:
+    def visit_Assert(self, node: ast.Assert) -> Iterator[ast.AST]:
         """See `visit_If`."""
-        self.visit(node.test)
+        yield node.test
         self.doubts += depends_on_file(node.test, self.node_name, self._chosen)
 
-    def visit_Try(self, node: ast.Try) -> None:
+    def visit_Try(self, node: ast.Try) -> Iterator[ast.AST]:
         """A handler that catches the error of an unknown name guards the body."""
         is_guard = any(_catches(handler) for handler in node.handlers)
         self.guards += is_guard
-        for statement in node.body:
-            self.visit(statement)
+        yield from node.body
         self.guards -= is_guard
-        for inner in (*node.handlers, *node.orelse, *node.finalbody):
-            self.visit(inner)
+        yield from (*node.handlers, *node.orelse, *node.finalbody)
 
-    def visit_With(self, node: ast.With) -> None:
+    def visit_With(self, node: ast.With) -> Iterator[ast.AST]:
         """`suppress` guards the body."""
-        is_guard = any('suppress' in ast.dump(item.context_expr) for item in node.items)
+        is_guard = any(_suppresses(item.context_expr) for item in node.items)
         self.guards += is_guard
-        self.generic_visit(node)
+        yield from ast.iter_child_nodes(node)
         self.guards -= is_guard
 
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> Iterator[ast.AST]:
         """An inner function may run later, or never."""
-        self._visit_nested(node, node.args, node.body, is_called=node.name in self._called)
+        yield from self._visit_nested(
+            node, node.args, node.body, is_called=node.name in self._called
+        )
 
-    def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> None:
+    def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> Iterator[ast.AST]:
         """See `visit_FunctionDef`."""
-        self._visit_nested(node, node.args, node.body, is_called=node.name in self._called)
+        yield from self._visit_nested(
+            node, node.args, node.body, is_called=node.name in self._called
+        )
 
-    def visit_Lambda(self, node: ast.Lambda) -> None:
+    def visit_Lambda(self, node: ast.Lambda) -> Iterator[ast.AST]:
         """See `visit_FunctionDef`."""
-        self._visit_nested(node, node.args, [node.body])
+        yield from self._visit_nested(node, node.args, [node.body])
 
     def _visit_choice(
         self, test: ast.expr, branches: Iterable[ast.AST], *, is_loop: bool = False
-    ) -> None:
-        self.visit(test)
+    ) -> Iterator[ast.AST]:
+        yield test
         is_chosen = depends_on_file(test, self.node_name, self._chosen)
         is_chosen |= not is_loop and self._is_constant(test)
         self.doubts += is_chosen
-        inner = list(branches)
-        for branch in inner:
-            self.visit(branch)
-        jumps = any(isinstance(node, _JUMPS) for branch in inner for node in ast.walk(branch))
-        if is_chosen and not jumps:
+        before = self._jumps
+        yield from branches
+        if is_chosen and self._jumps == before:
             self.doubts -= 1
 
     def _is_constant(self, test: ast.expr) -> bool:
@@ -142,16 +160,13 @@ class ControlFlowVisitor(ast.NodeVisitor):
         body: Iterable[ast.AST],
         *,
         is_called: bool = False,
-    ) -> None:
-        for default in (*arguments.defaults, *filter(None, arguments.kw_defaults)):
-            self.visit(default)
-        for decorator in getattr(node, 'decorator_list', ()):
-            self.visit(decorator)
+    ) -> Iterator[ast.AST]:
+        yield from (*arguments.defaults, *filter(None, arguments.kw_defaults))
+        yield from getattr(node, 'decorator_list', ())
         if any(argument.arg == self.node_name for argument in list_arguments(arguments)):
             return
         self.depth += not is_called
-        for inner in body:
-            self.visit(inner)
+        yield from body
         self.depth -= not is_called
 
 
@@ -172,6 +187,11 @@ def find_inner_calls(function: FunctionNode) -> set[str]:
             awaits = isinstance(node, ast.Await)
             pending += [(each, awaits) for each in ast.iter_child_nodes(node)]
     return found & inner.keys()
+
+
+def _suppresses(context: ast.expr) -> bool:
+    names = (getattr(each, 'id', '') or getattr(each, 'attr', '') for each in ast.walk(context))
+    return any('suppress' in name for name in names)
 
 
 def _catches(handler: ast.ExceptHandler) -> bool:

@@ -6,9 +6,15 @@ import ast
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from composer.python_source.modules import FunctionNode
+    from composer.python_source.syntax import FunctionNode
+
+
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+_IMPORTS = (ast.Import, ast.ImportFrom)
+_SINGLE_ASSIGNMENTS = (ast.AnnAssign, ast.AugAssign, ast.NamedExpr)
+_LOOPS = (ast.For, ast.AsyncFor, ast.comprehension)
 
 
 def find_parameter(function: FunctionNode, position: int | str) -> str | None:
@@ -27,39 +33,47 @@ def list_arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
     yield from filter(None, (arguments.vararg, arguments.kwarg))
 
 
-def stored_names(function: FunctionNode) -> Iterator[ast.Name]:
-    """Yield each place where a name is assigned or deleted."""
-    for statement in function.body:
-        for node in ast.walk(statement):
-            if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-                yield node
+def stored_names(nodes: Iterable[ast.AST]) -> Iterator[ast.Name]:
+    """Yield each place among nodes where a name is assigned or deleted."""
+    for node in nodes:
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            yield node
 
 
-def nested_names(function: FunctionNode) -> set[str]:
+def nested_names(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names that inner functions, classes, imports and handlers define."""
     names: set[str] = set()
-    for statement in function.body:
-        for node in ast.walk(statement):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-                names.add(node.name)
-            elif isinstance(node, ast.Import | ast.ImportFrom):
-                names |= {(item.asname or item.name).partition('.')[0] for item in node.names}
-            elif isinstance(node, ast.ExceptHandler) and node.name:
-                names.add(node.name)
+    for node in nodes:
+        if isinstance(node, _DEFINITIONS):
+            names.add(node.name)
+        elif isinstance(node, _IMPORTS):
+            names |= {(item.asname or item.name).partition('.')[0] for item in node.names}
+        elif isinstance(node, ast.ExceptHandler) and node.name:
+            names.add(node.name)
     return names
 
 
-def find_chosen(function: FunctionNode, node_name: str, chosen: set[str]) -> set[str]:
+def find_chosen(nodes: Iterable[ast.AST], node_name: str, chosen: set[str]) -> set[str]:
     """Return the names whose values a file sets, and those computed from them."""
     found = set(chosen)
-    pairs = [pair for statement in function.body for pair in _assignments(statement)]
-    while True:
-        before = len(found)
-        for target, value in pairs:
-            if depends_on_file(value, node_name, found):
-                found |= {name.id for name in ast.walk(target) if isinstance(name, ast.Name)}
-        if len(found) == before:
-            return found
+    targets_of: dict[str, list[ast.expr]] = {}
+    pending: list[str] = list(chosen)
+    for target, value in _assignments(nodes):
+        if depends_on_file(value, node_name, chosen):
+            pending += _names_in(target)
+        else:
+            for name in _names_in(value):
+                targets_of.setdefault(name, []).append(target)
+    while pending:
+        name = pending.pop()
+        found.add(name)
+        for target in targets_of.pop(name, ()):
+            pending += _names_in(target)
+    return found
+
+
+def _names_in(expression: ast.expr) -> set[str]:
+    return {each.id for each in ast.walk(expression) if isinstance(each, ast.Name)}
 
 
 def depends_on_file(expression: ast.expr, node_name: str, chosen: set[str]) -> bool:
@@ -73,14 +87,14 @@ def depends_on_file(expression: ast.expr, node_name: str, chosen: set[str]) -> b
     return False
 
 
-def _assignments(statement: ast.stmt) -> Iterator[tuple[ast.expr, ast.expr]]:
-    for node in ast.walk(statement):
+def _assignments(nodes: Iterable[ast.AST]) -> Iterator[tuple[ast.expr, ast.expr]]:
+    for node in nodes:
         if isinstance(node, ast.Assign):
             yield from ((target, node.value) for target in node.targets)
-        elif isinstance(node, ast.AnnAssign | ast.AugAssign | ast.NamedExpr):
+        elif isinstance(node, _SINGLE_ASSIGNMENTS):
             if node.value is not None:
                 yield node.target, node.value
-        elif isinstance(node, ast.For | ast.AsyncFor | ast.comprehension):
+        elif isinstance(node, _LOOPS):
             yield node.target, node.iter
         elif isinstance(node, ast.withitem) and node.optional_vars is not None:
             yield node.optional_vars, node.context_expr

@@ -10,6 +10,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.input_limits import MAX_TOKENS_OF_MODULES
 from composer.python_source.modules import ModuleSource, read_module
 from composer.spelling import find_nearest
 
@@ -58,6 +59,7 @@ class ModuleFinder:
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
         self._listed: dict[Path, list[str]] = {}
+        self._tokens_left = MAX_TOKENS_OF_MODULES
 
     def find(self, name: str) -> ModuleSource | MissingModule:
         """Return the module `package.module`, or the part of its name that is missing."""
@@ -76,7 +78,11 @@ class ModuleFinder:
                 return MissingModule('.'.join([*done, part]), self._nearest(part, done, folders))
             done.append(part)
             folders = inner
-        return read_module(file) if file else ModuleSource(None)
+        if file is None:
+            return ModuleSource(None)
+        module = read_module(file, self._tokens_left)
+        self._tokens_left -= module.tokens
+        return module
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
         for folder in folders:

@@ -5,17 +5,32 @@ from __future__ import annotations
 import ast
 import inspect
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from composer.diagnostics import SourceFile, Span
+from composer.input_limits import (
+    MAX_MODULE_BYTES,
+    MAX_MODULE_TOKENS,
+    UnreadableFileError,
+    read_file,
+)
+from composer.python_source.local_names import stored_names
+from composer.python_source.syntax import (
+    BLOCKS,
+    FunctionNode,
+    UnreadModuleError,
+    count_tokens,
+    parse_source,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 
 
@@ -33,18 +48,25 @@ class FunctionKind(Enum):
         return self in (FunctionKind.GENERATOR, FunctionKind.ASYNC_GENERATOR)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FunctionSource:
     """A function of a module.
 
     Attributes:
-        kind: `None` if only running the module could tell it; `signature` likewise.
-        definition: Its syntax tree, or `None` likewise.
+        definition: Its syntax tree; `None` if only running the module could tell what it is.
     """
 
-    kind: FunctionKind | None = None
-    signature: inspect.Signature | None = None
     definition: FunctionNode | None = None
+
+    @cached_property
+    def kind(self) -> FunctionKind | None:
+        """What it returns, if that is known."""
+        return _kind_of(self.definition) if self.definition else None
+
+    @cached_property
+    def signature(self) -> inspect.Signature | None:
+        """Its parameters, if they are known."""
+        return _read_signature(self.definition.args) if self.definition else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +83,8 @@ class ModuleSource:
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: The syntax error in its source, or `None`.
         error_line: The line of this error, counted from 1, if it is known.
+        unread: Why its source is not read although it may be valid, or `None`.
+        tokens: How many words and signs it has.
     """
 
     path: Path | None
@@ -72,6 +96,8 @@ class ModuleSource:
     is_open: bool = False
     syntax_error: str | None = None
     error_line: int | None = None
+    unread: str | None = None
+    tokens: int = 0
 
     def place_of(self, line: int) -> Span:
         """Return the span of a line; its path is relative to the current folder if possible."""
@@ -82,24 +108,31 @@ class ModuleSource:
         return Span(source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
 
 
-def read_module(path: Path) -> ModuleSource:
-    """Read a module; none of its code runs."""
+def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSource:
+    """Read a module; none of its code runs.
+
+    Args:
+        most_tokens: How many words and signs it may have.
+    """
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
     lines: tuple[str, ...] = ()
     try:
-        text = path.read_bytes()
+        text = read_file(path, MAX_MODULE_BYTES)
+        tokens = count_tokens(text, path, most_tokens)
         lines = tuple(text.decode(errors='replace').splitlines())
-        tree = ast.parse(text, str(path))
-        # The compiler finds more errors than the parser, such as `return` outside a function.
-        compile(tree, str(path), 'exec', dont_inherit=True)
+        tree = parse_source(text, path)
+    except UnreadableFileError as error:
+        if error.is_too_large:
+            return ModuleSource(path, is_open=True, unread=f'{path}: {error}')
+        return ModuleSource(path, syntax_error=f'{path}: {error}')
+    except UnreadModuleError as error:
+        return ModuleSource(path, is_open=True, unread=str(error))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = getattr(error, 'lineno', None)
         where = f'{path}:{line}' if line else str(path)
         reason = f'{where}: {getattr(error, "msg", error)}'
         return ModuleSource(path, lines=lines, syntax_error=reason, error_line=line)
-    except OSError as error:
-        return ModuleSource(path, syntax_error=f'{path}: {error.strerror}')
     reader = _ModuleReader()
     reader.read(tree.body)
     return ModuleSource(
@@ -110,20 +143,22 @@ def read_module(path: Path) -> ModuleSource:
         {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
         lines,
         reader.is_open,
+        tokens=tokens,
     )
 
 
-def find_texts(body: list[ast.stmt]) -> dict[str, str]:
-    """Return the names that statements assign only one text, with that text."""
+def find_texts(body: list[ast.stmt], nodes: Iterable[ast.AST] | None = None) -> dict[str, str]:
+    """Return the names that statements assign only one text, with that text.
+
+    Args:
+        nodes: All nodes of the statements, if they are at hand.
+    """
     texts = {name: text for statement in body for name, text in _read_text(statement)}
     if not texts:
         return {}
-    nodes = [node for statement in body for node in ast.walk(statement)]
-    stored = Counter(
-        node.id
-        for node in nodes
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
-    )
+    if nodes is None:
+        nodes = (node for statement in body for node in ast.walk(statement))
+    stored = Counter(name.id for name in stored_names(nodes))
     return {name: text for name, text in texts.items() if stored[name] == 1}
 
 
@@ -150,16 +185,22 @@ class _ModuleReader:
         self.constants: dict[str, str] = {}
         self.imports: dict[str, str] = {}
         self.is_open = False
-        self._conditions = 0
+        self._is_conditional = False
 
     def read(self, body: list[ast.stmt]) -> None:
-        for statement in body:
-            self._read_statement(statement)
+        pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(body)]
+        while pending:
+            statement, self._is_conditional = pending.pop()
+            inner = self._read_statement(statement)
+            pending += [(each, True) for each in reversed(inner)]
 
-    def _read_statement(self, statement: ast.stmt) -> None:
+    def _read_statement(self, statement: ast.AST) -> list[ast.AST]:
+        """Read a statement; return those in it that are run on a condition."""
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
             self.is_open |= statement.name == '__getattr__'
-            self._bind(statement.name, describe_function(statement))
+            # Decorators may change both kind and signature.
+            known = None if statement.decorator_list else statement
+            self._bind(statement.name, FunctionSource(known))
         elif isinstance(statement, ast.ClassDef):
             self._bind(statement.name, FunctionSource())
         elif isinstance(statement, ast.Import | ast.ImportFrom):
@@ -167,12 +208,9 @@ class _ModuleReader:
         elif isinstance(statement, ast.Assign | ast.AnnAssign):
             self._read_assignment(statement)
         else:
-            self._conditions += 1
-            for name in ('body', 'handlers', 'cases', 'orelse', 'finalbody'):
-                for inner in getattr(statement, name, ()):
-                    is_block = isinstance(inner, ast.ExceptHandler | ast.match_case)
-                    self.read(inner.body if is_block else [inner])
-            self._conditions -= 1
+            blocks = (getattr(statement, name, ()) for name in BLOCKS)
+            return [each for block in blocks for each in block]
+        return []
 
     def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
         for alias in statement.names:
@@ -194,19 +232,19 @@ class _ModuleReader:
                 if not isinstance(node, ast.Name):
                     continue
                 if isinstance(value, ast.Constant) and node is target:
-                    self._constant(node.id, f'the {type(value.value).__name__} {value.value!r}')
+                    self._constant(node.id, _describe_constant(value.value))
                 elif value is not None:
                     self._bind(node.id, FunctionSource())
 
     def _bind(self, name: str, function: FunctionSource, full_name: str = '') -> None:
-        if self._conditions and (name in self.functions or name in self.constants):
+        if self._is_conditional and (name in self.functions or name in self.constants):
             function = FunctionSource()
         self._note_import(name, full_name)
         self.constants.pop(name, None)
         self.functions[name] = function
 
     def _constant(self, name: str, what: str, full_name: str = '') -> None:
-        if self._conditions and name in self.functions:
+        if self._is_conditional and name in self.functions:
             self._bind(name, FunctionSource(), full_name)
             return
         self._note_import(name, full_name)
@@ -219,16 +257,20 @@ class _ModuleReader:
             self.imports[name] = ''
 
 
-def describe_function(node: FunctionNode) -> FunctionSource:
-    """Return the kind and signature of a function definition; decorators may change both."""
-    if node.decorator_list:
-        return FunctionSource()
+def _describe_constant(value: object) -> str:
+    kind = type(value).__name__
+    try:
+        return f'the {kind} {value!r}'
+    except ValueError:
+        # Python does not write numbers of thousands of digits.
+        return f'an {kind}'
+
+
+def _kind_of(node: FunctionNode) -> FunctionKind:
     yields = any(isinstance(inner, ast.Yield | ast.YieldFrom) for inner in _own_nodes(node))
     if isinstance(node, ast.AsyncFunctionDef):
-        kind = FunctionKind.ASYNC_GENERATOR if yields else FunctionKind.COROUTINE
-    else:
-        kind = FunctionKind.GENERATOR if yields else FunctionKind.PLAIN
-    return FunctionSource(kind, _read_signature(node.args), node)
+        return FunctionKind.ASYNC_GENERATOR if yields else FunctionKind.COROUTINE
+    return FunctionKind.GENERATOR if yields else FunctionKind.PLAIN
 
 
 def _own_nodes(function: FunctionNode) -> list[ast.AST]:
@@ -266,10 +308,13 @@ def _read_signature(arguments: ast.arguments) -> inspect.Signature:
 
 def _parameter(argument: ast.arg, kind: object, *, optional: bool = False) -> inspect.Parameter:
     default = ... if optional else inspect.Parameter.empty
-    annotation = ast.unparse(argument.annotation) if argument.annotation else None
+    annotation: object = inspect.Parameter.empty
+    # One that nests too deep means as much as none.
+    with suppress(RecursionError):
+        annotation = ast.unparse(argument.annotation) if argument.annotation else annotation
     return inspect.Parameter(
         argument.arg,
         kind,  # type: ignore[arg-type]
         default=default,
-        annotation=inspect.Parameter.empty if annotation is None else annotation,
+        annotation=annotation,
     )

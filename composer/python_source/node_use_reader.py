@@ -23,9 +23,9 @@ from composer.python_source.modules import find_texts
 from composer.python_source.node_uses import USED_NOUNS, NodePass, NodeUse, NodeUses
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
-    from composer.python_source.modules import FunctionNode
+    from composer.python_source.syntax import FunctionNode
 
 # Methods of `composer.Node`, and the kind of entity whose name is their first argument.
 _METHODS = {
@@ -52,17 +52,19 @@ def read_node_uses(
         given: The parameters whose values no file sets: the node itself, a message.
         texts: The constants outside of the function that are texts.
     """
+    nodes = [node for statement in function.body for node in ast.walk(statement)]
     parameters = {argument.arg for argument in list_arguments(function.args)}
-    stored = {name.id for name in stored_names(function)}
+    stored = {name.id for name in stored_names(nodes)}
     if node_name in stored:
         return NodeUses()
-    local = parameters | stored | nested_names(function)
-    chosen = find_chosen(function, node_name, parameters - set(given))
+    local = parameters | stored | nested_names(nodes)
+    chosen = find_chosen(nodes, node_name, parameters - set(given))
     known = {name: text for name, text in texts.items() if name not in local}
-    known |= {n: text for n, text in find_texts(function.body).items() if n not in parameters}
+    known |= {
+        n: text for n, text in find_texts(function.body, nodes).items() if n not in parameters
+    }
     reader = _UseVisitor(node_name, local, chosen, find_inner_calls(function), known)
-    for statement in function.body:
-        reader.visit(statement)
+    reader.visit_all(function.body)
     return NodeUses(
         tuple(reader.uses),
         tuple(reader.passes),
@@ -103,7 +105,7 @@ class _UseVisitor(ControlFlowVisitor):
         if node.id == self.node_name:
             self.open_kinds |= USED_NOUNS
 
-    def visit_Attribute(self, node: ast.Attribute) -> None:
+    def visit_Attribute(self, node: ast.Attribute) -> Iterator[ast.AST]:
         """`node.parameters.x`, and attributes that are not called."""
         if self._is_parameters(node.value):
             if isinstance(node.ctx, ast.Load) and node.attr not in _MAPPING_METHODS:
@@ -111,7 +113,7 @@ class _UseVisitor(ControlFlowVisitor):
             else:
                 self.open_kinds.add('parameter')
         elif not is_name(node.value, self.node_name):
-            self.visit(node.value)
+            yield node.value
         elif node.attr in _METHODS:
             self.open_kinds.add(_METHODS[node.attr])
         elif node.attr in ('parameters', 'ros'):
@@ -122,48 +124,48 @@ class _UseVisitor(ControlFlowVisitor):
         elif node.attr not in _HARMLESS:
             self.open_kinds |= USED_NOUNS
 
-    def visit_Subscript(self, node: ast.Subscript) -> None:
+    def visit_Subscript(self, node: ast.Subscript) -> Iterator[ast.AST]:
         """`node.parameters['x']`."""
         name = self._text(node.slice)
         if name is not None and self._is_parameters(node.value) and _is_load(node):
             self._use('parameter', name, node.slice)
         else:
-            self.generic_visit(node)
+            yield from ast.iter_child_nodes(node)
 
-    def visit_Compare(self, node: ast.Compare) -> None:
+    def visit_Compare(self, node: ast.Compare) -> Iterator[ast.AST]:
         """`'x' in node.parameters` uses it, and works without it."""
         name = self._text(node.left)
         if name is not None and len(node.ops) == 1 and self._is_parameters(node.comparators[0]):
             self._use('parameter', name, node.left, is_optional=True, has_default=True)
         else:
-            self.generic_visit(node)
+            yield from ast.iter_child_nodes(node)
 
-    def visit_Await(self, node: ast.Await) -> None:
+    def visit_Await(self, node: ast.Await) -> Iterator[ast.AST]:
         """The function waits for what it awaits."""
         self._awaited = node.value
-        self.visit(node.value)
+        yield node.value
 
-    def visit_Call(self, node: ast.Call) -> None:
+    def visit_Call(self, node: ast.Call) -> Iterator[ast.AST]:
         """`node.publish('x', …)` and the like, `node.parameters.get('x')`, `helper(node)`."""
         function = node.func
         if isinstance(function, ast.Attribute) and is_name(function.value, self.node_name):
-            self._visit_method(node, function)
+            yield from self._visit_method(node, function)
         elif (
             isinstance(function, ast.Attribute)
             and function.attr == 'get'
             and self._is_parameters(function.value)
         ):
-            self._visit_get(node)
+            yield from self._visit_get(node)
         elif isinstance(function, ast.Name) and function.id not in self.local:
-            self._visit_pass(node, function.id)
+            yield from self._visit_pass(node, function.id)
         else:
-            self.generic_visit(node)
+            yield from ast.iter_child_nodes(node)
 
-    def _visit_method(self, node: ast.Call, function: ast.Attribute) -> None:
+    def _visit_method(self, node: ast.Call, function: ast.Attribute) -> Iterator[ast.AST]:
         kind = _METHODS.get(function.attr)
         arguments = [*node.args, *(keyword.value for keyword in node.keywords)]
         if kind is None:
-            self.visit_Attribute(function)
+            yield function
         else:
             by_keyword = [each.value for each in node.keywords if each.arg == 'name']
             named = next(iter([*node.args, *by_keyword]), None)
@@ -174,20 +176,18 @@ class _UseVisitor(ControlFlowVisitor):
                 waits = function.attr != 'call_async' or self._awaited is node
                 self._use(kind, name, named, waits=waits)
                 arguments.remove(named)
-        for argument in arguments:
-            self.visit(argument)
+        yield from arguments
 
-    def _visit_get(self, node: ast.Call) -> None:
+    def _visit_get(self, node: ast.Call) -> Iterator[ast.AST]:
         name = self._text(node.args[0]) if node.args else None
         if name is None:
             self.open_kinds.add('parameter')
         else:
             has_default = len(node.args) + len(node.keywords) > 1
             self._use('parameter', name, node.args[0], is_optional=True, has_default=has_default)
-        for argument in (*node.args[1:], *(keyword.value for keyword in node.keywords)):
-            self.visit(argument)
+        yield from (*node.args[1:], *(keyword.value for keyword in node.keywords))
 
-    def _visit_pass(self, node: ast.Call, function: str) -> None:
+    def _visit_pass(self, node: ast.Call, function: str) -> Iterator[ast.AST]:
         places: list[tuple[int | str, ast.expr]] = list(enumerate(node.args))
         places += [(each.arg or '', each.value) for each in node.keywords]
         # After `*arguments`, positions are unknown.
@@ -206,7 +206,7 @@ class _UseVisitor(ControlFlowVisitor):
                     )
                 )
             else:
-                self.visit(value)
+                yield value
 
     def _text(self, node: ast.expr | None) -> str | None:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.python_source.modules import FunctionNode
+    from composer.python_source.syntax import FunctionNode
 
 # Expressions whose value is never `None`.
 _VALUES = (
@@ -66,9 +66,14 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
 
 def _ends(body: list[ast.stmt]) -> bool:
     """Return whether every path through a block ends with `return`."""
-    last = body[-1]
-    if isinstance(last, ast.If):
-        return bool(last.orelse) and _ends(last.body) and _ends(last.orelse)
-    if isinstance(last, ast.With | ast.AsyncWith):
-        return _ends(last.body)
-    return isinstance(last, ast.Return)
+    pending = [body]
+    while pending:
+        block = pending.pop()
+        last = block[-1] if block else None
+        if isinstance(last, ast.If):
+            pending += [last.body, last.orelse]
+        elif isinstance(last, ast.With | ast.AsyncWith):
+            pending.append(last.body)
+        elif not isinstance(last, ast.Return):
+            return False
+    return True

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 import warnings
+from collections import deque
 from contextlib import suppress
-from time import sleep
+from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
+from composer.executor.descriptors import ExecutorError
+from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -20,8 +24,10 @@ if TYPE_CHECKING:
 
     from rclpy.context import Context
 
-# After an unexpected error of the executor itself, which must not flood the log.
+# After an unexpected error of the executor itself, and how many of them in a row end the system.
 _PAUSE_SEC = 0.1
+_MOST_FAILURES = 3
+_RECOVERED_SEC = 10.0
 
 
 class NoResponseError(ComposerError):
@@ -36,6 +42,10 @@ class SystemExecutor(ComposerExecutor):
             others; `None` for no limit.
         log: Takes the text of an error outside all behaviours, after which the executor goes on.
         on_lost: Called when the context was shut down before `stop`.
+        on_broken: Called when the executor cannot go on, with the reason.
+
+    Attributes:
+        errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
@@ -44,13 +54,16 @@ class SystemExecutor(ComposerExecutor):
         threads: int | None,
         log: Callable[[str], None],
         on_lost: Callable[[], None] | None = None,
+        on_broken: Callable[[str], None] | None = None,
     ) -> None:
         with warnings.catch_warnings():
             # rclpy warns of a single thread, but means its own executors.
             warnings.simplefilter('ignore', UserWarning)
             super().__init__(threads, context=context)
-        self._log = log
+        self.errors = ErrorReporter(log)
         self._on_lost = on_lost
+        self._on_broken = on_broken
+        self._failures: deque[float] = deque(maxlen=_MOST_FAILURES)
         self._is_stopped = False
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True
@@ -75,7 +88,7 @@ class SystemExecutor(ComposerExecutor):
         if not isinstance(error, NoResponseError):
             # An error raised here would end the thread that spins.
             with suppress(Exception):
-                self._log(format_internal_error(error))
+                self.errors.report('a callback', error, format_internal_error)
 
     def _keep_spinning(self) -> None:
         self._spin_on()
@@ -89,5 +102,25 @@ class SystemExecutor(ComposerExecutor):
             except (ShutdownException, ExternalShutdownException):
                 return
             except BaseException as error:  # noqa: BLE001 - one error must not end all nodes
+                if self._is_broken_by(error):
+                    self._break(error)
+                    return
                 self.report(error)
                 sleep(_PAUSE_SEC)
+
+    def _is_broken_by(self, error: BaseException) -> bool:
+        """Return whether the executor cannot spin any more."""
+        self._failures.append(monotonic())
+        first, last = self._failures[0], self._failures[-1]
+        is_frequent = (
+            self._failures.maxlen == len(self._failures) and last - first < _RECOVERED_SEC
+        )
+        is_closed = isinstance(error, OSError) and error.errno == errno.EBADF
+        return is_closed or isinstance(error, ExecutorError) or is_frequent
+
+    def _break(self, error: BaseException) -> None:
+        # It was broken on purpose, or by accident: nothing is certain to work.
+        with suppress(BaseException):
+            if self._on_broken is not None and not self._is_stopped:
+                is_known = isinstance(error, ExecutorError)
+                self._on_broken(str(error) if is_known else format_internal_error(error))

@@ -4,7 +4,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.executor.c_bindings import ExecutorError, check_word_size
+from composer.executor.c_bindings import check_word_size
+from composer.executor.descriptors import ExecutorError
 
 pytestmark = pytest.mark.ros
 

@@ -14,7 +14,7 @@ from spinning import spinning, wait_for
 from std_msgs.msg import Empty
 
 from composer.executor import event_fds
-from composer.executor.c_bindings import write_eventfd
+from composer.executor.descriptors import write_eventfd
 from composer.executor.event_poller import EventPoller
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -151,7 +151,7 @@ def test_an_event_of_a_listener_that_has_just_gone_is_skipped(poller):
     heard: list[str] = []
     (listener,) = attach(poller, heard, 'a')
     listener.write()
-    arrived = poller._wait(5.0)
+    arrived = poller._epoll.poll(5.0)
     assert arrived
     poller.event_fds.detach(listener)
     poller._dispatch(arrived)

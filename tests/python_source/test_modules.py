@@ -205,7 +205,10 @@ def test_what_is_not_python_says_where(tmp_path, content, line):
 
 def test_an_unreadable_module_says_why(tmp_path):
     source = read_module(tmp_path / 'gone.py')
-    assert source.syntax_error == f'{tmp_path}/gone.py: No such file or directory'
+    assert (
+        source.syntax_error
+        == f'{tmp_path}/gone.py: cannot read the file: No such file or directory'
+    )
 
 
 def test_other_encodings_are_read(tmp_path):

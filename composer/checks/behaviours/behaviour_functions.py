@@ -20,17 +20,18 @@ if TYPE_CHECKING:
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     """Check all behaviours without importing them."""
-    broken: set[str] = set()
+    told: set[str] = set()
     for node in context.spec.nodes.values():
         for binding in node_bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
             module = context.modules.find(binding.behaviour.module)
-            if isinstance(module, MissingModule) or not module.syntax_error:
+            if isinstance(module, MissingModule) or not (module.syntax_error or module.unread):
                 yield from _check_source(context, binding, module)
-            elif binding.behaviour.module not in broken:
-                broken.add(binding.behaviour.module)
-                yield _explain_broken_module(context, binding, module)
+            elif binding.behaviour.module not in told:
+                told.add(binding.behaviour.module)
+                explain = _explain_broken_module if module.syntax_error else _explain_unread_module
+                yield explain(context, binding, module)
 
 
 def check_behaviour_call(
@@ -66,6 +67,20 @@ def _explain_broken_module(
         part=behaviour.module,
         first=True,
         related=[Related('the error is here', place)] if place else [],
+    )
+
+
+def _explain_unread_module(
+    context: CheckContext, binding: Binding, module: ModuleSource
+) -> Diagnostic:
+    behaviour = binding.behaviour
+    return context.at_value(
+        behaviour.path,
+        'unread-module',
+        f"the module '{behaviour.module}' is not checked: {module.unread}",
+        part=behaviour.module,
+        first=True,
+        help='put its behaviours into a smaller module',
     )
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from composer.entity_kinds import BehaviourKey, EntityKind
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
-    from composer.python_source.modules import FunctionNode
+    from composer.python_source.syntax import FunctionNode
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'wrong-annotation'
