@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer import confidential
 from composer.language.arguments import values_from_words
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
@@ -50,6 +51,7 @@ def load_system(
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
     """
+    confidential.begin([path, *layers])
     documents = [read_document(each) for each in (path, *layers)]
     return _load(apply_set_values(merge_documents(documents), set_values), path, words)
 
@@ -58,6 +60,7 @@ def load_system_text(
     text: str | bytes, path: Path = Path('<text>'), words: Sequence[str] | None = None
 ) -> LoadedSystem:
     """Read the text of a file that would be at `path`."""
+    confidential.begin([path])
     content = text.encode() if isinstance(text, str) else text
     return _load(parse_document(content, str(path)), path, words)
 

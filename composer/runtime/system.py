@@ -216,7 +216,7 @@ class System:
         if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
-            node.errors.flush()
+            node.flush_counts()
         self._executor.errors.flush()
         if ended:
             self._end_graph()

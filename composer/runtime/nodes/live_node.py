@@ -253,12 +253,18 @@ class LiveNode:
             if kind.is_timed:
                 yield from self.entities.get(kind.section, {}).values()
 
+    def flush_counts(self) -> None:
+        """Log the counts of what has not been logged."""
+        self.errors.flush()
+        for end in self.endpoints:
+            end.losses.flush()
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:
             return
         self._is_destroyed = True
-        self.errors.flush()
+        self.flush_counts()
         for end in self.at_destruction:
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
