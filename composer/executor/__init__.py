@@ -46,8 +46,8 @@ if not hasattr(rclpy.executors, 'TimeoutObject'):
     message = 'the executor needs rclpy 7.1 (ROS 2 Jazzy) or newer, and this one is older'
     raise ComposerError(message, help='source a newer ROS 2, or install its rclpy')
 
-from composer.executor.composer_executor import ComposerExecutor  # noqa: E402
-from composer.executor.descriptors import LostDescriptorError  # noqa: E402
-from composer.executor.sources.qos_events import checked_seldom  # noqa: E402
+from composer.executor.composer_executor import ComposerExecutor
+from composer.executor.descriptors import LostDescriptorError
+from composer.executor.sources.qos_events import checked_seldom
 
 __all__ = ['ComposerExecutor', 'LostDescriptorError', 'checked_seldom']
