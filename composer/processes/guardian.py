@@ -30,6 +30,8 @@ STACKS_SIGNAL = signal.SIGRTMAX
 BEGUN, OVER, LEAVE = 101, 102, 103
 
 _HURRY_SEC = 1.0
+# How long a process that ends may take from its last descriptor to its end.
+_CLOSING_SEC = 0.5
 # How long the threads of Composer get to print their stacks, and the process to end.
 _STACKS_SEC = 0.3
 _END_SEC = 2.0
@@ -46,7 +48,7 @@ class Guardian:
     """Watches Composer until it has ended.
 
     Args:
-        composer: The process ID of Composer.
+        composer: A descriptor of the process.
         reports: Where the bytes come from.
         switch: A byte that is written there ends Composer.
         stop_sec: How long a stop may take.
@@ -56,16 +58,13 @@ class Guardian:
     def __init__(
         self, composer: int, reports: int, switch: int, stop_sec: float, exit_sec: float
     ) -> None:
-        self._composer = composer
+        self._ended = composer
         self._reports = reports
         self._switch = switch
         self._stop_sec = stop_sec
         self._exit_sec = exit_sec
-        self._ended = os.pidfd_open(composer)
         self._deadline = _NEVER
         self._interrupts = 0
-        # Python takes back the handler of its stacks when it exits.
-        self._is_exiting = False
         self._has_left = False
 
     def run(self) -> bool:
@@ -80,14 +79,21 @@ class Guardian:
                 return True
             ready = {each for each, _ in poll.poll(None if rest == _NEVER else rest * 1000 + 1)}
             if self._ended in ready:
+                if self._deadline == _NEVER:
+                    tell(
+                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
+                        'killed, or a behaviour called os._exit'
+                    )
                 return True
             if self._reports in ready:
                 data = os.read(self._reports, _CHUNK)
                 if not data:
-                    # A behaviour has closed the descriptors of Composer.
                     poll.unregister(self._reports)
+                if not data and not self._wait(_CLOSING_SEC):
+                    # It has not ended: a behaviour has closed the descriptors of Composer.
                     self._take(BEGUN)
-                    self._signal(signal.SIGTERM)
+                    # Not counted if the system stops already.
+                    self._signal(signal.SIGHUP)
                 for byte in data:
                     self._take(byte)
         return False
@@ -101,7 +107,6 @@ class Guardian:
         if byte in {signal.SIGINT, signal.SIGTERM} and self._interrupts > 1:
             self._deadline = min(self._deadline, now + _HURRY_SEC)
         if byte == OVER:
-            self._is_exiting = True
             self._deadline = now + self._exit_sec
         if byte == LEAVE:
             self._has_left = True
@@ -110,9 +115,8 @@ class Guardian:
         tell(
             '[FATAL] [composer]: the system did not end in time, and is ended; its threads are at'
         )
-        if not self._is_exiting:
-            self._signal(STACKS_SIGNAL)
-            self._wait(_STACKS_SEC)
+        self._signal(STACKS_SIGNAL)
+        self._wait(_STACKS_SEC)
         with contextlib.suppress(OSError):
             os.write(self._switch, b'\0')
         if not self._wait(_END_SEC):
@@ -180,18 +184,16 @@ def kill_marked(mark: int) -> None:
 
 
 def main() -> None:
-    """Guard; the arguments are those of `Guardian`, and the mark, 0 for none."""
+    """Guard; the arguments: ID of Composer, those of `Guardian`, and the mark, 0 for none."""
     composer, reports, switch = (int(each) for each in sys.argv[1:4])
     stop_sec, exit_sec, mark = float(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    ended = os.pidfd_open(composer)
     # No child of Composer, or a behaviour that waits for all of its own would wait for ever.
     if os.fork():
         os._exit(0)
-    has_ended = True
-    with contextlib.suppress(ProcessLookupError):
-        has_ended = Guardian(composer, reports, switch, stop_sec, exit_sec).run()
-    if has_ended and mark:
+    if Guardian(ended, reports, switch, stop_sec, exit_sec).run() and mark:
         kill_marked(mark)
 
 

@@ -97,6 +97,13 @@ class GuardianClient:
             self.mark = 0
 
 
+def _find_marked(mark: int) -> dict[int, str]:
+    # Where a behaviour has used up all descriptors, the guardian ends them afterwards.
+    with suppress(OSError):
+        return guardian.find_marked(mark)
+    return {}
+
+
 def end_marked(mark: int, timeout_sec: float, logger: EscapingLogger) -> bool:
     """End all processes that bear a mark, and log which.
 
@@ -105,7 +112,7 @@ def end_marked(mark: int, timeout_sec: float, logger: EscapingLogger) -> bool:
     """
     deadline = monotonic() + timeout_sec
     known: set[int] = set()
-    while found := guardian.find_marked(mark):
+    while found := _find_marked(mark):
         if monotonic() > deadline:
             guardian.kill_marked(mark)
             return False
@@ -169,8 +176,12 @@ def _create_switch() -> int:
         block.sigevent.notify = _SIGEV_THREAD
         block.sigevent.function = ctypes.cast(libc._exit, ctypes.c_void_p).value  # noqa: SLF001
         libc.aio_read(ctypes.byref(block))
+    # When Python exits, it restores what was before its own handler.
+    libc.signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))
     with suppress(AttributeError, RuntimeError, ValueError):
         # There may be no standard error.
         stderr: Any = sys.__stderr__
         faulthandler.register(guardian.STACKS_SIGNAL, file=stderr, all_threads=True)
+        if not faulthandler.is_enabled():
+            faulthandler.enable(file=stderr)
     return switch

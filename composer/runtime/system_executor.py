@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import errno
 import threading
 import warnings
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _PAUSE_SEC = 0.1
 _MOST_FAILURES = 3
 _RECOVERED_SEC = 10.0
+_MOST_NAMES = 5
 
 
 class NoResponseError(ComposerError):
@@ -63,7 +65,8 @@ class SystemExecutor(ComposerExecutor):
         self.errors = ErrorReporter(log)
         self._on_lost = on_lost
         self._on_broken = on_broken
-        self._failures: deque[float] = deque(maxlen=_MOST_FAILURES)
+        self._failures = deque([float('-inf')] * _MOST_FAILURES, maxlen=_MOST_FAILURES)
+        self._builtins = dict(builtins.__dict__)
         self._is_stopped = False
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True
@@ -91,9 +94,11 @@ class SystemExecutor(ComposerExecutor):
                 self.errors.report('a callback', error, format_internal_error)
 
     def _keep_spinning(self) -> None:
-        self._spin_on()
-        if self._on_lost is not None and not self._is_stopped:
-            self._on_lost()
+        try:
+            self._spin_on()
+        finally:
+            if self._on_lost is not None and not self._is_stopped:
+                self._on_lost()
 
     def _spin_on(self) -> None:
         while not self._is_shutdown and self.context.ok():
@@ -102,8 +107,9 @@ class SystemExecutor(ComposerExecutor):
             except (ShutdownException, ExternalShutdownException):
                 return
             except BaseException as error:  # noqa: BLE001 - one error must not end all nodes
-                if self._is_broken_by(error):
-                    self._break(error)
+                replaced = self._restore_builtins()
+                if replaced or self._is_broken_by(error):
+                    self._break(error, replaced)
                     return
                 self.report(error)
                 sleep(_PAUSE_SEC)
@@ -111,16 +117,23 @@ class SystemExecutor(ComposerExecutor):
     def _is_broken_by(self, error: BaseException) -> bool:
         """Return whether the executor cannot spin any more."""
         self._failures.append(monotonic())
-        first, last = self._failures[0], self._failures[-1]
-        is_frequent = (
-            self._failures.maxlen == len(self._failures) and last - first < _RECOVERED_SEC
-        )
+        is_frequent = self._failures[-1] - self._failures[0] < _RECOVERED_SEC
         is_closed = isinstance(error, OSError) and error.errno == errno.EBADF
         return is_closed or isinstance(error, ExecutorError) or is_frequent
 
-    def _break(self, error: BaseException) -> None:
-        # It was broken on purpose, or by accident: nothing is certain to work.
-        with suppress(BaseException):
-            if self._on_broken is not None and not self._is_stopped:
-                is_known = isinstance(error, ExecutorError)
-                self._on_broken(str(error) if is_known else format_internal_error(error))
+    def _restore_builtins(self) -> list[str]:
+        """Give Python back the builtins that it had, for the stop; return which were replaced."""
+        now = builtins.__dict__
+        replaced = [name for name, value in self._builtins.items() if now.get(name) is not value]
+        now.update(self._builtins)
+        return replaced
+
+    def _break(self, error: BaseException, replaced: list[str]) -> None:
+        if replaced:
+            reason = f'builtins were replaced: {", ".join(replaced[:_MOST_NAMES])}'
+        elif isinstance(error, ExecutorError):
+            reason = str(error)
+        else:
+            reason = format_internal_error(error)
+        if self._on_broken is not None and not self._is_stopped:
+            self._on_broken(reason)
