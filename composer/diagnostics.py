@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
+from composer.confidential import conceal
 from composer.rules import Severity, load_rule
 from composer.terminal import escape
 
@@ -94,6 +95,10 @@ class Related:
     message: str
     span: Span
 
+    def __post_init__(self) -> None:
+        """Hide what must not be shown."""
+        object.__setattr__(self, 'message', conceal(self.message))
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
@@ -114,6 +119,11 @@ class Diagnostic:
     span: Span | None = None
     help: str | None = None
     related: tuple[Related, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Hide what must not be shown."""
+        object.__setattr__(self, 'message', conceal(self.message))
+        object.__setattr__(self, 'help', self.help and conceal(self.help))
 
     def with_related(self, related: Iterable[Related]) -> Diagnostic:
         """Return the same finding with more related places."""

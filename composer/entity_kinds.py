@@ -56,7 +56,7 @@ class EntityKind:
         has_group: Whether it has the key `group`; the behaviours of others run in no group.
         is_timed: Whether a timer calls its behaviour; what creates it returns something with
             rclpy's `reset` and `cancel`.
-        missed: What it can miss if callbacks take too long, as attributes of the executor's
+        missed: What it can miss if callbacks take too long, as attributes of
             `MissedCounts`, by their names in diagnostics.
         behaviours: The keys that name its behaviours.
         unused: What to say of one that no behaviour uses; `None` if behaviours do not use them.

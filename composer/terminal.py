@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+
 _INDENT = '  '
 
 
@@ -35,6 +37,29 @@ def escape_lines(text: str) -> str:
     first, *others = text.split('\n')
     lines = (f'{_INDENT}{escape(line)}' if line else '' for line in others)
     return '\n'.join([escape(first), *lines])
+
+
+class EscapingLogger:
+    """A ROS logger for texts that quote what others have written.
+
+    A logger of rclpy accepts one level from each line of code, so each level has its own.
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self.name: str = logger.name
+        self._logger = logger
+
+    def info(self, text: str) -> None:
+        """Log what happened."""
+        self._logger.info(escape_lines(text))
+
+    def warning(self, text: str) -> None:
+        """Log what may be wrong."""
+        self._logger.warning(escape_lines(text))
+
+    def error(self, text: str) -> None:
+        """Log what is wrong."""
+        self._logger.error(escape_lines(text))
 
 
 def colour_of(environment: Mapping[str, str]) -> bool | None:

@@ -86,6 +86,10 @@ class Child:
         self._reader.start()
 
     @property
+    def pid(self):
+        return self._process.pid
+
+    @property
     def output(self):
         return '\n'.join(self.lines)
 

@@ -21,6 +21,7 @@ ROOMS = (
         'input_limits',
         'names',
         'ament',
+        'confidential',
         'entity_kinds',
         'rules',
         'diagnostics',

@@ -21,6 +21,7 @@ from composer.cli.argument_types import (
 from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
 from composer.reports import FORMATS
+from composer.terminal import escape
 
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
@@ -98,7 +99,7 @@ def up_command(
         click.echo(context.get_help())
         if words:
             paths, _ = split_words(words)
-            click.echo(f'\n{paths[0]}: {describe_file_arguments(paths)}')
+            click.echo(f'\n{escape(str(paths[0]))}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
     return up(paths, arguments, context.obj, log_levels, set_values, ends_process=True)

@@ -20,6 +20,7 @@ from composer.interfaces.definitions.rendering import render_definition
 from composer.interfaces.search_paths import Entries, find_entries
 from composer.language.pipeline import load_system
 from composer.spelling import did_you_mean, find_nearest, suggest
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -171,7 +172,7 @@ def show(name: str) -> int:
         raise UnknownInterfaceError(message, help=_advise(name))
     click.echo(f'# {description.name}')
     for line in render_definition(description, comments=True):
-        click.echo(line)
+        click.echo(escape(line.expandtabs()))
     return ExitCode.DONE
 
 

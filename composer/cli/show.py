@@ -13,6 +13,7 @@ from composer.checks.checker import create_context
 from composer.checks.parameter_files import check_parameter_files
 from composer.cli.output import show_findings
 from composer.cli.show_comments import append_comments, find_kept_comments
+from composer.confidential import origin_of
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -22,7 +23,7 @@ from composer.language.pipeline import load_system
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
-from composer.yaml_text.writer import render_yaml
+from composer.yaml_text.writer import Expression, render_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -140,6 +141,8 @@ def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
     if 'interfaces' in data:
         folders = data['interfaces'].items()
         absolute['interfaces'] = {package: _absolute(folder) for package, folder in folders}
+    if 'environment' in data:
+        absolute['environment'] = _without_values(data['environment'])
     for section in ('nodes', 'processes'):
         if section in data:
             entries = data[section].items()
@@ -153,7 +156,24 @@ def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
         changed['cwd'] = _absolute(entry['cwd'])
     if 'parameter_files' in entry:
         changed['parameter_files'] = [_absolute(text) for text in entry['parameter_files']]
+    if 'env' in entry:
+        changed['env'] = _without_values(entry['env'])
     return entry | changed
+
+
+def _without_values(variables: dict[str, Any]) -> dict[str, Any]:
+    """Return variables without those values that are from the environment itself."""
+    return {name: _hidden(value) for name, value in variables.items()}
+
+
+def _hidden(value: Any) -> Any:
+    origin = origin_of(value)
+    if origin is None:
+        return value
+    name = origin.partition('"')[2].rpartition('"')[0]
+    if os.environ.get(name) != value:
+        return f'<from {origin}>'
+    return Expression(f"{{{{ env('{name}') }}}}")
 
 
 def _absolute(path: str) -> str:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from composer.confidential import may_show_lines
 from composer.reports.report import relative_path
 
 if TYPE_CHECKING:
@@ -41,20 +42,47 @@ class Excerpts:
         self._spans: dict[DataPath, list[tuple[DataPath, Span]]] = defaultdict(list)
         for path, span in positions.values.items():
             self._spans[path[:_NODE]].append((path, span))
+        self._masked = dict(self._mask_environments())
 
     def of(self, path: DataPath) -> list[Excerpt]:
         """Return the lines of an entry: those below its key, then those elsewhere."""
         key = self._positions.key(path)
         spans = [span for at, span in self._spans[path[:_NODE]] if at[: len(path)] == path]
         last = _last_line(key, spans)
-        found = [_excerpt(key.source, range(key.line, last + 1))]
+        found = [self._excerpt(key.source, range(key.line, last + 1))]
         elsewhere: dict[SourceFile, set[int]] = defaultdict(set)
         for span in spans:
             if span.source is not key.source or not key.line <= span.line <= last:
                 elsewhere[span.source].add(span.line)
+        found = found if may_show_lines(key.source.name) else []
         for source, numbers in elsewhere.items():
-            found += [_excerpt(source, run) for run in _runs(sorted(numbers))]
+            if may_show_lines(source.name):
+                found += [self._excerpt(source, run) for run in _runs(sorted(numbers))]
         return found[:_MOST_EXCERPTS]
+
+    def _excerpt(self, source: SourceFile, numbers: range) -> Excerpt:
+        name = relative_path(source.name) if source.home is None else source.name
+        if source.home is not None and (source, 1) in self._masked:
+            name = f'{name.partition("=")[0]}=…'
+        lines = (self._masked.get((source, each), source.line(each)) for each in numbers)
+        return Excerpt(name, numbers.start, tuple(lines))
+
+    def _mask_environments(self) -> Iterator[tuple[tuple[SourceFile, int], str]]:
+        """Yield the lines with environment variables of processes, without their values."""
+        for path, spans in list(self._spans.items()):
+            if path[:1] != ('processes',):
+                continue
+            within = [span for at, span in spans if at[_NODE : _NODE + 1] == ('env',)]
+            for span in within:
+                before = span.source.line(span.line)[: span.column - 1]
+                yield (span.source, span.line), f'{before}…'
+            key = self._positions.keys.get((*path, 'env'))
+            if key is not None:
+                for number in range(key.line + 1, _last_line(key, within) + 1):
+                    line = key.source.line(number)
+                    yield (key.source, number), f'{line[: len(line) - len(line.lstrip())]}…'
+                before = key.source.line(key.line)[: key.column - 1]
+                yield (key.source, key.line), f'{before}env: …'
 
 
 def _last_line(key: Span, spans: Iterable[Span]) -> int:
@@ -84,8 +112,3 @@ def _runs(numbers: Iterable[int]) -> Iterator[range]:
         end = number + 1
     if start:
         yield range(start, end)
-
-
-def _excerpt(source: SourceFile, numbers: range) -> Excerpt:
-    name = relative_path(source.name) if source.home is None else source.name
-    return Excerpt(name, numbers.start, tuple(map(source.line, numbers)))

@@ -28,9 +28,9 @@ The way of a message:
 Beside that way: `deadlines` makes timers ready, `qos_events` QoS events, `wait_set_thread` all
 else that is not announced, and `entity_registry` keeps the sources in step with the entities of
 the nodes.
-`spinner` puts these parts together for `composer_executor`, whose methods are rclpy's;
-`switch_interval` says how long a computing callback may hold up the others, and `after_fork` what
-a forked child does with all this.
+`spinner` puts these parts together for `composer_executor`, whose methods are rclpy's, and
+`after_fork` says what a forked child does with all this. A guest of theirs is `switch_interval`:
+how long a computing callback may hold up the others.
 
 Locks are held for moments, and nothing is called under them but the next in this order:
 `entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_fds`.
@@ -39,7 +39,6 @@ Callbacks, takes and waits run under none.
 
 from composer.executor.composer_executor import ComposerExecutor
 from composer.executor.descriptors import LostDescriptorError
-from composer.executor.sources.event_source import MissedCounts
 from composer.executor.sources.qos_events import checked_seldom
 
-__all__ = ['ComposerExecutor', 'LostDescriptorError', 'MissedCounts', 'checked_seldom']
+__all__ = ['ComposerExecutor', 'LostDescriptorError', 'checked_seldom']

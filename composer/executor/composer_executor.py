@@ -3,6 +3,7 @@
 import atexit
 import os
 import threading
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -10,15 +11,25 @@ from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
-from rclpy.task import Future
+from rclpy.task import Future, Task
 
+from composer.executor.after_fork import RefusedSpinner
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
 from composer.executor.scheduler import ExecutorTask, ScheduledTask
-from composer.executor.sources.event_source import MissedCounts
-from composer.executor.spinner import GRACE_SEC, Spinner
+from composer.executor.spinner import Spinner
+from composer.executor.switch_interval import short_switch_interval
 
 _MAX_THREADS = 256
+_NEVER_CALLED = (
+    '_make_handler',
+    '_take_client',
+    '_take_guard_condition',
+    '_take_service',
+    '_take_subscription',
+    '_take_timer',
+    '_take_waitable',
+)
 
 
 class ComposerExecutor(MultiThreadedExecutor):
@@ -29,32 +40,53 @@ class ComposerExecutor(MultiThreadedExecutor):
     - Without `num_threads`, threads are added as callbacks block, up to 256, so a slow callback
       delays nobody outside its group. With it, so many callbacks run at the same time.
     - `spin_once` waits up to 50 ms for the end of the callback that it began.
-    - `shutdown` waits for running callbacks, as rclpy documents; but not for the one it is called
-      from, and without `timeout_sec` not for long once the context has been shut down.
-    - Several threads may spin at the same time.
-    - While one does, the process's `sys.getswitchinterval()` is at most 1 ms: see
-      `switch_interval`.
+    - `shutdown` waits for running callbacks, as rclpy documents; but not for those that call it.
+    - Several threads may spin at the same time, and callbacks may, whatever `num_threads` is.
+    - It takes messages itself: a subclass that overrides rclpy's `_take_*` or `_make_handler` is
+      warned. `can_execute` may be overridden; `wake` makes the executor ask again.
+    - A forked child cannot use it.
+    - While `spin` and `spin_until_future_complete` run, `sys.getswitchinterval()` of the process
+      is at most 1 ms: see `switch_interval`.
 
     Args:
         num_threads: How many callbacks may run at the same time; None for as many as block.
         context: The context; None for the default one.
 
     Attributes:
+        calls_immediately: That `create_task` calls an `ImmediateCallback` at once.
+        has_own_rules: Whether a subclass says what may be executed.
         is_forked: Whether this process is a child that was forked after the executor was made.
     """
+
+    calls_immediately = True
 
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
         super().__init__(num_threads, context=context)  # Its pool is never used.
         self.is_forked = False
+        self.has_own_rules = type(self).can_execute is not ComposerExecutor.can_execute
         self._spinner = Spinner(self, num_threads or _MAX_THREADS, self._guard, self._sigint_gc)
         _executors.add(self)
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        super().__init_subclass__(**arguments)
+        for name in _NEVER_CALLED:
+            if getattr(cls, name, None) is not getattr(MultiThreadedExecutor, name, None):
+                message = f'{cls.__name__}.{name} is never called by ComposerExecutor'
+                warnings.warn(message, stacklevel=2)
+
+    def can_execute(self, entity: Any) -> bool:
+        """Tell whether the callback of `entity` may be executed; a subclass may have its rules."""
+        return bool(entity.callback_group.can_execute(entity))
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
         """Add a callback or coroutine to be executed during `spin`; returns its future."""
         if type(callback) is ImmediateCallback:
-            callback(*args)
+            if not self.is_forked:
+                callback(*args)
             return None
         task: Any = ExecutorTask(callback, args, kwargs, executor=self)
+        if self.is_forked:
+            return task  # A future may have created it. It runs when the executor spins: never.
         self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
 
@@ -69,7 +101,7 @@ class ComposerExecutor(MultiThreadedExecutor):
     @contextmanager
     def waiting(self) -> Iterator[None]:
         """Let a callback wait for others: meanwhile it does not count against `num_threads`."""
-        if not self._spinner.workers.hand_over_in_callback():
+        if self.is_forked or not self._spinner.workers.hand_over_in_callback():
             yield
             return
         self._spinner.scheduler.add_waiting(1)
@@ -80,6 +112,7 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def add_node(self, node: Any) -> bool:
         """Run the callbacks of `node`; returns False if the executor has it already."""
+        scheduler = self._spinner.scheduler  # Refused in a forked child.
         with _moving:
             if node in self._nodes:
                 return False
@@ -89,7 +122,7 @@ class ComposerExecutor(MultiThreadedExecutor):
             with self._nodes_lock:
                 self._nodes.add(node)
             node.executor = self
-        self._spinner.scheduler.retry_suspended()
+        scheduler.retry_suspended()
         self.wake()
         return True
 
@@ -103,16 +136,17 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.scheduler.retry_suspended()
         self.wake()
 
-    def missed_counts(self, node: Any, entity: Any) -> MissedCounts:
-        """Return what a subscription or timer of `node` missed because callbacks took too long.
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Have `observer` told of what comes to a subscription or a timer of `node`.
 
-        Counting begins when the executor listens to the entity; before, it has missed nothing.
+        It is a guest: a `QueueObserver` or a `TickObserver` (`sources.entity_sources`).
         """
-        source = self._spinner.registry.source_of(node, entity)
-        return MissedCounts() if source is None else source.missed_counts()
+        self._spinner.registry.observe(node, entity, observer)
 
     def wake(self) -> None:
         """Look again at the entities, their groups, the context and what is waited for."""
+        if self.is_forked:
+            return
         self._spinner.registry.is_stale = True
         self._spinner.scheduler.retry_deferred()
         self._spinner.wake()
@@ -122,7 +156,8 @@ class ComposerExecutor(MultiThreadedExecutor):
 
         An exception of a callback is raised here; spinning can be resumed after it.
         """
-        self._spinner.spin_until(lambda: False, None)
+        with short_switch_interval:
+            self._spinner.spin(lambda: False, None)
 
     def spin_until_future_complete(
         self,
@@ -133,8 +168,8 @@ class ComposerExecutor(MultiThreadedExecutor):
         if timeout_sec == 0:
             self.spin_once_until_future_complete(future, 0)
             return
-        with _calling_when_done(future, self._spinner.notifier.notify):
-            self._spinner.spin_until(_is_over(future), timeout_sec)
+        with short_switch_interval, self._watching(future) as is_watched:
+            self._spinner.spin(_is_over(future), timeout_sec, is_watched=is_watched)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for one callback and execute it, for at most `timeout_sec` (None: for ever)."""
@@ -148,8 +183,20 @@ class ComposerExecutor(MultiThreadedExecutor):
         """`spin_once`, but stop waiting when `future` is done."""
         if isinstance(timeout_sec, TimeoutObject):
             timeout_sec = float(timeout_sec.timeout)
-        with _calling_when_done(future, self._spinner.wake):
-            self._spinner.spin_once(_is_over(future), timeout_sec)
+        with self._watching(future) as is_watched:
+            self._spinner.spin_once(_is_over(future), timeout_sec, is_watched=is_watched)
+
+    @contextmanager
+    def _watching(self, future: Any) -> Iterator[bool]:
+        """Look again when `future` is done; yields whether that needs looking after callbacks."""
+        callback = ImmediateCallback(self._spinner.notifier.notify)
+        future.add_done_callback(callback)
+        try:
+            # Any other class may compute whether it is done, or call when nobody listens.
+            yield type(future) not in (Future, Task, ExecutorTask)
+        finally:
+            with suppress(AttributeError):  # As that of concurrent.futures.
+                future.remove_done_callback(callback)
 
     def shutdown(self, timeout_sec: float | None = None, *, wait_for_threads: bool = True) -> bool:
         """Begin no more callbacks and wait for those that run.
@@ -161,11 +208,12 @@ class ComposerExecutor(MultiThreadedExecutor):
         Returns:
             False if callbacks still ran after that time; then this can be called again.
         """
+        if self.is_forked:
+            return True
         self._is_shutdown = True
-        must_end = timeout_sec is not None or self._spinner.is_context_valid()
-        if not self._spinner.stop(timeout_sec if must_end else GRACE_SEC) and must_end:
+        if not self._spinner.stop(timeout_sec):
             return False
-        self._spinner.tear_down(self.get_nodes(), GRACE_SEC if wait_for_threads else 0.0)
+        self._spinner.tear_down(self.get_nodes(), wait_for_threads=wait_for_threads)
         with self._nodes_lock:
             self._nodes: set[Any] = set()
         with self._shutdown_lock:
@@ -182,36 +230,28 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.report(error)
 
     def halt(self) -> None:
-        """End the threads: rclpy aborts a process that exits while one of them waits in it."""
+        """Wait for running callbacks, as rclpy's pool does when the interpreter ends.
+
+        Then end the threads: rclpy aborts a process that exits while one of them waits in it.
+        """
         self._is_shutdown = True
-        self._spinner.stop(GRACE_SEC)
+        self._spinner.stop(None)
         self._spinner.wait_set_thread.close()
 
-    def reset_after_fork(self) -> None:
-        """Be shut down, without destroying anything: this is a forked child."""
+    def leave_to_parent(self) -> None:
+        """Refuse to spin and destroy nothing: this is a forked child."""
         self.is_forked = self._is_shutdown = True
-        _kept_for_parent.append(
-            (self._spinner, dict(vars(self._spinner.registry)), self._sigint_gc)
-        )
+        _kept_for_parent.append((self._spinner, self._sigint_gc))
+        self._spinner.leave_to_parent()
+        refused: Any = RefusedSpinner()
+        self._spinner = refused
         self._guard = self._sigint_gc = None
         self._nodes = set()
-        self._spinner.reset_after_fork()
 
     def __del__(self) -> None:
         """Do what rclpy does; `__init__` may have failed half-way."""
         with suppress(AttributeError, InvalidHandle, ValueError):
             super().__del__()
-
-
-@contextmanager
-def _calling_when_done(future: Any, function: Callable[[], None]) -> Iterator[None]:
-    """Have `function` called when `future` is done, if that is in this context."""
-    callback = ImmediateCallback(function)
-    future.add_done_callback(callback)
-    try:
-        yield
-    finally:
-        future.remove_done_callback(callback)
 
 
 def _is_over(future: Any) -> Callable[[], bool]:
@@ -233,11 +273,11 @@ def _halt_all() -> None:
 _kept_for_parent: list[Any] = []
 
 
-def _reset_all_after_fork() -> None:
+def _leave_all_to_parent() -> None:
     _moving._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001
     for executor in tuple(_executors):
-        executor.reset_after_fork()
+        executor.leave_to_parent()
     _executors.clear()
 
 
-os.register_at_fork(after_in_child=_reset_all_after_fork)
+os.register_at_fork(after_in_child=_leave_all_to_parent)

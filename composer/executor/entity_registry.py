@@ -4,12 +4,14 @@ import threading
 from contextlib import suppress
 from time import monotonic
 from typing import Any, TypeGuard
+from weakref import WeakKeyDictionary
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 
+from composer.executor.event_fds import UNKNOWN_COUNT
 from composer.executor.sources.entity_sources import (
     ClientSource,
     ServiceSource,
@@ -51,6 +53,7 @@ class EntityRegistry:
         self._wait_set_thread = wait_set_thread
         self._lock = threading.RLock()
         self._nodes: dict[Any, _NodeEntities] = {}
+        self._observers: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self._rest_until = 0.0
         self.is_stale = False
 
@@ -66,6 +69,10 @@ class EntityRegistry:
         if self.is_stale:
             self.refresh()
 
+    def flush(self) -> None:
+        """Return when what only the wait set thread sees is queued, if it was triggered before."""
+        self._wait_set_thread.flush_if_used()
+
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
         with self._lock:
@@ -80,10 +87,15 @@ class EntityRegistry:
             end = monotonic()
             self._rest_until = end + _REST_FACTOR * (end - begin)
 
-    def source_of(self, node: Any, entity: Any) -> EventSource | None:
-        """Return the source of an entity of `node`, None if the executor does not listen to it."""
-        entities = self._nodes.get(node)
-        return None if entities is None else entities.sources.get(entity)
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Have `observer` told what happens to an entity of `node`."""
+        with self._lock:
+            self._observers[entity] = observer
+            entities = self._nodes.get(node)
+            source = None if entities is None else entities.sources.get(entity)
+            if source is not None:
+                source.observer = observer
+                source.on_events(UNKNOWN_COUNT)
 
     def drop(self, node: Any) -> None:
         """Stop listening to the entities of `node`."""
@@ -92,10 +104,6 @@ class EntityRegistry:
             if entities is not None:
                 for source in entities.sources.values():
                     self._close(source)
-
-    def reset_after_fork(self) -> None:
-        """Forget the sources: the parent process listens to the entities."""
-        self._nodes = {}
 
     def _refresh_node(self, node: Any) -> None:
         seen = self._nodes.setdefault(node, _NodeEntities())
@@ -129,6 +137,7 @@ class EntityRegistry:
             if entity not in seen.sources:
                 with suppress(InvalidHandle):
                     source = source_class(entity, node, self._parts)
+                    source.observer = self._observers.get(entity)
                     self._open(source)
                     seen.sources[entity] = source
 

@@ -2,7 +2,8 @@
 
 `await future` in rclpy is a generator that yields until the future is done; rclpy's executors
 resume it over and over. Here the future tells when it is done. A coroutine that yields for another
-reason is resumed at once, then at growing intervals.
+reason is resumed at once, then at growing intervals; so is one that awaits a future of an executor
+that may never tell, as it calls nobody while it does not spin.
 """
 
 import types
@@ -13,13 +14,15 @@ from typing import Any
 
 from rclpy.task import Future
 
+from composer.executor.after_fork import end_child
 from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
-from composer.executor.scheduler import ExecutorTask, ScheduledTask
+from composer.executor.scheduler import ExecutorTask, ScheduledTask, Session
 from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
 
 _RETRY_SEC = 0.001
+_LINGER_SEC = 0.05
 _FUTURE_AWAIT = Future.__await__.__code__
 
 
@@ -29,63 +32,108 @@ class EventLoop:
     Args:
         parts: The parts of the executor.
         registry: Compared with the nodes when it is stale.
-        execute: Executes what the scheduler started.
+        runner: Executes what the scheduler started.
         on_error: Receives what the loop itself raised.
-        on_end: Called when a worker stops leading.
+        notify: Makes those who spin look again.
+
+    Attributes:
+        watchers: Those who want to look again after each callback.
     """
 
     def __init__(
         self,
         parts: ExecutorParts,
         registry: EntityRegistry,
-        execute: Callable[[Any], bool],
+        runner: 'CallbackRunner',
         on_error: Callable[[BaseException], None],
-        on_end: Callable[[], None],
+        notify: Callable[[], None],
     ) -> None:
-        self.workers = WorkerThreads(self._lead, on_error)
+        self.workers = WorkerThreads(self._lead, self._on_takeover, on_error)
+        self.watchers: set[object] = set()
         self._parts = parts
         self._registry = registry
-        self._execute = execute
+        self._runner = runner
         self._on_error = on_error
-        self._on_end = on_end
+        self._notify = notify
         self._refresh_later: DelayedCall | None = None
 
     def _lead(self, me: Worker) -> None:
         """Lead until nobody spins, or another worker leads."""
         workers, scheduler, poller = self.workers, self._parts.scheduler, self._parts.poller
         try:
-            while workers.is_leader(me, self._is_spinning):
+            while self._goes_on(me):
+                if scheduler.unlooked:
+                    self._look(me)
+                    continue
                 if self._execute_ready(me) or scheduler.running:
-                    if poller.peek() or not self._is_idle():
+                    if not self._is_spinning() or poller.peek() or not self._is_idle():
                         continue
                     if scheduler.running:
                         workers.let_standby_sleep(me)
                 if workers.leader is me:
-                    poller.wait_if(self._is_idle, None)
+                    poller.wait_if(self._is_idle)
+                    if self._is_spinning():
+                        poller.peek()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
-            scheduler.is_spinning = False
-            workers.is_leader(me, self._is_spinning)
+            workers.stop_leading(me)  # Whoever spins on starts another leader.
             self._on_error(error)
-        self._on_end()
+        self._notify()
+
+    def _goes_on(self, me: Worker) -> bool:
+        """Tell whether `me` goes on leading: it waits a little for the next session."""
+        if not self._is_spinning() and self.workers.leader is me:
+            self.workers.let_standby_sleep(me)
+            # What comes meanwhile is taken in rclpy's order when somebody spins again.
+            scheduler = self._parts.scheduler
+            self._parts.poller.wait_for_wake_if(
+                lambda: not scheduler.is_spinning and not scheduler.is_closed, _LINGER_SEC
+            )
+        return self.workers.is_leader(me, self._is_spinning)
+
+    def _on_takeover(self) -> None:
+        if self._parts.scheduler.admitted:
+            self._notify()
+
+    def _look(self, me: Worker) -> None:
+        """Look at everything for the sessions that were opened, and execute what is ready."""
+        scheduler = self._parts.scheduler
+        sessions = tuple(scheduler.unlooked)
+        self._registry.refresh_if_stale()
+        self._runner.resume_paused()
+        if any(session.admits_one for session in sessions):
+            self._registry.flush()
+            self._parts.poller.peek()
+        while self._execute_ready(me) and any(map(_is_waiting, sessions)):
+            pass  # What was ready had nothing to take.
+        if self.workers.leader is me:
+            scheduler.set_looked(sessions)
+            if any(session.is_late for session in sessions):
+                self._notify()
 
     def _execute_ready(self, me: Worker) -> bool:
         """Execute about what is ready now; False if there is no more, or `me` was replaced."""
         workers, scheduler = self.workers, self._parts.scheduler
-        registry, execute = self._registry, self._execute
+        registry, execute = self._registry, self._runner.execute
         left = len(scheduler) or 1
         tasks_follow = True
         while left:
             if registry.is_stale:
                 self._refresh()
-            work = scheduler.start_next()
+            work = scheduler.start_next(me)
             if work is None:
                 return False
             workers.begin_callback(me)
             if work.slow:
                 workers.hand_over(me)
-            execute(work)
+            if me.session is not None and workers.is_alone():
+                self._notify()  # Nobody will take over.
+            has_run = execute(work)
             work.slow = monotonic() - me.busy_since > TAKEOVER_SEC
             me.busy_since = 0.0
+            if len(scheduler):
+                self._parts.poller.wake()
+            if me.session is not None or self.watchers:
+                self._finish_session(me, has_run=has_run)
             if workers.leader is not me:
                 return False
             left -= 1
@@ -94,6 +142,12 @@ class EventLoop:
                 left = scheduler.count_tasks()
                 tasks_follow = False
         return True
+
+    def _finish_session(self, me: Worker, *, has_run: bool) -> None:
+        session, me.session = me.session, None
+        if session is not None:
+            self._parts.scheduler.finish_session(session, has_run=has_run)
+        self._notify()
 
     def _refresh(self) -> None:
         rest_sec = self._registry.rest_sec()
@@ -109,6 +163,7 @@ class EventLoop:
         return not (
             (self._registry.is_stale and self._refresh_later is None)
             or self._parts.deadlines.jumped
+            or self._parts.scheduler.unlooked
             or not self._parts.scheduler.is_spinning
             or self._parts.scheduler.has_work()
         )
@@ -117,11 +172,16 @@ class EventLoop:
         return self._parts.scheduler.is_spinning
 
 
+def _is_waiting(session: Session) -> bool:
+    return session.admits_one and session.work is None
+
+
 class CallbackRunner:
     """Executes what the scheduler started, and resumes what was suspended."""
 
     def __init__(self, parts: ExecutorParts) -> None:
         self._executor = parts.executor
+        self._has_own_rules = parts.executor.has_own_rules
         self._scheduler = parts.scheduler
         self._deadlines = parts.deadlines
         self._paused: set[ScheduledTask] = set()
@@ -141,16 +201,21 @@ class CallbackRunner:
     def _execute_source(self, source: EventSource) -> bool:
         outcome: Any = NOTHING
         suspended = False
-        begun = source.group.unrestricted
+        entity = source.entity
+        begun = False
         try:
-            begun = begun or source.entity.callback_group.beginning_execution(source.entity)
+            if not self._has_own_rules or self._executor.can_execute(entity):
+                group = source.group
+                begun = group.unrestricted or entity.callback_group.beginning_execution(entity)
             if begun:
                 outcome = source.run()
                 if outcome is not None and outcome is not NOTHING:
                     suspended = self._begin(outcome, source)
+                elif self._executor.is_forked:
+                    end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
             outcome = None
-            self._executor.report(error)
+            self._report(error)
         finally:
             if begun and not suspended:
                 self._end_execution(source)
@@ -182,6 +247,12 @@ class CallbackRunner:
         try:
             coroutine.send(None)
         except StopIteration:
+            has_ended = True
+        else:
+            has_ended = False
+        if self._executor.is_forked:
+            end_child()
+        if has_ended:
             return False
         self._suspend(ScheduledTask(ExecutorTask(coroutine, executor=self._executor), source))
         return True
@@ -194,9 +265,11 @@ class CallbackRunner:
             suspended = not (task.done() or task.cancelled())
             error = None if suspended else task.exception()
             if error is not None:
-                self._executor.report(error)
+                self._report(error)
+            elif self._executor.is_forked:
+                end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
-            self._executor.report(error)
+            self._report(error)
         finally:
             if suspended:
                 self._suspend(scheduled)
@@ -204,9 +277,14 @@ class CallbackRunner:
                 self._end_execution(scheduled.source)
             self._scheduler.finish(scheduled.source, suspended=suspended)
 
+    def _report(self, error: BaseException) -> None:
+        if self._executor.is_forked:
+            end_child(error)
+        self._executor.report(error)
+
     def _suspend(self, task: ScheduledTask) -> None:
         future = _awaited_future(task.task)
-        if future is not None:
+        if future is not None and _tells_at_once(future):
             future.add_done_callback(ImmediateCallback(lambda: self._scheduler.add_task(task)))
             return
         pause_sec = task.next_pause()
@@ -233,6 +311,12 @@ class ImmediateCallback:
     def __call__(self, _: Any) -> None:
         """Call the function, whichever future is done."""
         self._function()
+
+
+def _tells_at_once(future: Any) -> bool:
+    """Tell whether `future` calls an `ImmediateCallback` when it is done."""
+    executor = future._executor()  # noqa: SLF001
+    return executor is None or hasattr(executor, 'calls_immediately')
 
 
 def _awaited_future(task: Any) -> Any:

@@ -10,7 +10,6 @@ from time import monotonic
 from composer.executor.after_fork import replace_descriptors
 from composer.executor.deadlines import Deadlines
 from composer.executor.descriptors import (
-    EPOLL,
     TIMER,
     LostDescriptorError,
     peek_epoll,
@@ -20,15 +19,14 @@ from composer.executor.descriptors import (
 )
 from composer.executor.event_fds import EventFds, check_watched
 
-_MAX_EVENTS = 512
 _CHECK_SEC = 1.0
 
 
 class EventPoller:
     """Waits for events and deadlines, at a cost that depends only on how many have come.
 
-    All listeners have been called when `peek` or `wait_if` returns. Both raise
-    `LostDescriptorError` if somebody has closed or replaced a descriptor, a second later at most.
+    All listeners have been called when `peek` returns. It raises `LostDescriptorError` if somebody
+    has closed or replaced a descriptor, a second later at most.
     """
 
     def __init__(self) -> None:
@@ -62,30 +60,25 @@ class EventPoller:
             self._check()
         return bool(arrived)
 
-    def wait_if(self, is_idle: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Wait for events if `is_idle()`, else only look; for at most a second.
+    def wait_if(self, is_idle: Callable[[], bool]) -> None:
+        """Wait if `is_idle()` until there is something for `peek`, for at most a second.
 
         Whoever makes `is_idle()` false meanwhile calls `wake`.
         """
+        self._wait_if(is_idle, self._epoll.fileno(), _CHECK_SEC)
+
+    def wait_for_wake_if(self, is_idle: Callable[[], bool], timeout_sec: float) -> None:
+        """Wait if `is_idle()` until `wake` is called or `timeout_sec` has passed."""
+        self._wait_if(is_idle, self._wake_fd, timeout_sec)
+
+    def _wait_if(self, is_idle: Callable[[], bool], fd: int, timeout_sec: float) -> None:
         me = get_ident()
         self._waiting_threads.add(me)
         try:
-            sec = _CHECK_SEC if timeout_sec is None else min(timeout_sec, _CHECK_SEC)
-            arrived = self._wait(sec if is_idle() else 0)
+            if is_idle():
+                wait_readable(fd, timeout_sec)
         finally:
             self._waiting_threads.discard(me)
-        self._dispatch(arrived)
-        self.deadlines.rearm_after_jumps()
-        if monotonic() >= self._next_check:
-            self._check()
-
-    def _wait(self, timeout_sec: float) -> list[tuple[int, int]]:
-        if timeout_sec:
-            wait_readable(self._epoll.fileno(), timeout_sec)
-        try:
-            return self._epoll.poll(0, _MAX_EVENTS)
-        except OSError as error:
-            raise LostDescriptorError(EPOLL, self._epoll.fileno()) from error
 
     def _check(self) -> None:
         """Check that nobody has closed a descriptor: no event would come, and no word of it."""
@@ -111,18 +104,18 @@ class EventPoller:
         event_fd = self.event_fds.by_number.get(event[0])
         return 0 if event_fd is None else event_fd.rank
 
-    def reset_after_fork(self) -> None:
-        """Replace the descriptors shared with the parent process; the new ones are silent."""
+    def leave_to_parent(self) -> None:
+        """Close the descriptors that this process, a forked child, shares with its parent."""
         self._waiting_threads.clear()
-        self.deadlines.timer.reset_after_fork()
+        self.deadlines.timer.close()
         if self._epoll.closed:
             return
-        eventfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        replace_descriptors((self._wake_fd, *self.event_fds.by_number), eventfd)
-        os.close(eventfd)
-        with select.epoll() as epoll:
-            replace_descriptors((self._epoll.fileno(),), epoll.fileno())
-        self.event_fds.by_number.clear()
+        silent = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        replace_descriptors(self.event_fds.by_number, silent)
+        os.close(silent)
+        self._epoll.close()
+        wake_fd, self._wake_fd = self._wake_fd, -1
+        os.close(wake_fd)
 
     def close(self) -> None:
         """Close the descriptors; nothing else may be called after that."""

@@ -7,7 +7,7 @@ of the middleware before it can run: what waits longer than the QoS depth allows
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
@@ -36,6 +36,41 @@ class Group:
         self.unrestricted = type(callback_group) is ReentrantCallbackGroup
         self.active = False
         self.parked: deque[QueuedSource] = deque()
+
+
+class Session:
+    """A call of `spin` or `spin_once`: callbacks may begin while one is open.
+
+    Args:
+        admits_one: Whether one callback may begin by it, not any number.
+
+    Attributes:
+        work: What has begun, if it admits one.
+        has_ended: Whether that has ended.
+        is_closed: Whether nothing begins by it any more.
+        is_late: Whether it is closed as soon as it has looked.
+        has_looked: Whether what was ready when it was opened has begun, as far as it could.
+    """
+
+    __slots__ = ('admits_one', 'has_ended', 'has_looked', 'is_closed', 'is_late', 'work')
+
+    def __init__(self, *, admits_one: bool) -> None:
+        self.admits_one = admits_one
+        self.work: Any = None
+        self.has_ended = False
+        self.is_closed = False
+        self.has_looked = False
+        self.is_late = False
+
+
+class Starter(Protocol):
+    """A thread that executes what it starts.
+
+    Attributes:
+        session: The session of what it executes, if that admits one callback.
+    """
+
+    session: Session | None
 
 
 class QueuedSource(Protocol):
@@ -106,8 +141,10 @@ class Scheduler:
     Attributes:
         running: How many callbacks have begun and not ended.
         waiting: How many of these wait for others, and do not count against `max_running`.
-        is_spinning: Whether callbacks may begin, because a thread spins.
-        is_closed: Whether no callback begins any more.
+        is_spinning: Whether callbacks may begin, because a session is open that admits them.
+        is_closed: Whether nothing begins any more.
+        admitted: How many callbacks run of sessions that admit one.
+        unlooked: The sessions that have not looked yet.
     """
 
     def __init__(
@@ -117,7 +154,11 @@ class Scheduler:
         self.running = 0
         self.waiting = 0
         self.is_spinning = False
+        self.admitted = 0
+        self.unlooked: list[Session] = []
         self.is_closed = False
+        self._unlimited: set[Session] = set()
+        self._admitting: deque[Session] = deque()
         self._max_running = max_running
         self._wake = wake
         self._has_node = has_node
@@ -142,6 +183,38 @@ class Scheduler:
 
     def _has_free_slot(self) -> bool:
         return self.running - self.waiting < self._max_running
+
+    def open_session(self, session: Session) -> None:
+        """Let callbacks begin by `session`."""
+        with self.lock:
+            if self.is_closed:
+                return
+            if session.admits_one:
+                self._admitting.append(session)
+            else:
+                self._unlimited.add(session)
+            self.unlooked.append(session)
+            self.is_spinning = True
+
+    def close_session(self, session: Session) -> None:
+        """Let no callback begin by `session` any more."""
+        with self.lock:
+            session.is_closed = True
+            self._unlimited.discard(session)
+            for sessions in (self._admitting, self.unlooked):
+                if session in sessions:
+                    sessions.remove(session)
+            self._set_spinning()
+
+    def set_looked(self, sessions: Iterable[Session]) -> None:
+        """Note that what was ready has begun, as far as it could."""
+        with self.lock:
+            for session in sessions:
+                session.has_looked = True
+            self.unlooked = [session for session in self.unlooked if not session.has_looked]
+
+    def _set_spinning(self) -> None:
+        self.is_spinning = not self.is_closed and bool(self._unlimited or self._admitting)
 
     def group_of(self, callback_group: Any) -> Group:
         """Return the state of `callback_group`."""
@@ -193,13 +266,13 @@ class Scheduler:
         with self.lock:
             self._new_tasks += kept
 
-    def start_next(self, *, alone: bool = False) -> Any:
-        """Return a source or a task to execute now, or None; `finish` must follow.
+    def start_next(self, starter: Starter) -> Any:
+        """Return a source or a task that `starter` executes now, or None.
 
-        With `alone`, also while nobody spins: for the one callback of `spin_once`.
+        `finish` must follow, and `finish_session` if this gave the starter a session.
         """
         with self.lock:
-            if self.is_closed or not (alone or self.is_spinning) or not self._has_free_slot():
+            if not self.is_spinning or not self._has_free_slot():
                 return None
             if not (self._tasks or self._new_tasks):
                 work: Any = self._next_source()
@@ -209,6 +282,12 @@ class Scheduler:
                 work = self._next_source() or self._next_task()
             if work is not None:
                 self.running += 1
+                if self._admitting:
+                    session = self._admitting.popleft()
+                    session.work = work
+                    starter.session = session
+                    self.admitted += 1
+                    self._set_spinning()
             return work
 
     def finish(self, source: QueuedSource | None, *, suspended: bool = False) -> None:
@@ -217,6 +296,17 @@ class Scheduler:
             self.running -= 1
             if source is not None and not suspended:
                 self._release(source)
+
+    def finish_session(self, session: Session, *, has_run: bool) -> None:
+        """Note that the callback of `session` has ended; another may begin if it has not run."""
+        with self.lock:
+            self.admitted -= 1
+            if has_run or self.is_closed or session.is_closed:
+                session.has_ended = True
+            else:
+                session.work = None
+                self._admitting.appendleft(session)
+                self.is_spinning = True
 
     def defer(self, source: QueuedSource) -> None:
         """Undo the start of `source`, because its group refused; `retry_deferred` requeues it."""
@@ -249,13 +339,6 @@ class Scheduler:
         with self.lock:
             self.is_closed = True
             self.is_spinning = False
-
-    def reset_after_fork(self, running: int) -> None:
-        """Start nothing any more; `running` of the running callbacks are in this process."""
-        self.is_closed = True
-        self.is_spinning = False
-        self.running = running
-        self.waiting = 0
 
     def _release(self, source: QueuedSource) -> None:
         group = source.group

@@ -1,9 +1,8 @@
 """What spinning is: puts the parts of one executor together, and lets them run."""
 
-import threading
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
@@ -11,16 +10,18 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.executor.after_fork import end_child, reset_locks
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.event_loop import CallbackRunner, EventLoop
+from composer.executor.scheduler import Session
 from composer.executor.sources.event_source import ExecutorParts
-from composer.executor.switch_interval import short_switch_interval
 from composer.executor.wait_set_thread import WaitSetThread
-from composer.executor.worker_threads import TAKEOVER_SEC, Worker
+from composer.executor.worker_threads import TAKEOVER_SEC
 
 GRACE_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
+
+_MAX_LOOK_SEC = 1.0
+_MAX_END_SEC = 1.0
 
 
 class Notifier:
@@ -75,22 +76,18 @@ class Spinner:
         self.is_shutdown = False
         self.wait_set_thread = WaitSetThread(guard, sigint_guard, executor.context, self)
         self.registry = EntityRegistry(parts, self.wait_set_thread)
-        loop = EventLoop(parts, self.registry, self._execute, self.report, self.notifier.notify)
-        self.workers = loop.workers
+        runner = CallbackRunner(parts)
+        self._loop = EventLoop(parts, self.registry, runner, self.report, self.notifier.notify)
+        self.workers = self._loop.workers
         self._executor = executor
-        self._runner = CallbackRunner(parts)
-        self._spinning = 0
-        self._spinning_once = 0
-        self._count_lock = threading.Lock()
-        self._waiting_for_end = 0
+        self._waiting_callbacks: set[object] = set()
+        self._are_callbacks_free = False
         self._errors: deque[BaseException] = deque()
 
     # Errors and wake-ups
 
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins, unless it only means a lost context."""
-        if self.workers.is_forked:
-            end_child(error)
         if isinstance(error, _rclpy.RCLError) and not self.is_context_valid():
             return
         self._errors.append(error)
@@ -98,8 +95,11 @@ class Spinner:
 
     def _raise_error(self) -> None:
         """Raise the oldest error that was reported and not raised yet."""
-        if self._errors:
-            raise self._errors.popleft()
+        try:
+            error = self._errors.popleft()
+        except IndexError:
+            return
+        raise error
 
     def wake(self) -> None:
         """Make the leader and all threads that wait look again."""
@@ -120,170 +120,130 @@ class Spinner:
 
     # Spinning
 
-    def spin_until(self, condition: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Let workers execute callbacks until `condition()`, an error, a timeout or the end."""
-        self._raise_error()
-        self._start_spinning()
+    def spin(
+        self, is_over: Callable[[], bool], timeout_sec: float | None, *, is_watched: bool = False
+    ) -> None:
+        """Let workers execute callbacks until `is_over()`, an error, a timeout or the end.
+
+        Args:
+            is_over: Whether to return; who makes it true calls `notifier.notify`.
+            timeout_sec: None or negative for ever.
+            is_watched: Whether callbacks may make `is_over()` true without that.
+        """
+        session = Session(admits_one=False)
         try:
+            with self._open(session, is_watched=is_watched):
+                self._wait_until_over(session, is_over, timeout_sec)
+        finally:
+            if not self.scheduler.is_spinning:
+                self._wait_for_end(GRACE_SEC)
+        self._raise_error()
+
+    def spin_once(
+        self, is_over: Callable[[], bool], timeout_sec: float | None, *, is_watched: bool = False
+    ) -> None:
+        """Let a worker execute one callback; stop waiting for one when `is_over()`."""
+        session = Session(admits_one=True)
+        with self._open(session, is_watched=is_watched):
+            self._wait_until_over(session, is_over, timeout_sec)
+        self._raise_error()
+
+    @contextmanager
+    def _open(self, session: Session, *, is_watched: bool) -> Iterator[None]:
+        """Let callbacks begin by `session` meanwhile, in the place of one that spins itself."""
+        self._raise_error()
+        with self._executor.waiting():
+            try:
+                self.wait_set_thread.add_user(session)
+                if is_watched:
+                    self._loop.watchers.add(session)
+                self.scheduler.open_session(session)
+                self.poller.wake()
+                yield
+            finally:
+                self.scheduler.close_session(session)
+                self._loop.watchers.discard(session)
+                self.wait_set_thread.remove_user(session)
+
+    def _wait_until_over(
+        self, session: Session, is_over: Callable[[], bool], timeout_sec: float | None
+    ) -> None:
+        """Wait until `session` is over; until its callback has ended, if that takes no time."""
+
+        def has_begun_or_is_over() -> bool:
+            if session.work or self._errors or not self._is_alive() or is_over():
+                return True
+            # There is none yet, or an error has ended it.
+            self.workers.start()
+            return False
+
+        deadline = None if timeout_sec is None or timeout_sec < 0 else monotonic() + timeout_sec
+        while True:
+            left_sec = None if deadline is None else max(0.0, deadline - monotonic())
+            if not self.notifier.wait_for(has_begun_or_is_over, left_sec):
+                # What is ready runs, however short the time is.
+                session.is_late = True
+                self.notifier.wait_for(
+                    lambda: session.has_looked or has_begun_or_is_over(), _MAX_LOOK_SEC
+                )
+            if not session.work:
+                self.scheduler.close_session(session)
+            work = session.work
+            if work is None:
+                return
             self.notifier.wait_for(
-                lambda: bool(self._errors) or condition() or not self._is_alive(), timeout_sec
+                lambda: session.has_ended or not session.work,
+                TAKEOVER_SEC if work.slow else GRACE_SEC,
             )
-        finally:
-            self._stop_spinning()
-        self._raise_error()
-
-    def spin_once(self, condition: Callable[[], bool], timeout_sec: float | None) -> None:
-        """Let a worker execute one callback; stop waiting for one when `condition()`."""
-        self._raise_error()
-        if timeout_sec is not None and timeout_sec < 0:
-            timeout_sec = None
-        deadline = None if timeout_sec is None else monotonic() + timeout_sec
-        self.wait_set_thread.add_user()
-        with self._count_lock:
-            self._spinning_once += 1
-        try:
-            if self._is_alive():
-                self._look_at_everything()
-            while self._is_alive() and not condition() and not self._run_one():
-                left = None if deadline is None else deadline - monotonic()
-                if left is not None and left <= 0:
-                    break
-                self._wait_for_work(left)
-        finally:
-            with self._count_lock:
-                self._spinning_once -= 1
-            self.wait_set_thread.remove_user()
-            if self.is_shutdown:
-                self.notifier.notify()
-        self._raise_error()
-
-    def _execute(self, work: Any) -> bool:
-        """Execute what the scheduler started; False if there was nothing to take."""
-        ran = self._runner.execute(work)
-        if len(self.scheduler):
-            self.poller.wake()
-        if self._waiting_for_end:
-            self.notifier.notify()
-        return ran
+            if session.work or session.is_closed:
+                return
 
     def stop(self, timeout_sec: float | None) -> bool:
         """Begin no more callbacks, ever; returns whether those that ran have ended in time."""
-        with self._count_lock:
-            self.is_shutdown = True
-            self.scheduler.close()
+        self.is_shutdown = True
+        self.scheduler.close()
         self.wake()
         return self._wait_for_end(timeout_sec)
 
-    def tear_down(self, nodes: list[Any], timeout_sec: float) -> None:
-        """Stop listening to `nodes`, end the threads, and close what they waited for.
-
-        Args:
-            nodes: The nodes.
-            timeout_sec: How long to wait for the end of the threads.
-        """
+    def tear_down(self, nodes: list[Any], *, wait_for_threads: bool) -> None:
+        """Stop listening to `nodes`, end the threads, and close what they waited for."""
         for node in nodes:
             with suppress(InvalidHandle):
                 self.registry.drop(node)
         self.wait_set_thread.close()
-        self.workers.end(timeout_sec)
-        if not self.workers.is_in_callback():
-            self.notifier.wait_for(lambda: not self._spinning_once, GRACE_SEC)
-        if not self._spinning_once and not self.workers.has_threads():
+        # Other callbacks that shut down, too, keep their threads a little longer.
+        end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC
+        self.workers.end(end_sec if wait_for_threads else 0.0)
+        if not self.workers.has_threads():
             self.poller.close()
 
-    def reset_after_fork(self) -> None:
-        """Be shut down: this is a forked child, and all of this belongs to its parent."""
-        others = (self.wait_set_thread, self.registry, self.workers)
-        reset_locks((self, self._executor, self.scheduler, self.poller, self.poller.deadlines))
-        reset_locks(others)
+    def leave_to_parent(self) -> None:
+        """Let nobody go on here: this is a forked child, and all of this belongs to its parent."""
         self.is_shutdown = True
-        self.scheduler.reset_after_fork(int(self.workers.is_in_callback()))
-        for part in (self.poller, *others):
-            part.reset_after_fork()
-
-    def _start_spinning(self) -> None:
-        self.wait_set_thread.add_user()
-        short_switch_interval.add_user()
-        with self._count_lock:
-            self._spinning += 1
-            self.scheduler.is_spinning = not self.is_shutdown
-        if self.scheduler.is_spinning:
-            self.workers.start()
-
-    def _stop_spinning(self) -> None:
-        with self._count_lock:
-            self._spinning -= 1
-            last = not self._spinning
-            if last:
-                self.scheduler.is_spinning = False
-        short_switch_interval.remove_user()
-        self.wait_set_thread.remove_user()
-        if last:
-            self.poller.wake()
-            self._wait_for_end(GRACE_SEC)
-
-    def _look_at_everything(self) -> None:
-        self.registry.refresh_if_stale()
-        self.wait_set_thread.flush_if_used()
-        self._runner.resume_paused()
-        self.poller.peek()
-
-    def _wait_for_work(self, timeout_sec: float | None) -> None:
-        if self._spinning:  # Another thread leads, and may take the event or the wake-up.
-            timeout_sec = GRACE_SEC if timeout_sec is None else min(timeout_sec, GRACE_SEC)
-        self.poller.wait_if(self._is_idle, timeout_sec)
-        self.registry.refresh_if_stale()
-
-    def _run_one(self) -> bool:
-        """Have a worker run one callback, if one is ready, and wait a little for its end."""
-        while (work := self.scheduler.start_next(alone=True)) is not None:
-            job = _OneCallback(self._execute, work)
-            self.workers.run(job)
-            if job.has_run(TAKEOVER_SEC if work.slow else GRACE_SEC):
-                return True
-        return False
+        self.poller.leave_to_parent()
+        self.workers.leave_to_parent()
 
     def _wait_for_end(self, timeout_sec: float | None) -> bool:
-        """Wait until no callback runs, except the one from which this is called."""
-        with self._count_lock:
-            self._waiting_for_end += 1
-        try:
-            return self.notifier.wait_for(self._nothing_runs, timeout_sec)
-        finally:
-            with self._count_lock:
-                self._waiting_for_end -= 1
-
-    def _nothing_runs(self) -> bool:
+        """Wait until no callback runs, except those that wait here themselves."""
+        me = object()
+        has_ended = self._has_nothing_running
+        self._loop.watchers.add(me)
         if self.workers.is_in_callback():
-            return self.scheduler.running <= 1
-        return not self.scheduler.running and self.workers.leader is None
+            has_ended = self._have_others_ended
+            self._waiting_callbacks.add(me)
+            self.notifier.notify()
+        try:
+            return self.notifier.wait_for(has_ended, timeout_sec)
+        finally:
+            self._loop.watchers.discard(me)
+            self._waiting_callbacks.discard(me)
 
-    def _is_idle(self) -> bool:
-        return not (
-            self.registry.is_stale
-            or self.poller.deadlines.jumped
-            or self.scheduler.has_work()
-            or not self._is_alive()
-        )
+    def _has_nothing_running(self) -> bool:
+        return not self.scheduler.running
 
-
-class _OneCallback:
-    """A worker's job for `spin_once`: to execute what may turn out to be nothing."""
-
-    def __init__(self, execute: Callable[[Any], bool], work: Any) -> None:
-        self._execute = execute
-        self._work = work
-        self._ran = True
-        self._ended = threading.Lock()
-        self._ended.acquire()
-
-    def __call__(self, worker: Worker) -> None:
-        worker.busy_since = begin = monotonic()
-        self._ran = self._execute(self._work)
-        worker.busy_since = 0.0
-        self._work.slow = monotonic() - begin > TAKEOVER_SEC
-        self._ended.release()
-
-    def has_run(self, timeout_sec: float) -> bool:
-        """Wait for the end; False only if there was nothing to run."""
-        return not self._ended.acquire(timeout=timeout_sec) or self._ran
+    def _have_others_ended(self) -> bool:
+        if self.scheduler.running <= len(self._waiting_callbacks):
+            # After a shutdown nothing begins: what is true for one of them stays true for all.
+            self._are_callbacks_free = self.is_shutdown
+            return True
+        return self._are_callbacks_free

@@ -28,7 +28,7 @@ INTERVAL_SEC = 0.001
 
 
 class ShortSwitchInterval:
-    """Shortens the interpreter's switch interval while any executor of the process spins.
+    """Shortens the interpreter's switch interval while it is entered, in any thread.
 
     An interval that is shorter already, or that somebody sets meanwhile, is not changed.
     """
@@ -39,16 +39,14 @@ class ShortSwitchInterval:
         self._before_sec = 0.0
         os.register_at_fork(after_in_child=self._reset_lock)
 
-    def add_user(self) -> None:
-        """Shorten the interval until `remove_user`."""
+    def __enter__(self) -> None:
         with self._lock:
             self._users += 1
             if self._users == 1 and sys.getswitchinterval() > INTERVAL_SEC:
                 self._before_sec = sys.getswitchinterval()
                 sys.setswitchinterval(INTERVAL_SEC)
 
-    def remove_user(self) -> None:
-        """Undo `add_user`; the last one restores the interval."""
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._users -= 1
             if self._users or not self._before_sec:

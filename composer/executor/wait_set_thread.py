@@ -69,7 +69,7 @@ class WaitSetThread:
         self._flushes = 0
         self._thread: threading.Thread | None = None
         self._closing = False
-        self._users = 0
+        self._users: set[object] = set()
         self._waited_for: set[WaitSetSource] = set()
         self._signalled_until = 0.0
         self._events_from = 0.0
@@ -88,20 +88,28 @@ class WaitSetThread:
             self._waited_for.discard(source)
         self.flush()
 
-    def add_user(self) -> None:
-        """Run until `remove_user`."""
+    def add_user(self, user: object) -> None:
+        """Run until `remove_user`.
+
+        Raises:
+            RuntimeError: The process may have no more threads.
+        """
         with self._lock:
-            self._users += 1
+            self._users.add(user)
             if self._thread is None and not self._closing:
                 self._thread = threading.Thread(
                     target=self._run, name='executor-wait-set', daemon=True
                 )
-                self._thread.start()
+                try:
+                    self._thread.start()
+                except RuntimeError:
+                    self._thread = None
+                    raise
 
-    def remove_user(self) -> None:
+    def remove_user(self, user: object) -> None:
         """Undo `add_user`."""
         with self._lock:
-            self._users -= 1
+            self._users.discard(user)
 
     def wake(self) -> None:
         """Make the thread look at its sources again."""
@@ -137,11 +145,6 @@ class WaitSetThread:
         if thread is not None and thread is not threading.current_thread():
             thread.join(_FLUSH_SEC)
 
-    def reset_after_fork(self) -> None:
-        """Forget the thread, which is not in the child."""
-        self._closing = True
-        self._thread = None
-
     def _run(self) -> None:
         try:
             self._wait_and_check()
@@ -159,7 +162,7 @@ class WaitSetThread:
         while True:
             with self._lock:
                 requests = self._flush_requests
-                unused = self._users == 0
+                unused = not self._users
                 if not unused:
                     unused_since = None
                 elif unused_since is None:

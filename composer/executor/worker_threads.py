@@ -16,16 +16,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import get_ident
 from time import monotonic, sleep
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from composer.executor.after_fork import end_child
 from composer.executor.descriptors import LostDescriptorError, TimerFd
+
+if TYPE_CHECKING:
+    from composer.executor.scheduler import Session
 
 TAKEOVER_SEC = 0.001
 """How long a callback of the leader may take before the standby takes over."""
 
 _TAKEOVER_NS = int(TAKEOVER_SEC * 1e9)
 _MAX_IDLE_SEC = 2.0
+_MAX_IDLE_NS = int(_MAX_IDLE_SEC * 1e9)
 _POLL_SEC = 0.0005
 
 
@@ -34,10 +37,12 @@ class Worker:
 
     Attributes:
         busy_since: When its callback began (monotonic); 0 if it runs none.
+        session: The session of its callback, if that admits one callback.
     """
 
     def __init__(self, threads: 'WorkerThreads', job: Callable[['Worker'], None]) -> None:
         self.busy_since = 0.0
+        self.session: Session | None = None
         self.job: Callable[[Worker], None] | None = job
         self.has_job = threading.Lock()
         self.has_job.acquire()
@@ -49,8 +54,6 @@ class Worker:
             _set_up_thread()
             while self.job is not None:
                 self.job(self)
-                if self._threads.is_forked:
-                    end_child()
                 self.job = None
                 self._threads.wait_for_job(self)
 
@@ -76,21 +79,24 @@ class WorkerThreads:
 
     Args:
         lead: The job of the leader.
+        on_takeover: Called when a standby becomes the leader, because a callback takes long.
         report: Receives what was thrown into a thread from outside while it had no callback.
 
     Attributes:
         leader: The worker that leads, or None.
-        is_forked: Whether this process is a child that was forked after this was made.
     """
 
     def __init__(
-        self, lead: Callable[[Worker], None], report: Callable[[BaseException], None]
+        self,
+        lead: Callable[[Worker], None],
+        on_takeover: Callable[[], None],
+        report: Callable[[BaseException], None],
     ) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
-        self.is_forked = False
         self._standby: Worker | None = None
         self._lead = lead
+        self._on_takeover = on_takeover
         self._report = report
         self._timer = TimerFd(blocking=True)
         self._timer_is_set = False
@@ -134,7 +140,13 @@ class WorkerThreads:
         return True
 
     def start(self) -> None:
-        """Make sure that there are a leader and a standby."""
+        """Make sure that there are a leader and a standby.
+
+        Raises:
+            RuntimeError: The process may have no more threads.
+        """
+        if self.leader is not None and self._standby is not None:
+            return
         with self.lock:
             if self._ending:
                 return
@@ -151,15 +163,28 @@ class WorkerThreads:
                 return False
             if is_wanted():
                 return True
-            self.leader = None
-            worker.busy_since = 0.0
-            self._wake_standby()
+            self._end_leading(worker)
             return False
 
-    def run(self, job: Callable[[Worker], None]) -> None:
-        """Have a worker do `job`."""
+    def stop_leading(self, worker: Worker) -> None:
+        """Let nobody lead if `worker` does."""
         with self.lock:
-            self._give(job)
+            if self.leader is worker:
+                self._end_leading(worker)
+
+    def _end_leading(self, worker: Worker) -> None:
+        self.leader = None
+        worker.busy_since = 0.0
+        if self._ending:
+            self._wake_standby()
+        elif self._standby is not None:
+            # It stays for the next leader, but not for long.
+            self._timer_is_set = False
+            self._timer.expire_in(_MAX_IDLE_NS)
+
+    def is_alone(self) -> bool:
+        """Tell whether nobody stands by."""
+        return self._standby is None
 
     def begin_callback(self, worker: Worker) -> None:
         """Note that `worker`, the leader, begins a callback."""
@@ -209,15 +234,9 @@ class WorkerThreads:
             if not self._count:
                 self._timer.close()
 
-    def reset_after_fork(self) -> None:
-        """Forget the threads, but for one whose callback forked this process."""
-        self.is_forked = True
-        self.leader = self._standby = None
-        self._idle.clear()
-        mine = get_ident()
-        self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
-        self._count = len(self._workers)
-        self._timer.reset_after_fork()
+    def leave_to_parent(self) -> None:
+        """Close the timer that this process, a forked child, shares with its parent."""
+        self._timer.close()
 
     def has_threads(self) -> bool:
         """Tell whether any thread is left."""
@@ -293,6 +312,7 @@ class WorkerThreads:
                         self._takeover.release()
                         self._takeover = None
                     break
+        self._on_takeover()
         self._lead(me)
 
     def _is_late(self, leader: Any) -> bool:

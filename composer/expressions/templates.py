@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import suppress
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import (
@@ -21,6 +22,7 @@ from jinja2 import (
 )
 from jinja2.exceptions import SecurityError
 
+from composer.confidential import hide, origin_of
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.sandbox import Sandbox
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
+_ENV = re.compile(r"""\benv\(\s*['"]([^'"]*)['"]""")
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
 
@@ -121,6 +124,7 @@ class TemplateEvaluator:
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
         span = self.positions.key(path) if is_key else self.positions.value(path)
         sampled = False
+        expressions: list[slice] = []
         try:
             expressions = list(find_expressions(text, self._sandbox))
             names = self._names_in(text, expressions)
@@ -137,10 +141,20 @@ class TemplateEvaluator:
             # To explain one takes long, and nobody sees more.
             if is_sure and self._sandbox.explained <= MAX_FINDINGS:
                 self._sandbox.explained += 1
-                self.document.diagnostics.append(self._explain(error, span))
+                origin = self._hidden_origin(text, expressions)
+                self.document.diagnostics.append(self._explain(error, span, origin))
             return text
 
     def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
+        value = self._join(text, expressions, span)
+        origin = self._hidden_origin(text, expressions)
+        if origin is not None:
+            outside = [text[end.stop : begin.start] for end, begin in pairwise(expressions)]
+            ends = text[: expressions[0].start], text[expressions[-1].stop :]
+            hide(value, origin, ' '.join((*ends, *outside)))
+        return value
+
+    def _join(self, text: str, expressions: list[slice], span: Span) -> Any:
         first, last = expressions[0], expressions[-1]
         outside = text[: first.start], text[last.stop :]
         if first is last and not ''.join(outside).strip():
@@ -155,7 +169,23 @@ class TemplateEvaluator:
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
         scope = {'here': os.path.realpath(span.source.folder), **self._values}
-        return _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
+        value = _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
+        origin = self._hidden_origin(text, [expression])
+        if origin is not None:
+            hide(value, origin)
+        return value
+
+    def _hidden_origin(self, text: str, expressions: list[slice]) -> str | None:
+        """Return the call of `env` that expressions depend on, directly or by a name."""
+        for name in sorted(self._names_in(text, expressions)):
+            if name == 'env' and name not in self._values:
+                called = {found for each in expressions for found in _ENV.findall(text[each])}
+                # A default is none of the environment's.
+                if not called or any(each in os.environ for each in called):
+                    return f'env("{min(called)}")' if called else 'env(…)'
+            elif (origin := origin_of(self._values.get(name))) is not None:
+                return origin
+        return None
 
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
@@ -169,7 +199,7 @@ class TemplateEvaluator:
         used = sorted(names & self._origins.keys())
         return ', '.join(f'{name} = {self._values[name]} ({self._origins[name]})' for name in used)
 
-    def _explain(self, error: Exception, span: Span) -> Diagnostic:
+    def _explain(self, error: Exception, span: Span, origin: str | None) -> Diagnostic:
         if isinstance(error, UndefinedError) and (
             found := _UNDEFINED_NAME.fullmatch(str(error.message))
         ):
@@ -184,7 +214,11 @@ class TemplateEvaluator:
                 f"'{name}' is not defined",
                 help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
-        return diagnostic_at(span, 'bad-expression', _describe(error))
+        if origin is None:
+            return diagnostic_at(span, 'bad-expression', _describe(error))
+        # Its text may quote any part of the value.
+        message = f'the expression raised {type(error).__name__} with a value from {origin}'
+        return diagnostic_at(span, 'bad-expression', message)
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
         """Report that two keys of one mapping evaluate to the same."""

@@ -14,6 +14,7 @@ from composer.ros_parameters.parameter_types import (
     infer_parameter_type,
 )
 from composer.spelling import suggest
+from composer.terminal import escape
 from composer.yaml_text.scalars import ScalarError, parse_plain_scalar
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class ArgumentSpec:
         if self.choices:
             text += f', one of {_listed(self.choices)}'
         text += ', required)' if self.default is None else f', default {_shown(self.default)})'
-        return f'{text}: {self.description}' if self.description else text
+        return f'{text}: {escape(self.description)}' if self.description else text
 
 
 @dataclass(frozen=True, slots=True)

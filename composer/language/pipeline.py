@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer import confidential
+from composer.diagnostics import Diagnostic
 from composer.language.arguments import values_from_words
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
@@ -50,6 +52,7 @@ def load_system(
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
     """
+    confidential.begin([path, *layers])
     documents = [read_document(each) for each in (path, *layers)]
     return _load(apply_set_values(merge_documents(documents), set_values), path, words)
 
@@ -58,12 +61,18 @@ def load_system_text(
     text: str | bytes, path: Path = Path('<text>'), words: Sequence[str] | None = None
 ) -> LoadedSystem:
     """Read the text of a file that would be at `path`."""
+    confidential.begin([path])
     content = text.encode() if isinstance(text, str) else text
     return _load(parse_document(content, str(path)), path, words)
 
 
 def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
+    if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
+        # What is wrong with it would tell what is in it.
+        message = 'this is a link to a file outside of the project that is not a system'
+        system.data = None
+        system.diagnostics = [Diagnostic('unreadable-file', message, str(path))]
     if system.data is not None:
         _load_file(system, partial(values_from_words, words=words))
         Includer(system, _load_file).include_all()

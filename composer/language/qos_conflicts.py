@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from composer.language.qos import INFINITE, NANOSECONDS, format_policy_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
 PolicyValue: TypeAlias = str | float
 
@@ -39,27 +39,39 @@ class QosConflict:
 
     def __str__(self) -> str:
         """Return what is offered and what is requested."""
-        return self._describe('', '')
+        return self.describe('', '')
 
-    def describe_from(self, *, publisher: bool) -> str:
-        """Return the conflict, and what to do about it, as seen from one of both ends.
-
-        Args:
-            publisher: Whether that is the publisher.
-        """
-        if publisher:
-            text, here, there = self._describe(' here', ' there'), self.requested, self.offered
-        else:
-            text, here, there = self._describe(' there', ' here'), self.offered, self.requested
-        return f"{text}; set 'qos: {{{self.policy}: {here}}}' here, or {there} there"
-
-    def _describe(self, publisher: str, subscription: str) -> str:
+    def describe(self, publisher: str, subscription: str) -> str:
+        """Return what is offered and what is requested, with a text after each."""
         offered = format_policy_value(self.policy, self.offered)
         requested = format_policy_value(self.policy, self.requested)
         return (
             f'{self.policy}: {offered} is offered{publisher}, '
             f'{requested} is requested{subscription}'
         )
+
+
+def describe_conflicts(conflicts: Sequence[QosConflict], *, from_publisher: bool) -> str:
+    """Return conflicts, and what to do about them, as seen from one of both ends.
+
+    Args:
+        from_publisher: Whether that is the publisher.
+    """
+    places = (' here', ' there') if from_publisher else (' there', ' here')
+    texts = '; '.join(each.describe(*places) for each in conflicts)
+    offers, requests = (
+        ', '.join(f'{each.policy}: {_format_yaml(value)}' for each, value in values)
+        for values in (
+            [(each, each.offered) for each in conflicts],
+            [(each, each.requested) for each in conflicts],
+        )
+    )
+    here, there = (requests, offers) if from_publisher else (offers, requests)
+    return f"{texts}; set 'qos: {{{here}}}' here, or 'qos: {{{there}}}' there"
+
+
+def _format_yaml(value: PolicyValue) -> str:
+    return value if isinstance(value, str) else f'{value:g}'
 
 
 def find_qos_conflicts(

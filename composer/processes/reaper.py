@@ -26,6 +26,7 @@ import contextlib
 import ctypes
 import json
 import os
+import resource
 import select
 import signal
 import socket
@@ -37,6 +38,8 @@ from typing import Any
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+# See the guardian, which need not kill what the reaper has started.
+_RLIMIT_LOCKS = 10
 _KILL_SEC = 5.0
 _POLL_SEC = 0.02
 _CHUNK = 1 << 16
@@ -300,6 +303,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    _, hard = resource.getrlimit(_RLIMIT_LOCKS)
+    resource.setrlimit(_RLIMIT_LOCKS, (hard, hard))
     os.set_inheritable(descriptor, False)
     reaper = os.fork()
     try:

@@ -24,14 +24,15 @@ from composer.processes.reaper_client import ReaperConnection
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from rclpy.impl.rcutils_logger import RcutilsLogger
-
     from composer.language.specs import ProcessSpec
+    from composer.terminal import EscapingLogger
 
 # How long the last output of a process is waited for.
 _LAST_OUTPUT_SEC = 1.0
 # How long it may take until a killed process is gone.
 _KILLED_SEC = 2.0
+# How long an end that matters is kept back, to be told after the start.
+_LONGEST_START_SEC = 1.0
 _NO_REAPER = {'kind': 'failed', 'doing': 'reaper'}
 
 
@@ -40,10 +41,11 @@ class ProcessSupervisor:
 
     Args:
         logger: The logger of the system.
-        end_system: Called with an exit code when a required process has ended.
+        end_system: Called with an exit code when a required process has ended, or the last of all.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line.
+        is_alone: Whether the system has no nodes.
 
     Attributes:
         by_name: The processes.
@@ -52,11 +54,13 @@ class ProcessSupervisor:
     def __init__(
         self,
         specs: Iterable[ProcessSpec],
-        logger: RcutilsLogger,
+        logger: EscapingLogger,
         end_system: Callable[[int], None],
         timeout_sec: float,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
+        *,
+        is_alone: bool = False,
     ) -> None:
         self.by_name = {spec.name: ExternalProcess(spec) for spec in specs}
         self._logger = logger
@@ -64,6 +68,8 @@ class ProcessSupervisor:
         self._timeout_sec = timeout_sec
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
+        self._is_alone = is_alone
+        self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
         self._watchers: list[threading.Thread] = []
@@ -89,12 +95,17 @@ class ProcessSupervisor:
             self._runs.pop(run.number, None)
             raise _start_error(process.spec, answer)
 
+    def tell_ends(self) -> None:
+        """Log from now on how processes have ended: the system has started, or never will."""
+        self._has_started.set()
+
     def stop(self) -> bool:
         """End all processes, and all that they have started.
 
         Returns:
             Whether none had to be killed.
         """
+        self.tell_ends()
         with self._lock:
             self._stopping.set()
             runs = list(self._runs.values())
@@ -194,12 +205,17 @@ class ProcessSupervisor:
             return
         if not process.is_restarted(code):
             process.is_done = True
+            matters = code != 0 or process.spec.required
+            self._has_started.wait(_LONGEST_START_SEC if matters else None)
             self._log(end + process.describe_limit(code), is_error=code != 0)
             if process.spec.required:
                 self._logger.error(f"process '{name}' is required: the system ends")
                 self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
+            else:
+                self._end_if_last()
             return
         delay_sec = process.backoff.next_delay_sec()
+        self._has_started.wait(_LONGEST_START_SEC)
         self._log(f'{end}; it is started again in {delay_sec:g} s', is_error=code != 0)
         if not self._stopping.wait(delay_sec):
             self._restart(process)
@@ -213,9 +229,19 @@ class ProcessSupervisor:
             process.is_done = True
             if process.spec.required:
                 self._end_system(ExitCode.FAILED)
+            else:
+                self._end_if_last()
+
+    def _end_if_last(self) -> None:
+        """End a system without nodes whose processes have all ended."""
+        self._has_started.wait()
+        processes = self.by_name.values()
+        if self._is_alone and all(each.is_done for each in processes):
+            self._logger.info('all processes have ended: the system ends')
+            have_succeeded = all(each.run is not None and each.run.code == 0 for each in processes)
+            self._end_system(ExitCode.DONE if have_succeeded else ExitCode.FAILED)
 
     def _log(self, text: str, *, is_error: bool) -> None:
-        # A logger of rclpy accepts only one level from each line of code.
         if is_error:
             self._logger.error(text)
         else:

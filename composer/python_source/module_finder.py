@@ -10,14 +10,13 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.confidential import list_lineage
 from composer.input_limits import MAX_TOKENS_OF_MODULES
 from composer.python_source.modules import ModuleSource, read_module
 from composer.spelling import find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-_PROJECT_MARKS = ('pyproject.toml', '.git')
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,15 +39,8 @@ def project_search_path(configs: Iterable[Path]) -> list[Path]:
     `pyproject.toml` or `.git`; if there is none, only the folder of the file.
     """
     folders = dict.fromkeys(Path(os.path.realpath(config)).parent for config in configs)
-    chains = (each for folder in folders for each in _lineage(folder))
+    chains = (each for folder in folders for each in list_lineage(folder))
     return list(dict.fromkeys([Path.cwd(), *chains]))
-
-
-def _lineage(folder: Path) -> list[Path]:
-    """Return a folder and its parents up to the root of the project."""
-    lineage = [folder, *folder.parents]
-    roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in _PROJECT_MARKS)]
-    return lineage[: roots[0] + 1] if roots else [folder]
 
 
 class ModuleFinder:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.confidential import may_show_lines
 from composer.reports.report import count_severities
 from composer.rules import Severity
 from composer.terminal import escape
@@ -78,7 +79,7 @@ def _plain(text: str, **_style: object) -> str:
 
 def _render_excerpt(span: Span) -> tuple[str, str] | None:
     text, start = _cropped(span.source.line(span.line), span.column - 1)
-    if not text.strip():
+    if not text.strip() or not may_show_lines(span.source.name):
         return None
     number = str(span.line)
     before = text[:start]

@@ -46,6 +46,9 @@ def _restore_mask() -> None:
 def _start_child() -> None:
     global in_child  # noqa: PLW0603 - it is a fact of the whole process
     in_child = True
+    with suppress(ValueError):
+        # The signals of the child are none of the guardian's business.
+        signal.set_wakeup_fd(-1)
     for number, handler in signal_handlers.items():
         with suppress(ValueError, TypeError):
             signal.signal(number, handler)

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.logging import LoggingSeverity, get_logger, get_logger_level, set_logger_level
 
+from composer.terminal import EscapingLogger
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from composer.language.specs import NodeSpec
 
 # The logger of Composer itself, for messages about the whole system.
-system_logger = get_logger('composer')
+system_logger = EscapingLogger(get_logger('composer'))
 
 _rosout_is_enabled = ctypes.PyDLL(_rclpy.__file__).rcl_logging_rosout_enabled
 _rosout_is_enabled.restype = ctypes.c_bool

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer import signals
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ComposerError, ExitCode, StartError
+from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forced_exit, forked_children
 from composer.runtime.logs import log_levels, system_logger
 from composer.runtime.stop_request import StopRequest
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Sent when the terminal is closed, often twice: by the shell and by the kernel.
 _HANG_UP = signal.SIGHUP
+# How much longer than its timeouts a stop may take.
+_MARGIN_SEC = 5.0
+# To destroy nodes one by one takes time that grows with the square of their number.
+_DESTRUCTION_SEC = 0.0005
+_EXIT_SEC = 10.0
 
 
 def run_system(
@@ -37,14 +43,15 @@ def run_system(
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
 
-    The first SIGINT or SIGTERM stops the system, a second one ends the process at once with exit
-    code 1, and a third one does so even if no Python code can run. SIGHUP stops the system, too,
-    unless it was ignored before, as by `nohup`; further ones change nothing. If a behaviour does
-    not end, this ends the process with the exit code, since its thread cannot be ended. A SIGINT
+    The first SIGINT or SIGTERM stops the system, and a second one ends the process at once with
+    exit code 1. SIGHUP stops the system, too, unless it was ignored before, as by `nohup`; further
+    ones change nothing. If a behaviour does not end, this ends the process with the exit code,
+    since its thread cannot be ended. The guardian ends it if no Python code can run. A SIGINT
     before the system is up gives the exit code 130.
 
     Args:
-        ends_process: Whether the process exits afterwards: that is how a large system ends fast.
+        ends_process: Whether the process exits afterwards: that is how a large system ends fast,
+            and how the processes that behaviours have started end with it.
 
     Returns:
         The exit code.
@@ -56,24 +63,25 @@ def run_system(
     stop = StopRequest()
     with (
         log_levels(list(spec.nodes.values()), log_level_requests),
-        _handling_signals(stop, spec),
+        _guarded(spec, ends_process=ends_process) as guardian,
+        _handling_signals(stop, guardian.descriptor),
     ):
         system = System(
             spec,
             positions,
             functions,
+            guardian,
             ros_arguments,
             log_level_requests,
             stop_request=stop,
-            ends_process=ends_process,
         )
+        guardian.wait_until_begun()
         try:
             system.start()
             try:
                 system.wait()
             finally:
                 # Also if a signal handler of a behaviour raised an error in this thread.
-                forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
                 code, ended = system.stop()
         except ComposerError as error:
             code, ended = ExitCode.FAILED, False
@@ -81,16 +89,33 @@ def run_system(
                 signals.end_with(code)
                 raise
             system_logger.error(str(error))
-        finally:
-            forced_exit.cancel()
         signals.end_with(code)
-    if not ended:
-        forced_exit.leave(code)
+        if not ended:
+            forced_exit.leave(code)
     return code
 
 
 @contextmanager
-def _handling_signals(stop: StopRequest, spec: SystemSpec) -> Iterator[None]:
+def _guarded(spec: SystemSpec, *, ends_process: bool) -> Iterator[GuardianClient]:
+    stop_sec = spec.longest_stop_sec + _MARGIN_SEC
+    if not ends_process:
+        stop_sec += len(spec.nodes) ** 2 * _DESTRUCTION_SEC
+    try:
+        guardian = GuardianClient(stop_sec, _EXIT_SEC, owns_process=ends_process)
+    except OSError as error:
+        message = f'the guardian, a process of Composer, cannot be started: {error}'
+        raise StartError(message) from error
+    try:
+        yield guardian
+    finally:
+        if ends_process:
+            guardian.end_stop()
+        else:
+            guardian.send_away()
+
+
+@contextmanager
+def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
     # Python handles signals in the main thread alone; elsewhere the caller keeps them.
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -104,18 +129,17 @@ def _handling_signals(stop: StopRequest, spec: SystemSpec) -> Iterator[None]:
             forced_exit.leave(ExitCode.FAILED)
         is_early = number == signal.SIGINT and not stop.system_is_up
         stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
-        forced_exit.schedule(spec.longest_stop_sec, len(spec.nodes))
-        for each in _SIGNALS:
-            forced_exit.let_kernel_act_after_next(each)
 
     handled = list(_SIGNALS)
     if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:
         handled.append(_HANG_UP)
     before: dict[int, Any] = {number: signal.signal(number, handle) for number in handled}
     forked_children.signal_handlers.update(before | signals.previous)
+    wake_up_before = signal.set_wakeup_fd(wake_up, warn_on_full_buffer=False)
     try:
         yield
     finally:
+        signal.set_wakeup_fd(wake_up_before)
         forked_children.signal_handlers.clear()
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from time import monotonic
+from contextlib import suppress
+from time import monotonic, monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
+from composer.processes.guardian_client import end_marked
 from composer.processes.supervisor import ProcessSupervisor
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
+from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -25,15 +28,17 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
+    from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.yaml_text.positions import SourceMap
 
 _EXECUTOR_STOP_SEC = 1.0
+_MOST_SUSPECTS = 5
 
 
 class System:
@@ -42,10 +47,11 @@ class System:
     Args:
         positions: Where the parts of `spec` were written.
         functions: The behaviours, by their names.
+        guardian: Ends the process if the stop takes too long. If it owns the process, that exits
+            after the stop, and nothing uses ROS then.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
         stop_request: The request to stop it; by default a new one.
-        ends_process: Whether the process exits after the stop. Nothing may use ROS then.
 
     Attributes:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
@@ -57,24 +63,30 @@ class System:
         spec: SystemSpec,
         positions: SourceMap,
         functions: Mapping[str, Callable[..., Any]],
+        guardian: GuardianClient,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
         stop_request: StopRequest | None = None,
-        ends_process: bool = False,
     ) -> None:
         self._spec = spec
-        self._ends_process = ends_process
+        self._guardian = guardian
         self.has_ended = False
         self._begun = monotonic()
         self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
         self._executor = SystemExecutor(
-            self._context, spec.threads, log=system_logger.error, on_lost=self._on_lost
+            self._context,
+            spec.threads,
+            log=system_logger.error,
+            on_lost=self._on_lost,
+            on_broken=self._on_broken,
         )
         reserve(self._executor, 'the executor', 'shutdown')
-        self._hang_watcher = HangWatcher(lambda: list(self._nodes.values()), _limits(spec))
+        self._hang_watcher = HangWatcher(
+            lambda: list(self._nodes.values()), _limits(spec), self._executor.errors
+        )
         self._graph_watcher = GraphWatcher(self._endpoints)
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._handle = self._create_handle(positions, functions, ros_arguments)
@@ -91,6 +103,7 @@ class System:
             spec.shutdown_timeout_sec,
             ros_arguments,
             log_levels,
+            is_alone=not spec.nodes,
         )
         self._stop_request.kill_processes = self._processes.kill_all
 
@@ -161,9 +174,11 @@ class System:
             return
         elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
-        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
+        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
+        self._processes.tell_ends()
         self._parameter_services.begin()
 
     def wait(self) -> None:
@@ -177,19 +192,37 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
+        is_guarded = self._guardian.begin_stop()
+        if not is_guarded:
+            self._on_broken('The descriptor of the guardian was closed.')
+        try:
+            # Without its sockets, which are closed then, too, the middleware would not end.
+            self.has_ended = self._stop() and is_guarded
+        except BaseException as error:  # noqa: BLE001 - the process must end, whatever is broken
+            self._stop_request.set_code(ExitCode.FAILED)
+            with suppress(BaseException):
+                system_logger.error(f'the stop failed: {format_internal_error(error)}')
+        return self._stop_request.code, self.has_ended
+
+    def _stop(self) -> bool:
+        """Stop everything; return whether all behaviours have ended."""
+        timeout_sec = self._spec.shutdown_timeout_sec
         self._error_policy.stop()
         self._parameter_services.stop()
         with self._restarter.lock:
-            ended = stop_nodes(list(self._nodes.values()), self._spec.shutdown_timeout_sec)
+            ended = stop_nodes(list(self._nodes.values()), timeout_sec)
         # Processes end after the nodes: an `on_stop` may need them.
-        if not (self._processes.stop() and ended):
+        none_killed = self._processes.stop()
+        if self._guardian.mark:
+            none_killed &= end_marked(self._guardian.mark, timeout_sec, system_logger)
+        if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
         for node in self._nodes.values():
-            node.errors.flush()
+            node.flush_counts()
+        self._executor.errors.flush()
         if ended:
             self._end_graph()
-        self.has_ended = ended
-        return self._stop_request.code, ended
+        return ended
 
     def _start_all(self) -> list[LiveNode]:
         """Start all processes and nodes; return the nodes whose gates are still to be opened."""
@@ -255,6 +288,16 @@ class System:
             system_logger.error('the ROS context was shut down, so the system ends')
             self.request_stop(ExitCode.FAILED)
 
+    def _on_broken(self, reason: str) -> None:
+        try:
+            system_logger.error(
+                'the system is broken, and ends. A behaviour may have closed descriptors that are '
+                'not its own, or replaced what all use. The last ones to begin were:\n'
+                f'{_describe_last_calls(list(self._nodes.values()))}\n{reason}'
+            )
+        finally:
+            self._stop_request.make(ExitCode.FAILED)
+
     def _end_graph(self) -> None:
         self._graph_watcher.stop()
         if self._diagnostics_publisher is not None:
@@ -264,7 +307,7 @@ class System:
         self._executor.stop(_EXECUTOR_STOP_SEC)
         self._hang_watcher.stop()
         release(self._context)
-        if not (self._ends_process and leave_graph_at_exit(self._context, self._nodes)):
+        if not (self._guardian.owns_process and leave_graph_at_exit(self._context, self._nodes)):
             self._destroy_nodes()
         self._context.try_shutdown()
         self._context.destroy()
@@ -281,6 +324,21 @@ def _limits(spec: SystemSpec) -> Iterator[float | None]:
         for kind in ENTITY_KINDS:
             for entity in getattr(node, kind.section).values():
                 yield getattr(entity, 'warn_after_sec', None)
+
+
+def _describe_last_calls(nodes: Iterable[LiveNode]) -> str:
+    """Return the behaviours that began last, a line for each: those that run, or have ended."""
+    found = []
+    for node in nodes:
+        calls = [(call.owner, call.begun_ns) for call in node.running.calls()]
+        if node.running.last is not None:
+            calls.append(node.running.last)
+        found += [(begun_ns, node.spec.key, str(owner)) for owner, begun_ns in calls]
+    now_ns = monotonic_ns()
+    return '\n'.join(
+        f"  node '{node}': {owner}, {(now_ns - begun_ns) * 1e-9:.3f} s ago"
+        for begun_ns, node, owner in sorted(found, reverse=True)[:_MOST_SUSPECTS]
+    )
 
 
 def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import builtins
+import errno
 import threading
 import warnings
+from collections import deque
 from contextlib import suppress
-from time import sleep
+from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
 from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
+from composer.executor.descriptors import ExecutorError
+from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -20,8 +25,11 @@ if TYPE_CHECKING:
 
     from rclpy.context import Context
 
-# After an unexpected error of the executor itself, which must not flood the log.
+# After an unexpected error of the executor itself, and how many of them in a row end the system.
 _PAUSE_SEC = 0.1
+_MOST_FAILURES = 3
+_RECOVERED_SEC = 10.0
+_MOST_NAMES = 5
 
 
 class NoResponseError(ComposerError):
@@ -36,6 +44,10 @@ class SystemExecutor(ComposerExecutor):
             others; `None` for no limit.
         log: Takes the text of an error outside all behaviours, after which the executor goes on.
         on_lost: Called when the context was shut down before `stop`.
+        on_broken: Called when the executor cannot go on, with the reason.
+
+    Attributes:
+        errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
@@ -44,13 +56,17 @@ class SystemExecutor(ComposerExecutor):
         threads: int | None,
         log: Callable[[str], None],
         on_lost: Callable[[], None] | None = None,
+        on_broken: Callable[[str], None] | None = None,
     ) -> None:
         with warnings.catch_warnings():
             # rclpy warns of a single thread, but means its own executors.
             warnings.simplefilter('ignore', UserWarning)
             super().__init__(threads, context=context)
-        self._log = log
+        self.errors = ErrorReporter(log)
         self._on_lost = on_lost
+        self._on_broken = on_broken
+        self._failures = deque([float('-inf')] * _MOST_FAILURES, maxlen=_MOST_FAILURES)
+        self._builtins = dict(builtins.__dict__)
         self._is_stopped = False
         self._thread = threading.Thread(
             target=self._keep_spinning, name='composer-executor', daemon=True
@@ -75,12 +91,14 @@ class SystemExecutor(ComposerExecutor):
         if not isinstance(error, NoResponseError):
             # An error raised here would end the thread that spins.
             with suppress(Exception):
-                self._log(format_internal_error(error))
+                self.errors.report('a callback', error, format_internal_error)
 
     def _keep_spinning(self) -> None:
-        self._spin_on()
-        if self._on_lost is not None and not self._is_stopped:
-            self._on_lost()
+        try:
+            self._spin_on()
+        finally:
+            if self._on_lost is not None and not self._is_stopped:
+                self._on_lost()
 
     def _spin_on(self) -> None:
         while not self._is_shutdown and self.context.ok():
@@ -89,5 +107,33 @@ class SystemExecutor(ComposerExecutor):
             except (ShutdownException, ExternalShutdownException):
                 return
             except BaseException as error:  # noqa: BLE001 - one error must not end all nodes
+                replaced = self._restore_builtins()
+                if replaced or self._is_broken_by(error):
+                    self._break(error, replaced)
+                    return
                 self.report(error)
                 sleep(_PAUSE_SEC)
+
+    def _is_broken_by(self, error: BaseException) -> bool:
+        """Return whether the executor cannot spin any more."""
+        self._failures.append(monotonic())
+        is_frequent = self._failures[-1] - self._failures[0] < _RECOVERED_SEC
+        is_closed = isinstance(error, OSError) and error.errno == errno.EBADF
+        return is_closed or isinstance(error, ExecutorError) or is_frequent
+
+    def _restore_builtins(self) -> list[str]:
+        """Give Python back the builtins that it had, for the stop; return which were replaced."""
+        now = builtins.__dict__
+        replaced = [name for name, value in self._builtins.items() if now.get(name) is not value]
+        now.update(self._builtins)
+        return replaced
+
+    def _break(self, error: BaseException, replaced: list[str]) -> None:
+        if replaced:
+            reason = f'builtins were replaced: {", ".join(replaced[:_MOST_NAMES])}'
+        elif isinstance(error, ExecutorError):
+            reason = str(error)
+        else:
+            reason = format_internal_error(error)
+        if self._on_broken is not None and not self._is_stopped:
+            self._on_broken(reason)

@@ -9,11 +9,13 @@ import threading
 from dataclasses import dataclass
 from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.errors import StartError
 from composer.names import expand_name, remap_name
-from composer.runtime.ros_graph import RosGraph, create_graph_node, describe_graph
+from composer.runtime.behaviours.waits import WaitNotice
+from composer.runtime.logs import system_logger
+from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.stop_request import StopRequest
-    from composer.yaml_text.positions import SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 _POLL_SEC = 0.05
 _REASONS = {
@@ -35,6 +37,8 @@ _REASONS = {
     'action': 'nothing serves it',
     'node': 'there is no such node',
 }
+# What is waited for, where that is not called as the key is.
+_AWAITED = {'topic': 'a publisher of', 'action': 'action server'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +48,14 @@ class Waiter:
     Attributes:
         label: As in `node 'arm'`.
         resolve: Returns the full name for a condition.
+        log: Takes what it waits for.
         start: Starts it; returns when it has started.
     """
 
     label: str
     conditions: tuple[ConditionSpec, ...]
     resolve: Callable[[ConditionSpec], str]
+    log: Callable[[str], Any]
     start: Callable[[], None]
 
 
@@ -72,6 +78,7 @@ class WaitingStarter:
         self._nodes = nodes
         self._processes = processes
         self._positions = positions
+        self._notices: dict[DataPath, WaitNotice] = {}
 
     def start_all(self, waiters: Iterable[Waiter], stop: StopRequest) -> None:
         """Start all; a stop request ends the wait.
@@ -88,7 +95,7 @@ class WaitingStarter:
         try:
             with stop.waking(woken.set):
                 while pending and not stop.is_set:
-                    started = self._start_ready(pending, node, monotonic() - begun, stop)
+                    started = self._start_ready(pending, node, begun, stop)
                     pending = [each for each in pending if each not in started]
                     if not started:
                         woken.wait(_POLL_SEC)
@@ -96,9 +103,10 @@ class WaitingStarter:
             node.destroy_node()
 
     def _start_ready(
-        self, pending: list[Waiter], node: RosNode, waited_sec: float, stop: StopRequest
+        self, pending: list[Waiter], node: RosNode, begun: float, stop: StopRequest
     ) -> list[Waiter]:
         """Start those whose conditions hold, and return them."""
+        waited_sec = monotonic() - begun
         graph = RosGraph(node, self._hidden())
         ready = []
         for waiter in pending:
@@ -108,6 +116,7 @@ class WaitingStarter:
             for condition in missing:
                 if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
                     raise self._error(waiter, condition, graph)
+                self._notice(waiter, condition).log_if_due(begun)
         for waiter in ready:
             if not stop.is_set:
                 waiter.start()
@@ -117,6 +126,14 @@ class WaitingStarter:
         if condition.kind == 'process':
             return self._processes[condition.name].is_ready
         return graph.has(condition.kind, waiter.resolve(condition))
+
+    def _notice(self, waiter: Waiter, condition: ConditionSpec) -> WaitNotice:
+        """Return what says that a condition is waited for."""
+        if condition.path not in self._notices:
+            name = condition.name if condition.kind == 'process' else waiter.resolve(condition)
+            what = _AWAITED.get(condition.kind, condition.kind)
+            self._notices[condition.path] = WaitNotice(waiter.log, f"{what} '{name}'")
+        return self._notices[condition.path]
 
     def _is_hopeless(self, condition: ConditionSpec) -> bool:
         """Return whether it waits for a process that has ended for good."""
@@ -163,6 +180,7 @@ def list_waiters(
                 f"process '{process.spec.name}'",
                 process.spec.wait_for,
                 partial(_resolve_of_process, process.spec),
+                partial(_log_of_process, process.spec),
                 partial(processes.start, process),
             )
             for process in waiting_processes
@@ -172,6 +190,7 @@ def list_waiters(
                 f"node '{node.spec.name}'",
                 node.spec.wait_for,
                 partial(_resolve_of_node, node),
+                node.ros.get_logger().info,
                 partial(start_node, node),
             )
             for node in waiting_nodes
@@ -185,7 +204,11 @@ def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:
         return str(node.ros.resolve_topic_name(condition.name))
     if condition.kind == 'service':
         return str(node.ros.resolve_service_name(condition.name))
-    return expand_name(condition.name, node.ros.get_name(), node.ros.get_namespace())
+    return node.resolve_action_name(condition.name)
+
+
+def _log_of_process(spec: ProcessSpec, text: str) -> None:
+    system_logger.info(f"process '{spec.name}': {text}")
 
 
 def _resolve_of_process(spec: ProcessSpec, condition: ConditionSpec) -> str:

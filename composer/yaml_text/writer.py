@@ -96,6 +96,12 @@ def _render_inline(value: Any, dialect: Dialect, width: float) -> str | None:
     return render_scalar(value, dialect)
 
 
+class Expression(str):
+    """A text that is written as it is, although `{{` stands in it."""
+
+    __slots__ = ()
+
+
 def render_key(key: str, dialect: Dialect) -> str:
     """Return the key of a mapping, in quotes if it needs them."""
     return key if _is_plain(key) else _quote(key, dialect)
@@ -128,7 +134,7 @@ def _is_plain(text: str) -> bool:
 
 
 def _quote(text: str, dialect: Dialect) -> str:
-    if dialect.has_expressions and '{{' in text:
+    if dialect.has_expressions and '{{' in text and not isinstance(text, Expression):
         # Braces must not look like an expression, except for the one that gives them.
         text = f'{{{{ {text!r} }}}}'
     # JSON's strings are those of YAML in double quotes.

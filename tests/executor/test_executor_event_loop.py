@@ -13,6 +13,7 @@ pytest.importorskip('test_msgs')
 
 import rclpy
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 from spinning import DEADLINE_SEC, spinning, wait_for
 
@@ -161,6 +162,24 @@ def test_a_suspended_callback_of_a_destroyed_node_is_dropped(
     executor.remove_node(node)
     gc.collect()
     assert ended == [1]
+
+
+def test_a_coroutine_is_resumed_though_its_future_belongs_to_an_executor_that_never_spins(
+    node: Any, executor: Any, context: Context
+) -> None:
+    idle = SingleThreadedExecutor(context=context)
+    future: Future = Future(executor=idle)
+
+    async def wait() -> int:
+        return await future
+
+    task = executor.create_task(wait)
+    with spinning(executor):
+        wait_for(lambda: executor._spinner._loop._runner._paused)
+        future.set_result(3)
+        wait_for(task.done)
+    assert task.result() == 3
+    idle.shutdown()
 
 
 def test_ten_thousand_tasks_from_many_threads_all_run(node: Any, executor: Any) -> None:

@@ -62,6 +62,69 @@ def test_shutdown_from_a_callback(node: Any, executor: Any) -> None:
     assert results == [True]
 
 
+def test_callbacks_that_all_shut_down_wait_for_none_of_them(node: Any, executor: Any) -> None:
+    together = threading.Barrier(3)
+    results: list[bool] = []
+
+    def shut_down() -> None:
+        together.wait(DEADLINE_SEC)
+        results.append(executor.shutdown())
+        together.wait(DEADLINE_SEC)
+
+    for _ in range(3):
+        node.create_timer(0.01, shut_down, callback_group=MutuallyExclusiveCallbackGroup())
+    executor.spin()
+    wait_for(lambda: results == [True] * 3)
+    assert executor.shutdown()
+
+
+def test_shutdown_waits_for_a_callback_when_the_context_has_ended(
+    node: Any, executor: Any, context: Context
+) -> None:
+    began, let_go = threading.Event(), threading.Event()
+    ended: list[int] = []
+
+    def block() -> None:
+        began.set()
+        let_go.wait(DEADLINE_SEC)
+        ended.append(1)
+
+    node.create_timer(0.01, block)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    assert began.wait(DEADLINE_SEC)
+    context.shutdown()
+    thread.join(DEADLINE_SEC)
+    threading.Timer(0.2, let_go.set).start()
+    assert executor.shutdown()
+    assert ended
+
+
+@pytest.mark.usefixtures('domain_id')
+def test_callbacks_under_way_end_before_the_interpreter_does(start_program: Any) -> None:
+    program = """
+import rclpy, threading, time
+from rclpy.callback_groups import ReentrantCallbackGroup
+from composer.executor import ComposerExecutor
+rclpy.init()
+executor = ComposerExecutor()
+began = threading.Semaphore(0)
+def work(number):
+    began.release()
+    time.sleep(0.5)
+    print(f'{number} ', end='', flush=True)
+for number in range(20):
+    executor.create_task(work, number)
+threading.Thread(target=executor.spin, daemon=True).start()
+for _ in range(20):
+    began.acquire()
+"""
+    process = start_program('-c', program)
+    output, _ = process.communicate(timeout=DEADLINE_SEC)
+    assert sorted(map(int, output.split())) == list(range(20))
+    assert process.returncode == 0
+
+
 def test_shutdown_of_the_context_from_a_callback_ends_spin(
     node: Any,
     executor: Any,

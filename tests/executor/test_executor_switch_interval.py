@@ -6,9 +6,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rclpy.context import Context
-
-from composer.executor import ComposerExecutor
 from composer.executor.switch_interval import INTERVAL_SEC, ShortSwitchInterval
 
 DEADLINE_SEC = 40.0
@@ -24,44 +21,33 @@ def interval_is_pythons_own():
 
 def test_the_interval_is_short_until_the_last_user_has_left():
     interval = ShortSwitchInterval()
-    interval.add_user()
-    interval.add_user()
-    interval.remove_user()
-    assert sys.getswitchinterval() == INTERVAL_SEC
-    interval.remove_user()
+    with interval:
+        with interval:
+            pass
+        assert sys.getswitchinterval() == INTERVAL_SEC
     assert sys.getswitchinterval() == 0.005
 
 
 def test_a_shorter_interval_is_not_changed():
     sys.setswitchinterval(0.0005)
-    interval = ShortSwitchInterval()
-    interval.add_user()
-    assert sys.getswitchinterval() == 0.0005
-    interval.remove_user()
+    with ShortSwitchInterval():
+        assert sys.getswitchinterval() == 0.0005
     assert sys.getswitchinterval() == 0.0005
 
 
 def test_an_interval_that_was_set_meanwhile_is_not_changed():
     interval = ShortSwitchInterval()
-    interval.add_user()
-    sys.setswitchinterval(0.02)
-    interval.remove_user()
+    with interval:
+        sys.setswitchinterval(0.02)
     assert sys.getswitchinterval() == 0.02
-    interval.add_user()
-    interval.remove_user()
+    with interval:
+        pass
     assert sys.getswitchinterval() == 0.02
 
 
 @pytest.mark.ros
-def test_callbacks_run_with_the_short_interval_and_the_end_of_spin_restores_it(domain_id):
-    context = Context()
-    context.init(domain_id=domain_id)
-    executor = ComposerExecutor(context=context)
-    seen = []
-    task = executor.create_task(lambda: seen.append(sys.getswitchinterval()))
+def test_callbacks_run_with_the_short_interval_and_the_end_of_spin_restores_it(executor):
+    task = executor.create_task(sys.getswitchinterval)
     executor.spin_until_future_complete(task, DEADLINE_SEC)
-    assert seen == [INTERVAL_SEC]
+    assert task.result() == INTERVAL_SEC
     assert sys.getswitchinterval() == 0.005
-    executor.shutdown()
-    context.try_shutdown()
-    context.destroy()

@@ -20,7 +20,9 @@ def test_threads_that_have_still_to_begin_count(monkeypatch):
     begin = _thread.start_new_thread
     late = []
     monkeypatch.setattr(_thread, 'start_new_thread', lambda work, _: late.append(work))
-    threads = WorkerThreads(lambda worker: threads.is_leader(worker, lambda: False), pytest.fail)
+    threads = WorkerThreads(
+        lambda worker: threads.is_leader(worker, lambda: False), pytest.fail, pytest.fail
+    )
     threads.start()
     monkeypatch.undo()
     threads.end(0.0)
@@ -34,13 +36,13 @@ def test_threads_that_have_still_to_begin_count(monkeypatch):
 
 def test_shutdown_keeps_what_a_waiting_spin_once_waits_with(node, executor):
     poller = executor._spinner.poller
-    wait, waiting, errors = poller._wait, threading.Event(), []
+    wait_if, waiting, errors = poller.wait_if, threading.Event(), []
 
-    def wait_twice(timeout_sec):
+    def wait_twice(is_idle):
         waiting.set()
-        wait(timeout_sec)
+        wait_if(is_idle)
         time.sleep(0.01)
-        return wait(0)
+        wait_if(lambda: False)
 
     def spin():
         try:
@@ -48,7 +50,7 @@ def test_shutdown_keeps_what_a_waiting_spin_once_waits_with(node, executor):
         except BaseException as error:  # noqa: BLE001
             errors.append(error)
 
-    poller._wait = wait_twice
+    poller.wait_if = wait_twice
     thread = threading.Thread(target=spin)
     thread.start()
     assert waiting.wait(DEADLINE_SEC)
@@ -82,7 +84,7 @@ def test_the_executor_can_be_spun_on_whatever_is_thrown_into_its_threads(node, e
         # While the leader sleeps, others take over; then they are idle.
         executor.create_task(time.sleep, 0.01)
         for one in threading.enumerate():
-            if one.name.startswith('executor-'):
+            if one.ident and one.name.startswith('executor-'):
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(
                     ctypes.c_ulong(one.ident), ctypes.py_object(Thrown)
                 )

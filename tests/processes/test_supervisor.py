@@ -430,7 +430,7 @@ def test_exit_codes_and_signals_are_told(compose):
     child.wait_for_line("[INFO] [composer]: process 'good' has ended with exit code 0")
     child.wait_for_line("[ERROR] [composer]: process 'bad' has ended with exit code 3")
     child.wait_for_line("[ERROR] [composer]: process 'crash' was ended by SIGSEGV")
-    assert child.stop() == 0
+    assert child.wait() == 1
     assert len(child.matching('process ')) == 3
 
 
@@ -761,3 +761,14 @@ def test_many_systems_in_a_row_leave_nothing_behind(compose, stubborn, scratch):
     assert left == []
     assert threads == 1
     assert stubborn.left() == {}
+
+
+@pytest.mark.parametrize(('commands', 'code'), [(['true'], 0), (['true', 'false'], 1)])
+def test_a_system_without_nodes_ends_with_its_last_process(compose, commands, code):
+    processes = ''.join(f'  run_{name}: {{command: [{name!r}]}}\n' for name in commands)
+    child = compose(f'version: 1\nprocesses:\n{processes}')
+    assert child.wait() == code
+    ready = child.lines.index(child.wait_until_ready())
+    for name in commands:
+        assert child.lines.index(child.wait_for_line(f"process 'run_{name}' has ended")) > ready
+    assert child.lines[-1] == '[INFO] [composer]: all processes have ended: the system ends'

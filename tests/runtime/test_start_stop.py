@@ -240,7 +240,7 @@ def test_what_hangs_at_the_stop_is_shown_with_its_stack_and_exit_code_1(compose)
         stack = [line for line in child.lines[begin + 1 : begin + 5] if line.startswith('  ')]
         line = CODE[: CODE.index(statement)].count('\n') + 1
         assert any(f'parts.py", line {line}' in each for each in stack)
-        assert f'    {statement}' in stack
+        assert f'      {statement}' in stack
     for node in ('stuck', 'stuck_async', 'other'):
         assert f'[INFO] [{node}]: stopping' in child.lines
 

@@ -3,32 +3,44 @@
 import inspect
 import threading
 from time import monotonic_ns
-from typing import Any
+from typing import Any, Protocol
 
 import rclpy.exceptions
 import rclpy.timer
 from rclpy.exceptions import InvalidHandle
-from rclpy.qos import HistoryPolicy
 from rclpy.subscription import Subscription
 
 from composer.executor import c_bindings
 from composer.executor.after_fork import end_child
 from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT
-from composer.executor.sources.event_source import NOTHING, EventSource, MissedCounts
+from composer.executor.sources.event_source import NOTHING, EventSource
 
-_LATE_SHARE = 0.1
-_MIN_LATE_NS = 1_000_000
 _MIN_RESET_NS = 1_000_000
-"""A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its time.
-
-A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms unless
-that was set: beside it, timers with short periods are late indeed.
-"""
 
 # Since rclpy 9.
 _TimerInfo = getattr(rclpy.timer, 'TimerInfo', None)
 _TimerCancelledError = getattr(rclpy.exceptions, 'TimerCancelledError', InvalidHandle)
+
+
+class TickObserver(Protocol):
+    """A guest of the executor that is told of the ticks of a timer."""
+
+    def on_tick(self, late_ns: int, next_ns: int, period_ns: int) -> None:
+        """Note a tick that began `late_ns` after its time; the next is `next_ns` after its."""
+
+
+class QueueObserver(Protocol):
+    """A guest of the executor that is told what comes to a subscription, and what is taken."""
+
+    def on_announced(self, count: int | None) -> None:
+        """Note that `count` messages came; None: nobody knows how many."""
+
+    def begin_take(self) -> int:
+        """Note that a take begins, and return what `note_nothing_taken` is to be told."""
+
+    def note_nothing_taken(self, begun: int) -> None:
+        """Note that nothing was there."""
 
 
 class TimerSource(EventSource):
@@ -36,13 +48,11 @@ class TimerSource(EventSource):
 
     has_own_event_fd = False
     watch_entity = staticmethod(c_bindings.watch_timer_reset)
-    __slots__ = ('_clock', '_info_name', '_late', '_rearming', '_skipped', 'deadline_ns')
+    __slots__ = ('_clock', '_info_name', '_rearming', 'deadline_ns')
 
     def open(self) -> None:
         """See the base class."""
         self._rearming = threading.Lock()
-        self._late = 0
-        self._skipped = 0
         self.deadline_ns: int | None = None
         self._clock = None
         self.parts.event_fds.attach(self)
@@ -112,12 +122,8 @@ class TimerSource(EventSource):
         result = callback(**arguments)
         return result if result is not None and is_async else None
 
-    def missed_counts(self) -> MissedCounts:
-        """See the base class."""
-        return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
-
     def _call(self, handle: Any) -> dict[str, Any] | None:
-        """Tell rcl that the tick begins, and count what was missed.
+        """Tell rcl and the observer that the tick begins.
 
         Returns:
             The arguments of the callback, or None if the timer is not due.
@@ -133,15 +139,12 @@ class TimerSource(EventSource):
             info = handle.call_timer_with_info()
             clock_type = self.entity.clock.clock_type
             arguments[self._info_name] = _TimerInfo(**info, clock_type=clock_type)  # type: ignore[misc]
-        next_until_ns = handle.time_until_next_call()
-        period_ns = handle.get_timer_period()
-        if next_until_ns is None or not period_ns:
-            return arguments
-        if -until_ns > _MIN_LATE_NS and -until_ns > _LATE_SHARE * period_ns:
-            self._late += 1
-        # rcl sets the next tick to the next multiple of the period that has not passed.
-        advance_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
-        self._skipped += max(0, advance_ns // period_ns - 1)
+        if self.observer is not None:
+            next_until_ns = handle.time_until_next_call()
+            period_ns = handle.get_timer_period()
+            if next_until_ns is not None and period_ns:
+                next_ns = next_until_ns - until_ns + monotonic_ns() - begin_ns
+                self.observer.on_tick(-until_ns, next_ns, period_ns)
         return arguments
 
 
@@ -157,53 +160,27 @@ def _name_of_timer_info(callback: Any) -> str | None:
 
 
 class SubscriptionSource(EventSource):
-    """A subscription.
-
-    If fewer messages can be taken than came, newer ones have pushed the others out of the queue.
-    `_taken` counts a take from before it begins until it finds nothing: so one under way in
-    another thread, as in reentrant groups, does not count as an overrun.
-    """
+    """A subscription."""
 
     rank = 1
     ask = staticmethod(Readiness.has_messages)
     watch_entity = staticmethod(c_bindings.watch_subscription)
-    __slots__ = ('_arrived', '_is_counting', '_overruns', '_taken')
-
-    def open(self) -> None:
-        """See the base class."""
-        self._arrived = 0
-        self._taken = 0
-        self._overruns = 0
-        self._is_counting = True
-        super().open()
+    __slots__ = ()
 
     def on_events(self, count: int) -> None:
         """See the base class."""
-        event_fd = self.event_fd
-        if count >= UNKNOWN_COUNT or event_fd is None or event_fd.is_shared:
-            self._is_counting = False
-        else:
-            self._arrived += count
+        if self.observer is not None:
+            event_fd = self.event_fd
+            is_unknown = count >= UNKNOWN_COUNT or event_fd is None or event_fd.is_shared
+            self.observer.on_announced(None if is_unknown else count)
         super().on_events(count)
-
-    def missed_counts(self) -> MissedCounts:
-        """See the base class."""
-        profile = self.entity.qos_profile
-        if profile.history == HistoryPolicy.KEEP_LAST and profile.depth:
-            # A queue that never runs empty: the middleware holds no more than its depth.
-            self._note_overruns(self._arrived - self._taken - profile.depth)
-        return MissedCounts(overruns=self._overruns)
-
-    def _note_overruns(self, count: int) -> None:
-        # A message may be taken right before its event comes, which makes one count too low.
-        self._overruns = max(self._overruns, count)
 
     def run(self) -> Any:
         """See the base class."""
         entity = self.entity
         revision = self.revision
-        arrived = self._arrived
-        self._taken += 1
+        observer = self.observer
+        arrived = None if observer is None else observer.begin_take()
         handle = entity.handle
         try:
             with handle:
@@ -211,13 +188,8 @@ class SubscriptionSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if taken is None:
-            self._taken -= 1
-            if self._is_counting:
-                self._note_overruns(arrived - self._taken)
-            else:
-                # What the others of a shared eventfd had is not known: begin again from here.
-                self._arrived = self._taken + self._overruns
-                self._is_counting = True
+            if observer is not None:
+                observer.note_nothing_taken(arrived)
             self._note_nothing_taken(revision)
             return NOTHING
         self._note_taken()

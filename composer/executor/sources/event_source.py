@@ -1,7 +1,6 @@
 """What all kinds of sources share: a source listens to one entity, takes what came and runs it."""
 
 import inspect
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rclpy.exceptions import InvalidHandle
@@ -14,39 +13,6 @@ from composer.executor.sources.qos_events import QosEventPoll
 
 NOTHING = object()
 """What `EventSource.run` returns when there was nothing to take."""
-
-
-@dataclass(frozen=True, slots=True)
-class MissedCounts:
-    """What an entity missed because callbacks took too long, since the executor listens to it.
-
-    Attributes:
-        overruns: Messages that the middleware dropped from the queue of a subscription, because
-            newer ones came before they were taken. Not those lost on the way to the queue.
-        late_ticks: Ticks of a timer that began late.
-        skipped_ticks: Ticks that never began: rcl skips those whose time has passed.
-    """
-
-    overruns: int = 0
-    late_ticks: int = 0
-    skipped_ticks: int = 0
-
-    def __add__(self, other: 'MissedCounts') -> 'MissedCounts':
-        return MissedCounts(
-            self.overruns + other.overruns,
-            self.late_ticks + other.late_ticks,
-            self.skipped_ticks + other.skipped_ticks,
-        )
-
-    def __sub__(self, other: 'MissedCounts') -> 'MissedCounts':
-        return MissedCounts(
-            self.overruns - other.overruns,
-            self.late_ticks - other.late_ticks,
-            self.skipped_ticks - other.skipped_ticks,
-        )
-
-    def __bool__(self) -> bool:
-        return self != MissedCounts()
 
 
 class ExecutorParts:
@@ -76,6 +42,7 @@ class EventSource:
         has_own_event_fd: Whether it has an eventfd of its own from the start, if there are any.
         ask: The method of `Readiness` that tells whether there is something to take.
         watch_entity: The function that has rcl write to an eventfd.
+        observer: A guest of the executor that is told what happens to the entity, or None.
         slow: Whether the last callback held up the leader.
     """
 
@@ -92,6 +59,7 @@ class EventSource:
         'event_fd',
         'group',
         'node',
+        'observer',
         'parts',
         'pending',
         'queued',
@@ -110,6 +78,7 @@ class EventSource:
         self.revision = 0
         self.slow = False
         self.event_fd: EventFd | None = None
+        self.observer: Any = None
         self._callback: Any = None
         self._is_coroutine_function = False
 
@@ -139,10 +108,6 @@ class EventSource:
     def on_events(self, count: int) -> None:
         """Queue the source, which has `count` more to take."""
         self.parts.scheduler.add_events(self, count)
-
-    def missed_counts(self) -> MissedCounts:
-        """Return what the entity has missed."""
-        return MissedCounts()
 
     def _note_taken(self) -> None:
         """Have an eventfd of its own: it is busy."""

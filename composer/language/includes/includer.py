@@ -10,6 +10,7 @@ import os
 from functools import partial
 from typing import TYPE_CHECKING
 
+from composer.confidential import may_show_lines
 from composer.diagnostics import diagnostic_at, errors_first
 from composer.expressions import SECTIONS
 from composer.input_limits import MAX_ENTRIES, MAX_FINDINGS, MAX_INCLUDE_DEPTH, MAX_VALUES
@@ -144,6 +145,11 @@ class Includer:
             entry.report('too-deep', message)
             return None
         part = LoadedSystem.of(self._document(path, real), path)
+        if 'version' not in part.entries and not may_show_lines(real):
+            # What is wrong with it would tell what is in it.
+            message = f"'{entry.file}' is not a system, and lies outside of the project"
+            entry.report('missing-include', message)
+            return None
         if part.data is None:
             entry.system.diagnostics += _found_in(part, entry)
             return None

@@ -126,6 +126,7 @@ class BehaviourCall:
             finally:
                 if add_time is not None:
                     add_time(now_ns() - begun_ns)
+                running.last = owner, begun_ns
                 # As `running.end` does.
                 del entries[token]
                 if running.has_listeners:
@@ -162,6 +163,7 @@ class BehaviourCall:
             finally:
                 if add_time is not None:
                     add_time(monotonic_ns() - begun_ns)
+                running.last = self._owner, begun_ns
                 if token is not None:
                     running.end(token)
 

@@ -1,4 +1,4 @@
-"""Errors of behaviours in the log: each kind once with its traceback, then counted."""
+"""Errors of behaviours, and of other callbacks, in the log: each kind once, then counted."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from composer.runtime.behaviours.tracebacks import format_behaviour_error, place
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from composer.runtime.behaviours.running_calls import Owner
 
 # At most one line about the same entity in this time.
 _QUIET_SEC = 1.0
@@ -27,7 +25,7 @@ class _ErrorCount:
 
 
 class ErrorReporter:
-    """Logs the errors of one node's entities: each kind once with its traceback, then counts.
+    """Logs errors: each kind once with its traceback, then counts.
 
     Args:
         log: Takes the text, as the node's logger does.
@@ -35,19 +33,25 @@ class ErrorReporter:
 
     def __init__(self, log: Callable[[str], Any]) -> None:
         self._log = log
-        self._counts: dict[tuple[Owner, str], _ErrorCount] = {}
+        self._counts: dict[str, _ErrorCount] = {}
         self._lock = threading.Lock()
 
-    def report(self, owner: Owner, place: str, error: BaseException) -> None:
-        """Log what a behaviour raised, or count it.
+    def report(
+        self,
+        who: str,
+        error: BaseException,
+        format_error: Callable[[BaseException], str] = format_behaviour_error,
+    ) -> None:
+        """Log what was raised, or count it.
 
         Args:
-            place: Where the file declares it, as `file:line`.
+            who: What raised it, as in `timer 'tick' (robot.yaml:7)`.
+            format_error: Returns the traceback.
         """
         kind = (type(error).__name__, *place_of(error))
         summary = summarize(error)
         with self._lock:
-            count = self._counts.setdefault((owner, place), _ErrorCount())
+            count = self._counts.setdefault(who, _ErrorCount())
             now = monotonic()
             if now - count.last_line < _QUIET_SEC:
                 count.unreported += 1
@@ -56,13 +60,11 @@ class ErrorReporter:
             if kind in count.shown:
                 count.unreported += 1
                 count.last_error = summary
-                text = _format_count(owner, place, count)
+                text = _format_count(who, count)
             else:
                 count.shown.add(kind)
-                earlier = f'{_format_count(owner, place, count)}\n' if count.unreported else ''
-                text = (
-                    f'{earlier}{owner} ({place}) raised {summary}\n{format_behaviour_error(error)}'
-                )
+                earlier = f'{_format_count(who, count)}\n' if count.unreported else ''
+                text = f'{earlier}{who} raised {summary}\n{format_error(error)}'.rstrip()
             count.last_line = now
         self._log(text)
 
@@ -78,16 +80,16 @@ class ErrorReporter:
     def _flush(self, before: float) -> None:
         with self._lock:
             texts = []
-            for (owner, place), count in self._counts.items():
+            for who, count in self._counts.items():
                 if count.unreported and count.last_line <= before:
-                    texts.append(_format_count(owner, place, count))
+                    texts.append(_format_count(who, count))
                     count.last_line = monotonic()
         for text in texts:
             self._log(text)
 
 
-def _format_count(owner: Owner, place: str, count: _ErrorCount) -> str:
+def _format_count(who: str, count: _ErrorCount) -> str:
     """Return the line about the errors that were counted, and reset the count."""
     times = 'once more' if count.unreported == 1 else f'{count.unreported} more times'
     count.unreported = 0
-    return f'{owner} ({place}) raised {times}, last: {count.last_error}'
+    return f'{who} raised {times}, last: {count.last_error}'

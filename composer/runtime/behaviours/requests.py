@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
     from composer.errors import ComposerError
-    from composer.runtime.behaviours.waits import Waits
+    from composer.runtime.behaviours.waits import WaitNotice, Waits
 
 
 def _keep(_future: Future) -> None:
@@ -25,6 +25,7 @@ class Requests:
 
     Args:
         is_available: Whether the server is there.
+        notice: Says that the server is waited for.
         unavailable: Returns the error for a server that is not there after so many seconds.
         unanswered: Returns the error for a request without an answer after so many seconds, and
             since a time of `time.monotonic`.
@@ -33,6 +34,7 @@ class Requests:
 
     waits: Waits
     is_available: Callable[[], bool]
+    notice: WaitNotice
     unavailable: Callable[[float], ComposerError]
     unanswered: Callable[[float, float], ComposerError]
     forget: Callable[[Future], None] = _keep
@@ -49,7 +51,7 @@ class Requests:
             SystemStoppingError: A stop was requested while it waited.
         """
         begun = monotonic()
-        if not self.waits.until_true(self.is_available, timeout_sec):
+        if not self.waits.until_true(self.is_available, timeout_sec, self.notice):
             raise self.unavailable(timeout_sec or 0.0)
         future = send()
         try:
@@ -63,7 +65,8 @@ class Requests:
     async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
         """As `send`, without holding a thread while it waits."""
         begun = monotonic()
-        if not await self.waits.until_true_async(self.is_available, timeout_sec):
+        is_there = self.waits.until_true_async(self.is_available, timeout_sec, self.notice)
+        if not await is_there:
             raise self.unavailable(timeout_sec or 0.0)
         future = send()
         try:

@@ -8,11 +8,16 @@ from dataclasses import dataclass
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from composer.runtime.behaviours.stacks import format_coroutine, format_thread
+from composer.runtime.behaviours.stacks import (
+    coroutine_codes,
+    format_coroutine,
+    format_thread,
+    thread_codes,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import CoroutineType
+    from collections.abc import Callable, Iterator
+    from types import CodeType, CoroutineType
 
 
 class Progress:
@@ -75,6 +80,12 @@ class RunningCall:
             return self.begun_ns
         return max(self.begun_ns, self.progress.resumed_ns)
 
+    def codes(self) -> Iterator[CodeType]:
+        """Yield the code of each call that it is in now."""
+        if self.coroutine is not None:
+            return coroutine_codes(self.coroutine)
+        return thread_codes(self.thread or 0)
+
     def format_stack(self) -> str:
         """Return where it is now, innermost call last."""
         if self.coroutine is not None:
@@ -94,14 +105,24 @@ class RunningCalls:
     Attributes:
         entries: The calls, by tokens; `None` for work that has no stack of its own.
         tokens: The token of the next entry.
+        last: Whose call ended last, and when it had begun, by `time.monotonic_ns`.
         has_listeners: Whether somebody must be told when an entry is removed.
     """
 
-    __slots__ = ('_changed', '_end_listeners', '_waiters', 'entries', 'has_listeners', 'tokens')
+    __slots__ = (
+        '_changed',
+        '_end_listeners',
+        '_waiters',
+        'entries',
+        'has_listeners',
+        'last',
+        'tokens',
+    )
 
     def __init__(self) -> None:
         self.entries: dict[int, _CallEntry | None] = {}
         self.tokens = itertools.count()
+        self.last: tuple[Owner, int] | None = None
         self.has_listeners = False
         self._waiters = 0
         self._end_listeners: dict[int, Callable[[], None]] = {}

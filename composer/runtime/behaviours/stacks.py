@@ -11,7 +11,8 @@ from types import AsyncGeneratorType, CoroutineType, GeneratorType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from types import FrameType
+    from collections.abc import Iterator
+    from types import CodeType, FrameType
 
 _SUSPENDABLE = (CoroutineType, GeneratorType, AsyncGeneratorType)
 _FRAMES = ('cr_frame', 'gi_frame', 'ag_frame')
@@ -33,13 +34,17 @@ def format_thread(thread: int) -> str:
 
 def format_coroutine(coroutine: CoroutineType[Any, Any, Any]) -> str:
     """Return the stack of a coroutine, innermost call last, whether it waits or runs."""
-    if coroutine.cr_running:
-        # What it awaits is known only while it waits; while it runs, a thread has its frames.
-        for frame in sys._current_frames().values():  # noqa: SLF001 - the only way
-            frames = _stack(frame)
-            if coroutine.cr_frame in frames:
-                return _format(frames[frames.index(coroutine.cr_frame) :])
-    return _format(_awaited_frames(coroutine))
+    return _format(_coroutine_frames(coroutine))
+
+
+def thread_codes(thread: int) -> Iterator[CodeType]:
+    """Yield the code of each call on the stack of a thread."""
+    return (frame.f_code for frame in _stack(sys._current_frames().get(thread)))  # noqa: SLF001
+
+
+def coroutine_codes(coroutine: CoroutineType[Any, Any, Any]) -> Iterator[CodeType]:
+    """Yield the code of each call on the stack of a coroutine."""
+    return (frame.f_code for frame in _coroutine_frames(coroutine))
 
 
 def is_own(filename: str) -> bool:
@@ -53,6 +58,16 @@ def _stack(frame: FrameType | None) -> list[FrameType]:
         frames.append(frame)
         frame = frame.f_back
     return frames[::-1]
+
+
+def _coroutine_frames(coroutine: CoroutineType[Any, Any, Any]) -> list[FrameType]:
+    if coroutine.cr_running:
+        # What it awaits is known only while it waits; while it runs, a thread has its frames.
+        for frame in sys._current_frames().values():  # noqa: SLF001 - the only way
+            frames = _stack(frame)
+            if coroutine.cr_frame in frames:
+                return frames[frames.index(coroutine.cr_frame) :]
+    return _awaited_frames(coroutine)
 
 
 def _awaited_frames(suspended: Any) -> list[FrameType]:

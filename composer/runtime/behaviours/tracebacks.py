@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 
-from composer.errors import ComposerError
+from composer.errors import ActionNotAvailableError, ComposerError, ServiceNotAvailableError
 from composer.runtime.behaviours.stacks import is_own
 
 _LONGEST_SUMMARY = 500
@@ -40,15 +40,21 @@ def place_of(error: BaseException) -> tuple[str, int | None]:
 
 
 def format_behaviour_error(error: BaseException) -> str:
-    """Return its traceback, without Composer's own frames around the behaviour, and its help."""
+    """Return its traceback, without Composer's own frames around the behaviour, and its help.
+
+    That a server is not there is no error in the code: it has no traceback.
+    """
+    help_text = _help_of(error)
+    advice = f'\nhelp: {help_text}' if help_text else ''
+    if isinstance(error, ServiceNotAvailableError | ActionNotAvailableError):
+        return advice.lstrip('\n')
     try:
         described = traceback.TracebackException.from_exception(error, compact=True)
         _drop_own_frames(described, error)
         text = ''.join(described.format()).rstrip()
     except BaseException as other:  # noqa: BLE001 - an exception can be made to break anything
         text = f'(its traceback cannot be shown: {type(other).__name__})'
-    help_text = _help_of(error)
-    return _cut(text, _LONGEST_TRACEBACK) + (f'\nhelp: {help_text}' if help_text else '')
+    return _cut(text, _LONGEST_TRACEBACK) + advice
 
 
 def format_internal_error(error: BaseException) -> str:

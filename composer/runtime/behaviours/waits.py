@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 _POLL_SEC = 0.01
 
+# When it is said what is waited for: first after a second, then every ten.
+_FIRST_NOTICE_SEC = 1.0
+_NOTICE_PERIOD_SEC = 10.0
+
 # What a wait for an item gets when a stop is requested.
 _STOPPED = object()
 
@@ -34,6 +38,27 @@ _STOPPED = object()
 def stopping_error() -> SystemStoppingError:
     """Return the error that ends a wait."""
     return SystemStoppingError('the system is stopping')
+
+
+class WaitNotice:
+    """Logs what is waited for, if that takes long; several may wait for the same.
+
+    Args:
+        log: Takes the text, as a logger does.
+        what: What is waited for, as in `service '/ask'`.
+    """
+
+    def __init__(self, log: Callable[[str], Any], what: str) -> None:
+        self._log = log
+        self._what = what
+        self._last = float('-inf')
+
+    def log_if_due(self, begun: float) -> None:
+        """Log it, if that is due for a wait that began at a time of `time.monotonic`."""
+        now = monotonic()
+        if now - begun >= _FIRST_NOTICE_SEC and now - self._last >= _NOTICE_PERIOD_SEC:
+            self._last = now
+            self._log(f'Waiting for {self._what}…')
 
 
 class Waits:
@@ -112,34 +137,42 @@ class Waits:
             raise stopping_error()
         return item
 
-    def until_true(self, condition: Callable[[], bool], timeout_sec: float | None) -> bool:
+    def until_true(
+        self, condition: Callable[[], bool], timeout_sec: float | None, notice: WaitNotice
+    ) -> bool:
         """Wait until a condition holds; return whether it did in time.
+
+        Args:
+            timeout_sec: `None` for no limit.
+            notice: Says what is waited for.
 
         Raises:
             SystemStoppingError: A stop was requested, and `on_stop` has not been called yet.
         """
         if condition():
             return True
-        deadline = _deadline(timeout_sec)
+        begun = monotonic()
         with self.make_room():
             while not condition():
                 if self._is_refused():
                     raise stopping_error()
-                if monotonic() >= deadline:
+                if _is_over(begun, timeout_sec):
                     return False
+                notice.log_if_due(begun)
                 sleep(_POLL_SEC)
         return True
 
     async def until_true_async(
-        self, condition: Callable[[], bool], timeout_sec: float | None
+        self, condition: Callable[[], bool], timeout_sec: float | None, notice: WaitNotice
     ) -> bool:
         """As `until_true`, for coroutines."""
-        deadline = _deadline(timeout_sec)
+        begun = monotonic()
         while not condition():
             if self._is_refused():
                 raise stopping_error()
-            if monotonic() >= deadline:
+            if _is_over(begun, timeout_sec):
                 return False
+            notice.log_if_due(begun)
             pause: Future = Future()
             await self._with_timeout(_POLL_SEC, partial(pause.set_result, None), pause)
         return True
@@ -184,6 +217,10 @@ class Waits:
             timeout.cancel()
 
 
-def _deadline(timeout_sec: float | None) -> float:
-    """Return the time of `time.monotonic` at which a wait ends."""
-    return float('inf') if timeout_sec is None else monotonic() + timeout_sec
+def _is_over(begun: float, timeout_sec: float | None) -> bool:
+    """Return whether a wait that began at a time of `time.monotonic` has used up its time."""
+    return timeout_sec is not None and monotonic() >= begun + timeout_sec
+
+
+# A behaviour that is in one of these waits for what is not there yet, and does not hang.
+CODES_OF_ABSENCE = frozenset({Waits.until_true.__code__, Waits.until_true_async.__code__})

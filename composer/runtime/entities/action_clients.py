@@ -20,6 +20,7 @@ from composer.errors import (
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.running_calls import Owner
+from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 
@@ -43,11 +44,15 @@ class ActionClient:
         action_class: Any = import_interface(spec.type)
         kind, name = 'action client', spec.name
         self._node = node
-        self._name = spec.action
+        self._name = node.resolve_action_name(spec.action)
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
         self._requests = Requests(
-            node.waits, self._client.server_is_ready, self._unavailable, self._unanswered
+            node.waits,
+            self._client.server_is_ready,
+            WaitNotice(node.ros.get_logger().info, f"action server '{self._name}'"),
+            self._unavailable,
+            self._unanswered,
         )
         self._behaviours = _Behaviours(
             node, {Owner(kind, name, key): getattr(spec, key) for key in ('feedback', 'result')}

@@ -13,6 +13,7 @@ from composer.errors import (
 )
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
+from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
@@ -40,6 +41,7 @@ class ServiceClient:
         self._requests = Requests(
             node.waits,
             self._client.service_is_ready,
+            WaitNotice(node.ros.get_logger().info, f"service '{self._service}'"),
             self._unavailable,
             self._unanswered,
             self._client.remove_pending_request,

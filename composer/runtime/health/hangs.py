@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.running_calls import RunningCall
+from composer.runtime.behaviours.waits import CODES_OF_ABSENCE
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ class HangLimit:
         ran_sec = (now_ns - call.since_ns) * 1e-9
         if self.after_sec is None or ran_sec < self.after_sec:
             return
+        if any(code in CODES_OF_ABSENCE for code in call.codes()):
+            # What it waits for is logged instead.
+            return
         if now_ns * 1e-9 < self._quiet_until:
             self._skipped.add(token)
             return
@@ -108,15 +112,20 @@ class HangWatcher(Watcher):
     Args:
         nodes: Returns the present nodes.
         limits_sec: The limits of all entities.
+        errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
-        self, nodes: Callable[[], Iterable[WatchedNode]], limits_sec: Iterable[float | None]
+        self,
+        nodes: Callable[[], Iterable[WatchedNode]],
+        limits_sec: Iterable[float | None],
+        errors: ErrorReporter,
     ) -> None:
         shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
         pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
         super().__init__('composer-watch', self._check_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
         self._nodes = nodes
+        self._errors = errors
 
     def _check_calls(self) -> None:
         for node in self._nodes():
@@ -124,3 +133,4 @@ class HangWatcher(Watcher):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
                     limit.check(node.running, token, RunningCall(*entry))
             node.errors.flush_old()
+        self._errors.flush_old()

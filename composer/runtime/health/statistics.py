@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.executor import MissedCounts
 from composer.runtime.behaviours.tracebacks import summarize
+from composer.runtime.health.missed import MissedCounts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

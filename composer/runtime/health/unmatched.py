@@ -14,12 +14,14 @@ from rclpy.exceptions import InvalidHandle
 
 from composer.entity_kinds import KIND_OF_NOUN
 from composer.executor import checked_seldom
-from composer.language.qos_conflicts import find_qos_conflicts
+from composer.language.qos_conflicts import CONFLICTS, describe_conflicts, find_qos_conflicts
+from composer.runtime.health.qos_losses import QosLosses
 from composer.runtime.health.watcher import Watcher
 from composer.runtime.messages.qos_profiles import read_policies
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from rclpy.node import Node as RosNode
     from rclpy.qos import QoSProfile
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 _PAUSE_SEC = 1.0
 # The graph may learn the name of an end some time after the event.
 _MOST_CHECKS = 10
+# Policies of these values are another one when the end has been created.
+_LEFT_TO_THE_MIDDLEWARE = ('best_available', 'system_default')
 _UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 
 
@@ -43,6 +47,7 @@ class TopicEndpoint:
 
     Attributes:
         topic: Its name in the graph.
+        losses: What it misses of what its QoS promises.
     """
 
     def __init__(
@@ -54,25 +59,34 @@ class TopicEndpoint:
         place: str,
     ) -> None:
         self.ros = ros
-        self._place = place
         self._spec = spec
-        self._profile = profile
-        self._noun = noun
+        self._declared = read_policies(profile)
+        self._owner = f"{noun} '{spec.name}' ({place})"
         self._publishes = KIND_OF_NOUN[noun].provides
         self._reported: set[tuple[str, str]] = set()
         self._checks_left = 0
         self.topic = ros.resolve_topic_name(spec.topic)
+        self.losses = QosLosses(
+            self._owner,
+            self._declared,
+            EscapingLogger(ros.get_logger()).warning,
+            publishes=self._publishes,
+        )
 
     def subscription_events(self) -> SubscriptionEventCallbacks:
         """Return the event callbacks of a subscription."""
         return SubscriptionEventCallbacks(
-            incompatible_qos=self._on_incompatible_qos, use_default_callbacks=False
+            incompatible_qos=self._on_incompatible_qos,
+            use_default_callbacks=False,
+            **self.losses.callbacks(),
         )
 
     def publisher_events(self) -> PublisherEventCallbacks:
         """Return the event callbacks of a publisher."""
         return PublisherEventCallbacks(
-            incompatible_qos=self._on_incompatible_qos, use_default_callbacks=False
+            incompatible_qos=self._on_incompatible_qos,
+            use_default_callbacks=False,
+            **self.losses.callbacks(),
         )
 
     @property
@@ -83,9 +97,10 @@ class TopicEndpoint:
     def check(self) -> None:
         """Find the ends that cannot match, and report each once."""
         found = False
-        for end in self._other_ends():
+        policies = self._find_policies()
+        for end in self._ends(publish=not self._publishes):
             name = f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-            reason = self._find_reason(end)
+            reason = self._find_reason(end, policies)
             if reason is None or end.node_name == _UNKNOWN_NAME:
                 continue
             found = True
@@ -102,27 +117,46 @@ class TopicEndpoint:
     def _on_incompatible_qos(self, _event: Any) -> None:
         self.expect()
 
-    def _other_ends(self) -> list[TopicEndpointInfo]:
+    def _ends(self, *, publish: bool) -> list[TopicEndpointInfo]:
+        """Return the publishers or the subscriptions of the topic."""
         get = (
-            self.ros.get_subscriptions_info_by_topic
-            if self._publishes
-            else self.ros.get_publishers_info_by_topic
+            self.ros.get_publishers_info_by_topic
+            if publish
+            else self.ros.get_subscriptions_info_by_topic
         )
         return list(get(self.topic))
 
+    def _find_policies(self) -> dict[str, Any]:
+        """Return its own policies, those that the middleware has chosen included."""
+        chosen = {
+            policy for policy in CONFLICTS if self._declared[policy] in _LEFT_TO_THE_MIDDLEWARE
+        }
+        if chosen:
+            own = self.ros.get_name(), self.ros.get_namespace()
+            for end in self._ends(publish=self._publishes):
+                policies = read_policies(end.qos_profile)
+                if (end.node_name, end.node_namespace) == own and all(
+                    policies[policy] == self._declared[policy]
+                    for policy in CONFLICTS.keys() - chosen
+                ):
+                    return policies
+        return self._declared
+
     def _report(self, name: str, reason: str) -> None:
         what = 'sends nothing to' if self._publishes else 'gets nothing from'
-        owner = f"{self._noun} '{self._spec.name}' ({self._place})"
-        self.ros.get_logger().warning(f"{owner} {what} '{name}': {reason}")
+        text = f"{self._owner} {what} '{name}': {reason}"
+        EscapingLogger(self.ros.get_logger()).warning(text)
 
-    def _find_reason(self, end: TopicEndpointInfo) -> str | None:
+    def _find_reason(self, end: TopicEndpointInfo, here: Mapping[str, Any]) -> str | None:
         """Return why another end cannot match this one, `None` if it can."""
         if end.topic_type != self._spec.type:
             return f'its type is {end.topic_type} there, and {self._spec.type} here'
-        here, there = read_policies(self._profile), read_policies(end.qos_profile)
+        there = read_policies(end.qos_profile)
         offered, requested = (here, there) if self._publishes else (there, here)
-        conflict = next(find_qos_conflicts(offered, requested), None)
-        return None if conflict is None else conflict.describe_from(publisher=self._publishes)
+        conflicts = list(find_qos_conflicts(offered, requested))
+        if not conflicts:
+            return None
+        return describe_conflicts(conflicts, from_publisher=self._publishes)
 
 
 class GraphWatcher(Watcher):
@@ -152,6 +186,7 @@ class GraphWatcher(Watcher):
                 end.expect()
             if end.is_due:
                 end.check()
+            end.losses.flush_old()
 
     def _newly_mixed_topics(self, endpoints: list[TopicEndpoint]) -> set[str]:
         """Return the topics with several types, if anything in the graph has changed."""

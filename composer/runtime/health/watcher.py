@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
+from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.logs import system_logger
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Watcher:
-    """Calls a function periodically, whatever it raises; each error is logged once.
+    """Calls a function periodically, whatever it raises; its errors are logged as those of others.
 
     Args:
         name: The name of the thread.
@@ -25,7 +26,7 @@ class Watcher:
         self._check = check
         self._pause_sec = pause_sec
         self._ended = threading.Event()
-        self._errors: set[str] = set()
+        self._reporter = ErrorReporter(system_logger.error)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
@@ -43,9 +44,4 @@ class Watcher:
             try:
                 self._check()
             except Exception as error:  # noqa: BLE001 - one error must not end the checks
-                self._report(format_internal_error(error))
-
-    def _report(self, error: str) -> None:
-        if error not in self._errors:
-            self._errors.add(error)
-            system_logger.error(error)
+                self._reporter.report(self._thread.name, error, format_internal_error)

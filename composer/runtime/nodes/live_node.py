@@ -17,11 +17,13 @@ from rclpy.exceptions import InvalidHandle
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
+from composer.names import expand_name
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
+from composer.runtime.health.missed import count_missed
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     Gate,
@@ -31,6 +33,7 @@ from composer.runtime.nodes.callback_groups import (
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -113,6 +116,10 @@ class LiveNode:
             self._groups[key] = kind(self.gate)
         return self._groups[key]
 
+    def resolve_action_name(self, name: str) -> str:
+        """Return the full name of an action, whose name itself ROS does not remap."""
+        return expand_name(name, self.ros.get_name(), self.ros.get_namespace())
+
     def place(self, path: DataPath) -> str:
         """Return `file:line` of a place in the file."""
         span = self.system.positions.key(path)
@@ -155,7 +162,7 @@ class LiveNode:
                 return
             if health is not None:
                 health.note_error(error)
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
@@ -188,7 +195,7 @@ class LiveNode:
         def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            self.errors.report(owner, place, error)
+            self.errors.report(f'{owner} ({place})', error)
             if failed is not None:
                 failed(error)
 
@@ -238,7 +245,7 @@ class LiveNode:
         """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
-            health.follow(partial(self.system.executor.missed_counts, self.ros, entity))
+            health.follow(count_missed(self.system.executor, self.ros, entity))
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""
@@ -246,12 +253,18 @@ class LiveNode:
             if kind.is_timed:
                 yield from self.entities.get(kind.section, {}).values()
 
+    def flush_counts(self) -> None:
+        """Log the counts of what has not been logged."""
+        self.errors.flush()
+        for end in self.endpoints:
+            end.losses.flush()
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:
             return
         self._is_destroyed = True
-        self.errors.flush()
+        self.flush_counts()
         for end in self.at_destruction:
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
@@ -266,7 +279,7 @@ class LiveNode:
 
     def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
         if owner not in self.limits:
-            warn = self.ros.get_logger().warning
+            warn = EscapingLogger(self.ros.get_logger()).warning
             self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
 
@@ -288,7 +301,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         system,
         ros,
         behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
-        errors=ErrorReporter(ros.get_logger().error),
+        errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
         entities=entities,
         waits=waits,
         background=background,

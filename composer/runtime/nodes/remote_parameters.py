@@ -15,6 +15,7 @@ from composer.errors import (
 )
 from composer.names import join_names
 from composer.runtime.behaviours.requests import Requests
+from composer.runtime.behaviours.waits import WaitNotice
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -126,6 +127,9 @@ class RemoteParameters:
         requests = Requests(
             self._waits,
             client.service_is_ready,
+            WaitNotice(
+                self._ros.get_logger().info, f"the parameter services of node '{full_name}'"
+            ),
             unavailable,
             unanswered,
             client.remove_pending_request,

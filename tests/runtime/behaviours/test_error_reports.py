@@ -4,9 +4,12 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rcl_interfaces.msg import Log
+from rcl_interfaces.msg import Log, Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Int32
+from std_msgs.msg import Int32, String
+
+from tests.running import DEADLINE_SEC
 
 pytestmark = pytest.mark.ros
 
@@ -48,10 +51,10 @@ def test_an_error_is_logged_with_node_entity_place_and_traceback_and_others_go_o
     lines = [line for line in child.lines if 'alive' not in line]
     begin = lines.index(first)
     assert lines[begin + 1 : begin + 5] == [
-        'Traceback (most recent call last):',
-        f'  File "{compose.folder}/parts.py", line 3, in fail',
-        "    raise RuntimeError('out of order')",
-        'RuntimeError: out of order',
+        '  Traceback (most recent call last):',
+        f'    File "{compose.folder}/parts.py", line 3, in fail',
+        "      raise RuntimeError('out of order')",
+        '  RuntimeError: out of order',
     ]
 
 
@@ -224,3 +227,42 @@ def test_a_restart_of_many_nodes_at_once_brings_all_of_them_back(compose):
 
     assert child.stop() == 0
     assert not child.matching('InvalidHandle')
+
+
+def test_a_message_cannot_write_lines_or_escape_codes_into_the_log(compose, peer):
+    text = """
+        version: 1
+        nodes:
+          ears: {subscriptions: {words: {type: std_msgs/msg/String, behaviour: 'parts:hear'}}}
+    """
+    code = """
+        def hear(node, message):
+            raise ValueError(message.data)
+    """
+    child = compose(text, code)
+    forged = '\n[FATAL] [composer]: forged\x1b[2J\x9b2J\u2028\u202e\r\x7f'
+    peer.advertise(String, 'words').publish(String(data=forged))
+    child.wait_for_line('ValueError', times=2)
+
+    assert child.stop() == 0
+    assert not [line for line in child.lines if line.startswith('[FATAL]')]
+    assert all(line.isprintable() for line in child.lines)
+    escaped = r'[FATAL] [composer]: forged\x1b[2J\x9b2J\u2028\u202e\r\x7f'
+    assert child.lines.count(f'  {escaped}') == 2
+
+
+def test_errors_of_callbacks_that_are_no_behaviours_are_counted(compose, peer):
+    """Those that a peer causes, as with a type of parameters that does not exist."""
+    child = compose('{version: 1, nodes: {n: {parameters: {p: 1}}}}')
+    wrong = Parameter(name='p', value=ParameterValue(type=99))
+    client = peer.node.create_client(SetParameters, '/n/set_parameters')
+    assert client.wait_for_service(DEADLINE_SEC)
+    for _ in range(100):
+        client.call_async(SetParameters.Request(parameters=[wrong]))
+    child.wait_for_line('[ERROR] [composer]: a callback raised')
+    peer.call(SetParameters, '/n/set_parameters')
+
+    assert child.stop() == 0
+    assert len(child.matching('Traceback')) == 1
+    counts = [line.split(' raised ')[1] for line in child.matching('more')]
+    assert sum(int(count.split()[0].replace('once', '1')) for count in counts) == 99

@@ -267,11 +267,11 @@ def test_what_composer_raises_on_purpose_shows_the_line_of_the_behaviour_last(co
     begin = child.lines.index(line)
 
     assert child.lines[begin + 1 : begin + 6] == [
-        'Traceback (most recent call last):',
-        f'  File "{compose.folder}/parts.py", line 4, in fail',
-        "    node.publish(name[:], 'hello')",
-        "composer.runtime.nodes.behaviour_node.UndeclaredError: node 'bad' declares no publisher 'wrods'",
-        "help: did you mean 'words'?",
+        '  Traceback (most recent call last):',
+        f'    File "{compose.folder}/parts.py", line 4, in fail',
+        "      node.publish(name[:], 'hello')",
+        "  composer.runtime.nodes.behaviour_node.UndeclaredError: node 'bad' declares no publisher 'wrods'",
+        "  help: did you mean 'words'?",
     ]
 
 

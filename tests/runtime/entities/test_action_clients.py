@@ -245,19 +245,19 @@ def test_a_goal_can_be_cancelled(compose):
     child = compose(acting('cancel', server='forever'), CODE)
 
     assert child.wait_for_line('end: ') == '[INFO] [client]: end: executing True canceled'
-    child.wait_for_line("[WARN] [client]: the goal of 'act' was canceled")
+    child.wait_for_line("[WARN] [client]: the goal of '/act' was canceled")
     assert child.stop() == 0
 
 
 ERRORS = {
-    'refused': ('', "GoalRejectedError: the server of 'refused' refused the goal"),
+    'refused': ('', "GoalRejectedError: the server of '/refused' refused the goal"),
     'missing': (
         ', with: {timeout: 0.2}',
-        "ActionNotAvailableError: no server of the action 'missing' appeared within 0.2 s",
+        "ActionNotAvailableError: no server of the action '/missing' appeared within 0.2 s",
     ),
     'slow': (
         ', with: {patience: 0.2}',
-        "GoalTimeoutError: the goal of 'slow' did not end within 0.2 s",
+        "GoalTimeoutError: the goal of '/slow' did not end within 0.2 s",
     ),
     'failing': ('', 'end: aborted'),
 }
@@ -310,7 +310,7 @@ def test_feedback_and_result_behaviours_hear_all_in_order_and_never_beside_other
 
 def test_the_result_behaviour_hears_of_an_aborted_goal_too(compose):
     child = compose(acting('send_only', server='fail', client=", result: 'parts:take'"), CODE)
-    child.wait_for_line("[WARN] [client]: the goal of 'act' was aborted")
+    child.wait_for_line("[WARN] [client]: the goal of '/act' was aborted")
     child.wait_for_line('[client]: result: []')
 
 

@@ -50,7 +50,7 @@ def live(node):
     node.logger.info('alive')
 
 def call(node):
-    node.call('absent', timeout=1.0)
+    node.call('slow', timeout=1.0)
 
 def count(node, goal):
     pauses = []
@@ -133,7 +133,7 @@ def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends
 
     for name, functions in HANGING.items():
         lines = stack_after(child, reports[name]).splitlines()
-        stack = [text for text in lines if text.startswith('  File')]
+        stack = [text for text in lines if text.startswith('    File')]
         assert [text.rpartition(' in ')[2] for text in stack if 'parts.py' in text] == functions
         assert 'composer/' not in stack[0]
     assert len(child.matching('has been running for')) == len(HANGING)
@@ -208,19 +208,22 @@ def test_what_is_slow_again_and_again_is_not_told_each_time(compose):
     assert len(child.matching('returned after')) == 1
 
 
-def test_a_wait_for_a_service_counts_like_any_other_time(compose):
+def test_a_wait_for_an_answer_counts_like_any_other_time(compose):
     text = """
         version: 1
         nodes:
           bad:
-            service_clients: {absent: std_srvs/srv/Trigger}
+            service_clients: {slow: std_srvs/srv/Trigger}
             timers: {ask: {period: 0.02, behaviour: 'parts:call', warn_after: 0.1}}
+          slow:
+            services: {slow: {type: std_srvs/srv/Trigger, behaviour: 'parts:hang'}}
     """
     child = compose(text, CODE)
     line = child.wait_for_line('has been running for')
     child.wait_for_line("[bad]: timer 'ask' (system.yaml:6) returned after")
 
     assert 'in call' in stack_after(child, line)
+    (compose.folder / 'over').touch()
 
 
 def test_a_service_that_hangs_is_reported(compose, peer):

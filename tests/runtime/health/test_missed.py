@@ -14,7 +14,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from std_msgs.msg import Int32
 
-from composer.executor import MissedCounts
+from composer.executor import event_fds
+from composer.runtime.health.missed import MissedCounts, count_missed
 from tests.running import DEADLINE_SEC
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -79,6 +80,7 @@ def advertise(node, reliability, wait_for):
 @pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
 def test_messages_that_a_full_queue_drops_are_overruns(node, executor, wait_for, reliability):
     slow = Slow(node, reliability)
+    missed = count_missed(executor, node, slow.entity)
     publisher = advertise(node, reliability, wait_for)
     with spinning(executor):
         publisher.publish(Int32(data=-1))
@@ -88,13 +90,14 @@ def test_messages_that_a_full_queue_drops_are_overruns(node, executor, wait_for,
         slow.may_end.set()
         wait_for(lambda: slow.heard == [-1, *range(90, 100)], 'what was kept')
         wait_for(
-            lambda: executor.missed_counts(node, slow.entity) == MissedCounts(overruns=90),
+            lambda: missed() == MissedCounts(overruns=90),
             'overruns',
         )
 
 
 def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
     slow = Slow(node)
+    missed = count_missed(executor, node, slow.entity)
     publisher = advertise(node, 'RELIABLE', wait_for)
     with spinning(executor):
         publisher.publish(Int32(data=-1))
@@ -102,7 +105,7 @@ def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
         for number in range(100):
             publisher.publish(Int32(data=number))
         wait_for(
-            lambda: executor.missed_counts(node, slow.entity) == MissedCounts(overruns=90),
+            lambda: missed() == MissedCounts(overruns=90),
             'overruns',
         )
         slow.may_end.set()
@@ -113,43 +116,44 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
     node, executor, wait_for, start_program, reliability
 ):
     slow = Slow(node, reliability)
+    missed = count_missed(executor, node, slow.entity)
     sender = start_program('-c', SENDER, reliability, '200', stdin=PIPE)
     wait_for(slow.entity.get_publisher_count, 'the publisher')
     with spinning(executor):
         wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
         print('go', file=sender.stdin, flush=True)
-        wait_for(lambda: executor.missed_counts(node, slow.entity).overruns, 'the first overrun')
+        wait_for(lambda: missed().overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1] == 199, 'the last message')
         if reliability == 'RELIABLE':
             wait_for(
-                lambda: (
-                    executor.missed_counts(node, slow.entity).overruns == 200 - len(slow.heard)
-                ),
+                lambda: missed().overruns == 200 - len(slow.heard),
                 'the exact count',
             )
 
 
 def test_subscriptions_that_keep_up_have_no_overruns(node, executor, wait_for):
     slow = Slow(node)
+    missed = count_missed(executor, node, slow.entity)
     slow.may_end.set()
     publisher = advertise(node, 'RELIABLE', wait_for)
     with spinning(executor):
         for number in range(300):
             publisher.publish(Int32(data=number))
             wait_for(lambda: len(slow.heard) == number + 1, 'the message')  # noqa: B023
-        assert executor.missed_counts(node, slow.entity) == MissedCounts()
+        assert missed() == MissedCounts()
 
 
 def test_takes_of_reentrant_groups_are_no_overruns(node, executor, wait_for):
     slow = Slow(node, group=ReentrantCallbackGroup(), history='KEEP_ALL')
+    missed = count_missed(executor, node, slow.entity)
     publisher = advertise(node, 'RELIABLE', wait_for)
     with spinning(executor):
         for number in range(30):
             publisher.publish(Int32(data=number))
         wait_for(lambda: len(slow.heard) == 30, 'all at the same time')
         slow.may_end.set()
-        assert executor.missed_counts(node, slow.entity) == MissedCounts()
+        assert missed() == MissedCounts()
 
 
 def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
@@ -164,8 +168,9 @@ def test_a_clock_that_leaps_over_ticks_skips_them(node, executor, wait_for):
     def leap_to(seconds, tick_count):
         clock.set_ros_time_override(Time(nanoseconds=int(seconds * 1e9)))
         wait_for(lambda: len(ticks) == tick_count, f'the tick at {seconds}')
-        return executor.missed_counts(node, timer)
+        return missed()
 
+    missed = count_missed(executor, node, timer)
     with spinning(executor):
         wait_for(lambda: timer in executor_entities(executor, node), 'the timer to be seen')
         assert leap_to(101.05, 1) == MissedCounts()
@@ -187,21 +192,73 @@ def test_ticks_behind_a_slow_callback_of_their_group_are_late_and_skipped(
     slow = Slow(node)
     ticks = []
     timer = node.create_timer(0.05, lambda: ticks.append(1))
+    missed = count_missed(executor, node, timer)
     publisher = advertise(node, 'RELIABLE', wait_for)
     with spinning(executor):
         publisher.publish(Int32())
         wait_for(lambda: slow.heard, 'the message')
-        before = executor.missed_counts(node, timer)
+        before = missed()
         count = len(ticks)
         ended = threading.Timer(1.0, slow.may_end.set)
         ended.start()
         wait_for(lambda: len(ticks) > count, 'the next tick')
-        after = executor.missed_counts(node, timer)
+        after = missed()
         assert after.late_ticks > before.late_ticks
         assert after.skipped_ticks - before.skipped_ticks >= 18
 
 
 def test_what_the_executor_does_not_know_has_missed_nothing(node, executor):
     timer = node.create_timer(10.0, print, autostart=False)
-    assert executor.missed_counts(node, timer) == MissedCounts()
-    assert executor.missed_counts(None, timer) == MissedCounts()
+    assert count_missed(executor, node, timer)() == MissedCounts()
+    assert count_missed(executor, None, timer)() == MissedCounts()
+    assert count_missed(executor, node, object())() == MissedCounts()
+
+
+def test_a_new_subscription_has_missed_nothing_of_a_destroyed_one(node, executor, wait_for):
+    ticks = []
+    node.create_timer(0.01, lambda: ticks.append(1))
+    before = node.create_subscription(Int32, 'numbers', print, 10)
+    publisher = node.create_publisher(Int32, 'numbers', 100)
+    executor.spin_once(timeout_sec=0)
+    for number in range(30):
+        publisher.publish(Int32(data=number))
+    node.destroy_subscription(before)
+    executor.spin_once(timeout_sec=0)
+    silent = node.create_subscription(Int32, 'silent', print, 10)
+    missed = count_missed(executor, node, silent)
+    with spinning(executor):
+        wait_for(lambda: len(ticks) > 3, 'ticks')
+        assert missed() == MissedCounts()
+
+
+def test_a_subscription_is_counted_exactly_once_it_need_not_share(
+    node, executor, wait_for, monkeypatch
+):
+    monkeypatch.setattr(event_fds, '_own_event_fds', event_fds._OwnEventFds())
+    monkeypatch.setattr(event_fds, '_MAX_OWN_SHARE', 0)
+    slow = Slow(node)
+    slow.may_end.set()
+    missed = count_missed(executor, node, slow.entity)
+    node.create_subscription(Int32, 'other', print, 10)
+    publisher = advertise(node, 'RELIABLE', wait_for)
+
+    def send(first, count, heard):
+        for number in range(first, first + count):
+            publisher.publish(Int32(data=number))
+        wait_for(lambda: len(slow.heard) == heard, 'the messages')
+
+    with spinning(executor):
+        wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
+        send(0, 5, 5)
+        monkeypatch.setattr(event_fds, '_MAX_OWN_SHARE', 1)
+        source = executor_entities(executor, node)[slow.entity]
+        wait_for(
+            lambda: send(5, 1, len(slow.heard) + 1) or not source.event_fd.is_shared, 'its own'
+        )
+        heard = len(slow.heard)
+        slow.may_end.clear()
+        send(100, 1, heard + 1)
+        for number in range(100):
+            publisher.publish(Int32(data=number))
+        slow.may_end.set()
+        wait_for(lambda: missed() == MissedCounts(overruns=90), 'overruns')

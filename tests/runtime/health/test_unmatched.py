@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32, String
 
@@ -38,12 +39,12 @@ def test_ends_with_other_qos_are_named_with_what_to_do_about_it(compose, peer):
     child.wait_for_line(
         "[WARN] [robot.ears]: subscription 'scan' (system.yaml:7) gets nothing from '/peer': "
         'reliability: best_effort is offered there, reliable is requested here; '
-        "set 'qos: {reliability: best_effort}' here, or reliable there"
+        "set 'qos: {reliability: best_effort}' here, or 'qos: {reliability: reliable}' there"
     )
     child.wait_for_line(
         "[WARN] [mouth]: publisher 'words' (system.yaml:10) sends nothing to '/peer': "
         'reliability: best_effort is offered here, reliable is requested there; '
-        "set 'qos: {reliability: reliable}' here, or best_effort there"
+        "set 'qos: {reliability: reliable}' here, or 'qos: {reliability: best_effort}' there"
     )
 
 
@@ -95,3 +96,72 @@ def test_an_end_of_another_type_is_named_with_both_types(compose, peer):
         "[WARN] [robot.ears]: subscription 'scan' (system.yaml:7) gets nothing from '/peer': "
         'its type is std_msgs/msg/Int32 there, and std_msgs/msg/String here'
     )
+
+
+def test_all_policies_at_fault_are_named_and_no_others(compose, peer):
+    text = """
+        version: 1
+        nodes:
+          ears:
+            subscriptions:
+              strict:
+                type: std_msgs/msg/String
+                topic: /words
+                qos: {deadline: 1, liveliness_lease_duration: 3}
+                behaviour: parts:hear
+              adapted: {type: std_msgs/msg/String, topic: /late, qos: best_available, behaviour: 'parts:hear'}
+    """
+    child = compose(text, CODE)
+    child.wait_until_ready()
+    lease = Duration(seconds=2)
+    peer.node.create_publisher(
+        String, '/words', QoSProfile(depth=1, deadline=lease, liveliness_lease_duration=lease)
+    )
+    peer.node.create_publisher(String, '/late', BEST_EFFORT)
+
+    child.wait_for_line(
+        "subscription 'strict' (system.yaml:6) gets nothing from '/peer': deadline: 2 s is "
+        "offered there, 1 s is requested here; set 'qos: {deadline: 2}' here, or "
+        "'qos: {deadline: 1}' there"
+    )
+    child.wait_for_line(
+        "subscription 'adapted' (system.yaml:11) gets nothing from '/peer': reliability: "
+        'best_effort is offered there, reliable is requested here; durability: volatile is '
+        'offered there, transient_local is requested here; liveliness: automatic is offered '
+        "there, manual_by_topic is requested here; set 'qos: {reliability: best_effort, "
+        "durability: volatile, liveliness: automatic}' here, or 'qos: {reliability: reliable, "
+        "durability: transient_local, liveliness: manual_by_topic}' there"
+    )
+
+
+def test_missed_deadlines_and_lost_liveliness_are_logged_once_then_counted(compose):
+    text = """
+        version: 1
+        qos:
+          brisk: {deadline: 0.1, liveliness: manual_by_topic, liveliness_lease_duration: 0.2}
+        nodes:
+          mouth:
+            publishers: {words: {type: std_msgs/msg/String, qos: brisk}}
+            timers: {speak: {period: 1, publish: words, message: hello}}
+          ears:
+            subscriptions: {words: {type: std_msgs/msg/String, qos: brisk, behaviour: 'parts:hear'}}
+    """
+    child = compose(text, CODE)
+    lines = [
+        f'[WARN] {line}'
+        for line in (
+            "[mouth]: publisher 'words' (system.yaml:7) published nothing within its deadline of 0.1 s",
+            "[mouth]: publisher 'words' (system.yaml:7) lost its liveliness: it published nothing within its lease of 0.2 s",
+            "[ears]: subscription 'words' (system.yaml:10) got no message within its deadline of 0.1 s",
+            "[ears]: subscription 'words' (system.yaml:10) lost a publisher: no sign of life within the lease of 0.2 s",
+        )
+    ]
+    for line in lines:
+        child.wait_for_line(line)
+    child.wait_for_line('heard hello', times=3)
+    assert child.stop() == 0
+    for line in lines:
+        first, *counted = child.matching(line)
+        assert first == line
+        assert all(each.endswith((' more times', ', once more')) for each in counted)
+    assert child.matching('within its deadline of 0.1 s, ')

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
+from composer.runtime.middleware.shared_memory import remove_left_segments
 from composer.runtime.reserved_methods import reserve
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def create_ros_context(ros_arguments: Sequence[str]) -> Context:
         UsageError: ROS does not accept them, or they rename all nodes.
         StartError: ROS 2 cannot start.
     """
+    remove_left_segments()
     context = _SystemContext()
     _init(context, ros_arguments)
     reserve(context, 'the context', 'shutdown', 'try_shutdown', 'destroy')

@@ -1,0 +1,201 @@
+"""Ends Composer where it cannot end itself, and what its behaviours started: a process of its own.
+
+It runs as a script and imports nothing of Composer, to start fast and stay small. Neither a
+behaviour that holds the interpreter nor an output that nobody reads can block it.
+
+- Composer sends it a byte for each signal, from the handler that Python has in C, which runs
+  whatever holds the interpreter, and a byte for what Composer does itself (`BEGUN` ...).
+- If a stop takes longer than it may, or more signals come and nothing happens, the guardian has
+  Composer print its stacks and end with exit code 1.
+- When Composer has ended, however that happened, it kills all processes that bear its mark:
+  those that behaviours have started and left.
+
+The mark is a limit of resources that Linux has not looked at since 2003, the number of file
+locks. Each process has it from its parent, whatever session, environment and parent it has later.
+Source: https://man7.org/linux/man-pages/man2/getrlimit.2.html
+"""
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+from pathlib import Path
+
+RLIMIT_LOCKS = 10
+# Prints the stacks of Composer's threads.
+STACKS_SIGNAL = signal.SIGRTMAX
+# What Composer sends, beside the numbers of signals.
+BEGUN, OVER, LEAVE = 101, 102, 103
+
+_HURRY_SEC = 1.0
+# How long a process that ends may take from its last descriptor to its end.
+_CLOSING_SEC = 0.5
+# How long the threads of Composer get to print their stacks, and the process to end.
+_STACKS_SEC = 0.3
+_END_SEC = 2.0
+_KILL_SEC = 5.0
+_POLL_SEC = 0.01
+_CHUNK = 4096
+_LONGEST_COMMAND = 200
+# Ends by itself, and removes what the others have shared.
+_SPARED = b'from multiprocessing.resource_tracker import main'
+_NEVER = float('inf')
+
+
+class Guardian:
+    """Watches Composer until it has ended.
+
+    Args:
+        composer: A descriptor of the process.
+        reports: Where the bytes come from.
+        switch: A byte that is written there ends Composer.
+        stop_sec: How long a stop may take.
+        exit_sec: How long Python may take to exit after it.
+    """
+
+    def __init__(
+        self, composer: int, reports: int, switch: int, stop_sec: float, exit_sec: float
+    ) -> None:
+        self._ended = composer
+        self._reports = reports
+        self._switch = switch
+        self._stop_sec = stop_sec
+        self._exit_sec = exit_sec
+        self._deadline = _NEVER
+        self._interrupts = 0
+        self._has_left = False
+
+    def run(self) -> bool:
+        """Return whether Composer has ended; it may have sent the guardian away before."""
+        poll = select.poll()
+        poll.register(self._ended, select.POLLIN)
+        poll.register(self._reports, select.POLLIN)
+        while not self._has_left:
+            rest = self._deadline - time.monotonic()
+            if rest <= 0:
+                self._end_composer()
+                return True
+            ready = {each for each, _ in poll.poll(None if rest == _NEVER else rest * 1000 + 1)}
+            if self._ended in ready:
+                if self._deadline == _NEVER:
+                    tell(
+                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
+                        'killed, or a behaviour called os._exit'
+                    )
+                return True
+            if self._reports in ready:
+                data = os.read(self._reports, _CHUNK)
+                if not data:
+                    poll.unregister(self._reports)
+                if not data and not self._wait(_CLOSING_SEC):
+                    # It has not ended: a behaviour has closed the descriptors of Composer.
+                    self._take(BEGUN)
+                    # Not counted if the system stops already.
+                    self._signal(signal.SIGHUP)
+                for byte in data:
+                    self._take(byte)
+        return False
+
+    def _take(self, byte: int) -> None:
+        now = time.monotonic()
+        if byte in {signal.SIGINT, signal.SIGTERM}:
+            self._interrupts += 1
+        if byte in {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, BEGUN}:
+            self._deadline = min(self._deadline, now + self._stop_sec)
+        if byte in {signal.SIGINT, signal.SIGTERM} and self._interrupts > 1:
+            self._deadline = min(self._deadline, now + _HURRY_SEC)
+        if byte == OVER:
+            self._deadline = now + self._exit_sec
+        if byte == LEAVE:
+            self._has_left = True
+
+    def _end_composer(self) -> None:
+        tell(
+            '[FATAL] [composer]: the system did not end in time, and is ended; its threads are at'
+        )
+        self._signal(STACKS_SIGNAL)
+        self._wait(_STACKS_SEC)
+        with contextlib.suppress(OSError):
+            os.write(self._switch, b'\0')
+        if not self._wait(_END_SEC):
+            self._signal(signal.SIGKILL)
+
+    def _signal(self, number: int) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._ended, number)
+
+    def _wait(self, timeout_sec: float) -> bool:
+        return bool(select.select([self._ended], [], [], timeout_sec)[0])
+
+
+def tell(line: str) -> None:
+    """Print a line, unless that would block."""
+    with contextlib.suppress(OSError, ValueError):
+        if select.select([], [2], [], 0)[1]:
+            os.write(2, line.encode(errors='backslashreplace') + b'\n')
+
+
+def find_marked(mark: int) -> dict[int, str]:
+    """Return the command lines of all other processes that bear a mark, by their IDs."""
+    found = {}
+    for name in os.listdir('/proc'):  # noqa: PTH208 - fast
+        folder = Path('/proc', name)
+        # It may have ended, or belong to another user.
+        with contextlib.suppress(OSError, ValueError):
+            if int(name) == os.getpid() or _read_mark(folder) != mark:
+                continue
+            command = (folder / 'cmdline').read_bytes()
+            if not _is_dead(folder) and _SPARED not in command:
+                found[int(name)] = _describe(command)
+    return found
+
+
+def _describe(command: bytes) -> str:
+    """Return a command line as it is shown: without control characters, and cut."""
+    words = command.rstrip(b'\0').replace(b'\0', b' ').decode(errors='backslashreplace')
+    text = ascii(words)[1:-1]
+    return text if len(text) <= _LONGEST_COMMAND else f'{text[:_LONGEST_COMMAND]}...'
+
+
+def _read_mark(folder: Path) -> int:
+    """Return the limit of file locks; raise `ValueError` if there is none."""
+    _, _, rest = (folder / 'limits').read_text().partition('Max file locks')
+    return int(rest.split()[0])
+
+
+def _is_dead(folder: Path) -> bool:
+    return (folder / 'stat').read_bytes().rpartition(b')')[2].split()[0] in {b'Z', b'X'}
+
+
+def kill_marked(mark: int) -> None:
+    """Kill all processes that bear a mark until there are no more, and print which."""
+    told: set[int] = set()
+    deadline = time.monotonic() + _KILL_SEC
+    while (found := find_marked(mark)) and time.monotonic() < deadline:
+        for pid, command in found.items():
+            if pid not in told:
+                told.add(pid)
+                tell(f'[WARN] [composer]: process {pid} ({command}) outlived the system: killed')
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        time.sleep(_POLL_SEC)
+
+
+def main() -> None:
+    """Guard; the arguments: ID of Composer, those of `Guardian`, and the mark, 0 for none."""
+    composer, reports, switch = (int(each) for each in sys.argv[1:4])
+    stop_sec, exit_sec, mark = float(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    ended = os.pidfd_open(composer)
+    # No child of Composer, or a behaviour that waits for all of its own would wait for ever.
+    if os.fork():
+        os._exit(0)
+    if Guardian(ended, reports, switch, stop_sec, exit_sec).run() and mark:
+        kill_marked(mark)
+
+
+if __name__ == '__main__':
+    main()

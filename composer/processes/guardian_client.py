@@ -1,0 +1,187 @@
+"""Starts the guardian, the process that ends this one where it cannot end itself."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import faulthandler
+import os
+import resource
+import secrets
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from functools import cache
+from time import monotonic, sleep
+from typing import TYPE_CHECKING, Any
+
+from composer.processes import guardian
+
+if TYPE_CHECKING:
+    from composer.terminal import EscapingLogger
+
+_SIGEV_THREAD = 2
+_MARK_BITS = 62
+_POLL_SEC = 0.02
+
+
+class GuardianClient:
+    """Starts the guardian, and tells it about a stop.
+
+    Args:
+        stop_sec: How long a stop may take.
+        exit_sec: How long Python may take to exit after it.
+        owns_process: Whether this process exits with the system, to which all processes that it
+            starts from now on belong.
+
+    Attributes:
+        owns_process: As given.
+        descriptor: For `signal.set_wakeup_fd`.
+        mark: What marks the processes that belong to the system; 0 if nothing does.
+    """
+
+    def __init__(self, stop_sec: float, exit_sec: float, *, owns_process: bool) -> None:
+        self.owns_process = owns_process
+        self.mark = secrets.randbits(_MARK_BITS) if owns_process else 0
+        reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+        switch = _create_switch()
+        try:
+            self._process = subprocess.Popen(  # noqa: S603 - our own script
+                [
+                    *(sys.executable, '-I', '-S', guardian.__file__),
+                    *map(str, (os.getpid(), reports, switch, stop_sec, exit_sec, self.mark)),
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=(reports, switch),
+                start_new_session=True,
+            )
+        finally:
+            os.close(reports)
+        if self.mark:
+            self._set_mark()
+
+    def wait_until_begun(self) -> None:
+        """Wait until the guardian is no child of this process any more."""
+        self._process.wait()
+
+    def begin_stop(self) -> bool:
+        """Let the time of a stop run; return whether the guardian can be told."""
+        return self._send(guardian.BEGUN)
+
+    def end_stop(self) -> None:
+        """Let the time of the exit run instead."""
+        self._send(guardian.OVER)
+
+    def send_away(self) -> None:
+        """Let the guardian end: this process goes on."""
+        self._send(guardian.LEAVE)
+        with suppress(OSError):
+            os.close(self.descriptor)
+
+    def _send(self, byte: int) -> bool:
+        # A behaviour may have closed it; then the guardian stops the system.
+        try:
+            os.write(self.descriptor, bytes([byte]))
+        except OSError as error:
+            return error.errno != errno.EBADF
+        return True
+
+    def _set_mark(self) -> None:
+        _, hard = resource.getrlimit(guardian.RLIMIT_LOCKS)
+        try:
+            resource.setrlimit(guardian.RLIMIT_LOCKS, (self.mark, hard))
+        except (OSError, ValueError):
+            # The limit of this process is lower already.
+            self.mark = 0
+
+
+def _find_marked(mark: int) -> dict[int, str]:
+    # Where a behaviour has used up all descriptors, the guardian ends them afterwards.
+    with suppress(OSError):
+        return guardian.find_marked(mark)
+    return {}
+
+
+def end_marked(mark: int, timeout_sec: float, logger: EscapingLogger) -> bool:
+    """End all processes that bear a mark, and log which.
+
+    Returns:
+        Whether none had to be killed.
+    """
+    deadline = monotonic() + timeout_sec
+    known: set[int] = set()
+    while found := _find_marked(mark):
+        if monotonic() > deadline:
+            guardian.kill_marked(mark)
+            return False
+        for pid in sorted(found.keys() - known):
+            logger.warning(
+                f'process {pid} ({found[pid]}), which a behaviour has started, still runs: '
+                'it is ended'
+            )
+            for number in (signal.SIGTERM, signal.SIGCONT):
+                with suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, number)
+        known |= found.keys()
+        sleep(_POLL_SEC)
+    return True
+
+
+class _SigEvent(ctypes.Structure):
+    """`struct sigevent` of glibc and musl on 64-bit Linux."""
+
+    _fields_ = (
+        ('value', ctypes.c_size_t),
+        ('signo', ctypes.c_int),
+        ('notify', ctypes.c_int),
+        ('function', ctypes.c_void_p),
+        ('attributes', ctypes.c_void_p),
+        ('padding', ctypes.c_ubyte * 32),
+    )
+
+
+class _AioControlBlock(ctypes.Structure):
+    """The beginning of their `struct aiocb`, with room for the rest."""
+
+    _fields_ = (
+        ('fildes', ctypes.c_int),
+        ('lio_opcode', ctypes.c_int),
+        ('reqprio', ctypes.c_int),
+        ('buf', ctypes.c_void_p),
+        ('nbytes', ctypes.c_size_t),
+        ('sigevent', _SigEvent),
+        ('rest', ctypes.c_ubyte * 256),
+    )
+
+
+@cache
+def _create_switch() -> int:
+    """Return a descriptor; a byte that is written there ends this process with exit code 1.
+
+    No Python runs for it: the C library reads the byte in a thread of its own, and calls `_exit`.
+    """
+    reader, switch = os.pipe2(os.O_CLOEXEC)
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, 'aio_read'):
+        libc.calloc.restype = ctypes.c_void_p
+        # Never freed: the thread lives as long as the process.
+        address = libc.calloc(1, ctypes.sizeof(_AioControlBlock))
+        block = _AioControlBlock.from_address(address)
+        block.fildes = reader
+        block.buf = address + _AioControlBlock.rest.offset + block.rest._length_ - 1
+        block.nbytes = 1
+        block.sigevent.value = 1
+        block.sigevent.notify = _SIGEV_THREAD
+        block.sigevent.function = ctypes.cast(libc._exit, ctypes.c_void_p).value  # noqa: SLF001
+        libc.aio_read(ctypes.byref(block))
+    # When Python exits, it restores what was before its own handler.
+    libc.signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))
+    with suppress(AttributeError, RuntimeError, ValueError):
+        # There may be no standard error.
+        stderr: Any = sys.__stderr__
+        faulthandler.register(guardian.STACKS_SIGNAL, file=stderr, all_threads=True)
+        if not faulthandler.is_enabled():
+            faulthandler.enable(file=stderr)
+    return switch

@@ -1,0 +1,132 @@
+"""What subscriptions and timers miss because callbacks take too long."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+
+_LATE_SHARE = 0.1
+_MIN_LATE_NS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class MissedCounts:
+    """What an entity missed because callbacks took too long, since it is counted.
+
+    Attributes:
+        overruns: Messages that the middleware dropped from the queue of a subscription, because
+            newer ones came before they were taken. Not those lost on the way to the queue.
+        late_ticks: Ticks of a timer that began late.
+        skipped_ticks: Ticks that never began: rcl skips those whose time has passed.
+    """
+
+    overruns: int = 0
+    late_ticks: int = 0
+    skipped_ticks: int = 0
+
+    def __add__(self, other: 'MissedCounts') -> 'MissedCounts':
+        return MissedCounts(
+            self.overruns + other.overruns,
+            self.late_ticks + other.late_ticks,
+            self.skipped_ticks + other.skipped_ticks,
+        )
+
+    def __sub__(self, other: 'MissedCounts') -> 'MissedCounts':
+        return MissedCounts(
+            self.overruns - other.overruns,
+            self.late_ticks - other.late_ticks,
+            self.skipped_ticks - other.skipped_ticks,
+        )
+
+    def __bool__(self) -> bool:
+        return self != MissedCounts()
+
+
+def count_missed(executor: Any, node: Any, entity: Any) -> Callable[[], MissedCounts]:
+    """Begin to count what an entity of `node` misses in `executor`; returns what tells it."""
+    counter: Any
+    if isinstance(entity, Subscription):
+        counter = QueueOverruns(entity.qos_profile)
+    elif isinstance(entity, Timer):
+        counter = MissedTicks()
+    else:
+        return MissedCounts
+    executor.observe(node, entity, counter)
+    counts: Callable[[], MissedCounts] = counter.counts
+    return counts
+
+
+class MissedTicks:
+    """Counts the late and skipped ticks of a timer.
+
+    A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its
+    time. A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms
+    unless that was set: beside it, timers with short periods are late indeed.
+    """
+
+    def __init__(self) -> None:
+        self._late = 0
+        self._skipped = 0
+
+    def counts(self) -> MissedCounts:
+        """Return what it has missed."""
+        return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
+
+    def on_tick(self, late_ns: int, next_ns: int, period_ns: int) -> None:
+        """Note a tick that began `late_ns` after its time; the next is `next_ns` after its."""
+        if late_ns > _MIN_LATE_NS and late_ns > _LATE_SHARE * period_ns:
+            self._late += 1
+        # rcl sets the next tick to the next multiple of the period that has not passed.
+        self._skipped += max(0, next_ns // period_ns - 1)
+
+
+class QueueOverruns:
+    """Counts the messages that were pushed out of the queue of a subscription.
+
+    If fewer messages can be taken than came, newer ones have pushed the others out of the queue.
+    `_taken` counts a take from before it begins until it finds nothing: so one under way in
+    another thread, as in reentrant groups, does not count as an overrun.
+    """
+
+    def __init__(self, profile: QoSProfile) -> None:
+        # Of a queue without an end, nothing is known before it runs empty.
+        self._depth = profile.depth if profile.history == HistoryPolicy.KEEP_LAST else 0
+        self._arrived = 0
+        self._taken = 0
+        self._overruns = 0
+        self._is_counting = True
+
+    def counts(self) -> MissedCounts:
+        """Return what it has missed."""
+        if self._depth:
+            # A queue that never runs empty: the middleware holds no more than its depth.
+            self._note_overruns(self._arrived - self._taken - self._depth)
+        return MissedCounts(overruns=self._overruns)
+
+    def on_announced(self, count: int | None) -> None:
+        """Note that `count` messages came; None: nobody knows how many."""
+        if count is None:
+            self._is_counting = False
+        else:
+            self._arrived += count
+
+    def begin_take(self) -> int:
+        """Note that a take begins; returns how many had come until then."""
+        self._taken += 1
+        return self._arrived
+
+    def note_nothing_taken(self, arrived: int) -> None:
+        """Note that nothing was left when the take began of which `begin_take` told that."""
+        self._taken -= 1
+        if self._is_counting:
+            self._note_overruns(arrived - self._taken)
+        else:
+            self._arrived = self._taken + self._overruns
+            self._is_counting = True
+
+    def _note_overruns(self, count: int) -> None:
+        # A message may be taken right before its event comes, which makes one count too low.
+        self._overruns = max(self._overruns, count)

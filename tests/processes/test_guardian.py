@@ -1,0 +1,205 @@
+"""What keeps Composer from ending is overcome, and processes of behaviours end with it."""
+
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from tests.running import DEADLINE_SEC, ROOT
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import ctypes
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from composer.runtime import run
+
+run._MARGIN_SEC = 0.5
+
+def hold_interpreter(node):
+    node.logger.info('holding')
+    ctypes.PyDLL(None).sleep(1000)
+
+def flood(node):
+    while True:
+        node.logger.info('x' * 1000)
+
+def stay(deaf=False):
+    if deaf:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    print(os.getpid(), 'stays', flush=True)
+    while True:
+        time.sleep(1)
+
+def start(node, deaf=False):
+    command = [sys.executable, '-c', f'from parts import stay; stay({deaf})']
+    subprocess.Popen(command)
+    subprocess.Popen(['setsid', *command], env={'PYTHONPATH': os.environ['PYTHONPATH']})
+    subprocess.Popen(['sh', '-c', '"$@" & exit', 'sh', *command])
+    multiprocessing.Process(target=stay).start()
+    multiprocessing.get_context('spawn').Process(target=stay).start()
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            stay()
+        os._exit(0)
+"""
+STARTED = 6
+STARTING = 'version: 1\nexecutor: {{shutdown_timeout: {}}}\nnodes: {{n: {{on_start: {}}}}}\n'
+HOLDING = """
+version: 1
+executor: {shutdown_timeout: 0.5}
+nodes: {n: {timers: {t: {period: 0.02, behaviour: 'parts:hold_interpreter'}}}}
+"""
+
+
+def started_by(child):
+    """Return the processes that the behaviour has started."""
+    child.wait_for_line(' stays', times=STARTED)
+    child.wait_until_ready()
+    return {int(line.split()[-2]) for line in child.matching(' stays')}
+
+
+def is_alive(pid):
+    try:
+        state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != 'Z'
+
+
+def guardian_of(child):
+    """Return the process that guards a system."""
+    composer = str(child.pid).encode()
+    for folder in Path('/proc').glob('[0-9]*'):
+        try:
+            command = (folder / 'cmdline').read_bytes().split(b'\0')
+        except OSError:
+            continue
+        if any(word.endswith(b'/guardian.py') for word in command) and composer in command:
+            return int(folder.name)
+    return None
+
+
+@pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGHUP'], ['SIGINT', 'SIGINT']])
+def test_a_call_that_holds_the_interpreter_is_ended(compose, signals):
+    child = compose(HOLDING, CODE)
+    child.wait_for_line('holding')
+    for name in signals:
+        child.send(signal.Signals[name])
+
+    assert child.wait() == 1
+    assert child.matching('the system did not end in time')
+    assert child.matching('in hold_interpreter')
+
+
+def test_output_that_blocks_does_not_keep_the_process_alive(compose, start_program, wait_for):
+    text = HOLDING.replace('hold_interpreter', 'flood')
+    process = start_program(
+        *('-m', 'composer', 'up', compose.write(text, CODE).name),
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(compose.domain_id)},
+        stderr=subprocess.PIPE,
+    )
+    assert ' ready in ' in process.stderr.readline()
+    wait_for(lambda: 'pipe_write' in stack_of(process.pid), 'a full pipe')
+    process.send_signal(signal.SIGINT)
+
+    assert process.wait(DEADLINE_SEC) == 1
+
+
+def stack_of(pid):
+    """Return what the kernel does for the threads of a process."""
+    return ' '.join(
+        path.read_text() for path in Path(f'/proc/{pid}/task').glob('*/wchan') if path.exists()
+    )
+
+
+def test_processes_of_behaviours_end_with_the_system(compose):
+    child = compose(STARTING.format(30, 'parts:start'), CODE)
+    pids = started_by(child)
+
+    assert child.stop() == 0
+    assert not any(map(is_alive, pids))
+    for pid in pids:
+        assert child.matching(f'process {pid} (')
+    assert len(child.matching('which a behaviour has started, still runs')) >= STARTED
+    assert not child.matching('resource_tracker')
+
+
+def test_processes_of_behaviours_that_do_not_end_are_killed(compose):
+    start = "{behaviour: 'parts:start', with: {deaf: true}}"
+    child = compose(STARTING.format(0.5, start), CODE)
+    pids = started_by(child)
+
+    assert child.stop() == 1
+    assert not any(map(is_alive, pids))
+    assert len(child.matching(' outlived the system: killed')) == 3
+
+
+def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_for):
+    child = compose(STARTING.format(30, 'parts:start'), CODE)
+    pids = started_by(child)
+    child.send(signal.SIGKILL)
+
+    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
+    for pid in pids:
+        assert child.wait_for_line(f'process {pid} (').endswith(' outlived the system: killed')
+
+
+def test_a_system_does_without_its_guardian(compose, wait_for):
+    child = compose('version: 1\nnodes: {n: {}}\n', '')
+    child.wait_until_ready()
+    guardian = guardian_of(child)
+    os.kill(guardian, signal.SIGKILL)
+    wait_for(lambda: not is_alive(guardian), 'its end')
+
+    assert child.stop() == 0
+
+
+def test_the_guardian_ends_with_the_system(compose, wait_for):
+    child = compose('version: 1\nnodes: {n: {}}\n', '')
+    child.wait_until_ready()
+    guardian = guardian_of(child)
+
+    assert child.stop() == 0
+    wait_for(lambda: not is_alive(guardian), 'its end')
+
+
+def test_processes_of_a_program_that_calls_up_are_its_own(compose, start_program):
+    text = "version: 1\nnodes: {n: {on_start: 'parts:start'}}\n"
+    code = """
+        import subprocess
+        import sys
+
+        started = []
+
+        def start(node):
+            started.append(subprocess.Popen([sys.executable, '-c', 'input()'], stdin=-1))
+            node.shutdown()
+    """
+    program = """
+import sys
+import composer
+assert composer.up(sys.argv[1]) == 0
+from parts import started
+print(started[0].poll())
+started[0].communicate(b'.')
+"""
+    process = start_program(
+        *('-c', program, compose.write(text, code).name),
+        cwd=compose.folder,
+        env=os.environ | {'PYTHONPATH': f'{ROOT}:.', 'ROS_DOMAIN_ID': str(compose.domain_id)},
+    )
+    output, _ = process.communicate(timeout=DEADLINE_SEC)
+    assert (process.returncode, output.splitlines()[-1]) == (0, 'None')

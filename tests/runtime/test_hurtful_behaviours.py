@@ -1,0 +1,91 @@
+"""A behaviour that breaks what all share: the log says which one ran, and the system ends."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+import builtins
+import os
+
+def descriptors(kind):
+    for name in os.listdir('/proc/self/fd'):
+        try:
+            if kind in os.readlink(f'/proc/self/fd/{name}') and int(name) > 2:
+                yield int(name)
+        except OSError:
+            pass
+
+def close(node, kind):
+    for descriptor in list(descriptors(kind)):
+        os.close(descriptor)
+
+def replace(node, kind):
+    null = os.open(os.devnull, os.O_RDWR)
+    for descriptor in list(descriptors(kind)):
+        os.dup2(null, descriptor)
+
+def close_all(node):
+    os.closerange(3, 4096)
+
+def replace_builtin(node):
+    builtins.len = None
+
+def exit(node):
+    os._exit(7)
+
+def crash(node):
+    import ctypes
+    ctypes.string_at(0)
+
+def stop(node):
+    node.logger.info(f'stopped, {len("abc")}')
+
+def nothing(node):
+    pass
+"""
+SYSTEM = """
+version: 1
+executor: {{shutdown_timeout: 5.0}}
+nodes:
+  bad: {{timers: {{hurt: {{period: 0.2, behaviour: {}}}}}}}
+  good: {{on_stop: 'parts:stop', timers: {{tick: {{period: 3600, behaviour: 'parts:nothing'}}}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    'behaviour',
+    [
+        "'parts:close', with: {kind: timerfd}",
+        "'parts:replace', with: {kind: timerfd}",
+        "'parts:close', with: {kind: eventpoll}",
+        "'parts:close', with: {kind: eventfd}",
+        "'parts:close', with: {kind: pipe}",
+        "'parts:close_all'",
+        "'parts:replace_builtin'",
+    ],
+)
+def test_the_system_ends_and_names_the_behaviours_that_ran_last(compose, behaviour):
+    child = compose(SYSTEM.format(behaviour), CODE)
+
+    assert child.wait() == 1
+    report = next(n for n, line in enumerate(child.lines) if 'the system is broken' in line)
+    assert "  node 'bad': timer 'hurt', " in child.lines[report + 1]
+    assert child.matching('[good]: stopped, 3')
+
+
+def test_a_process_that_ends_without_a_stop_is_reported(compose):
+    child = compose(SYSTEM.format('parts:exit'), CODE)
+
+    assert child.wait() == 7
+    child.wait_for_line('[FATAL] [composer]: the process ended without a stop')
+
+
+def test_a_crash_shows_where_it_was(compose):
+    child = compose(SYSTEM.format('parts:crash'), CODE)
+
+    assert child.wait() < 0
+    child.wait_for_line('in crash')
+    child.wait_for_line('[FATAL] [composer]: the process ended without a stop')
