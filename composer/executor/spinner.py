@@ -1,5 +1,6 @@
 """What spinning is: puts the parts of one executor together, and lets them run."""
 
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -82,6 +83,7 @@ class Spinner:
         self._executor = executor
         self._waiting_callbacks: set[object] = set()
         self._are_callbacks_free = False
+        self._closing = threading.Lock()
         self._errors: deque[BaseException] = deque()
 
     # Errors and wake-ups
@@ -214,8 +216,9 @@ class Spinner:
         # Other callbacks that shut down, too, keep their threads a little longer.
         end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC
         self.workers.end(end_sec if wait_for_threads else 0.0)
-        if not self.workers.has_threads():
-            self.poller.close()
+        with self._closing:  # Another thread may shut down, too.
+            if not self.workers.has_threads():
+                self.poller.close()
 
     def leave_to_parent(self) -> None:
         """Let nobody go on here: this is a forked child, and all of this belongs to its parent."""

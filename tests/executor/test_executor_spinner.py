@@ -386,6 +386,20 @@ def test_a_subclass_is_told_that_its_takes_are_never_called() -> None:
                 return super()._take_timer(tmr)
 
 
+def test_an_rclpy_that_is_too_old_is_called_that(start_program: Any) -> None:
+    program = """
+import rclpy.executors
+from composer.errors import ComposerError
+del rclpy.executors.TimeoutObject
+try:
+    import composer.executor
+except ComposerError as error:
+    print(error)
+"""
+    output, _ = start_program('-c', program).communicate(timeout=DEADLINE_SEC)
+    assert output.startswith('the executor needs rclpy 7.1 (ROS 2 Jazzy) or newer')
+
+
 def test_num_threads_means_what_it_does_in_rclpy(context: Context) -> None:
     executor = ComposerExecutor(num_threads=3, context=context)
     assert executor._executor._max_workers == 3
