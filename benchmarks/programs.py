@@ -15,6 +15,7 @@ from typing import Any
 
 _READY_SEC = 120.0
 _STOP_SEC = 10.0
+_LONGEST_STOP_SEC = 600.0
 
 
 class Program:
@@ -80,7 +81,7 @@ class Program:
         """Ask it to end, and return how long that took (s)."""
         begun = time.monotonic()
         self.interrupt()
-        self._process.wait(_READY_SEC)
+        self._process.wait(_LONGEST_STOP_SEC)
         return time.monotonic() - begun
 
     def end(self) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,8 +33,12 @@ def begin(files: Iterable[Path]) -> None:
     """Forget all values, and take the projects of these files, and that of this folder, as own."""
     _origins.clear()
     _roots.clear()
-    folders = [Path.cwd(), *(Path(os.path.realpath(file)).parent for file in files)]
-    _roots.update(list_lineage(folder)[-1] for folder in folders)
+    for path in (Path('file'), *files):
+        # A name may be no path at all, or the working folder may be gone.
+        with suppress(OSError, ValueError):
+            # As written: a link in the project may lead anywhere.
+            root = list_lineage(Path(os.path.abspath(path)).parent)[-1]  # noqa: PTH100
+            _roots.add(Path(os.path.realpath(root)))
 
 
 def list_lineage(folder: Path) -> list[Path]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # Of a system, a parameter file or a type description. A thousand nodes with five thousand entities
 # take one megabyte.
 MAX_FILE_BYTES = 10_000_000
+MAX_LINES = 1_000_000
 # Keys and values of a file, with what its aliases stand for: five times those of such a system.
 MAX_VALUES = 300_000
 # Levels of data, aliases and merges; the walks over the data are safe from deep recursion by it.
@@ -29,13 +30,13 @@ MAX_ENTRIES = 10_000
 # Nobody reads more findings of a file.
 MAX_FINDINGS = 1000
 # Of a .msg, .srv or .action file, and of all of a package.
-MAX_DEFINITION_BYTES = 200_000
+MAX_DEFINITION_BYTES = 100_000
 MAX_PACKAGE_BYTES = 2_000_000
 # Of a Python module: its words and signs are what its syntax tree grows with. Real code has nine
-# in a line, so that this is 20,000 lines; the modules of a system may have five times as many.
+# in a line, so that this is 20,000 lines; the modules of a system may have more together.
 MAX_MODULE_BYTES = 2_000_000
 MAX_MODULE_TOKENS = 200_000
-MAX_TOKENS_OF_MODULES = 1_000_000
+MAX_TOKENS_OF_MODULES = 500_000
 
 _KINDS = {
     stat.S_IFIFO: 'a named pipe',

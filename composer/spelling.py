@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import heapq
+from collections import Counter
 from functools import lru_cache
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -13,7 +15,9 @@ if TYPE_CHECKING:
 # With more options, or longer ones, the search for the nearest would take seconds.
 _MOST_OPTIONS = 2000
 _LONGEST_WORD = 255
-_PRESELECTED = 100
+_FEW = 100
+# Of more options these share most pairs of letters with the word, and are compared.
+_PRESELECTED = 25
 _LONGEST_COMPARED = 64
 # Of more options the help lists the first.
 _MOST_LISTED = 12
@@ -34,7 +38,7 @@ def suggest(
         otherwise: The help if no option is near and none is listed.
     """
     names = _strings(options)
-    near = find_nearest(word, names)
+    near = _search(word, names)
     if near is None and listed and names:
         shown = ', '.join(heapq.nsmallest(_MOST_LISTED, names))
         otherwise = f'{listed}: {shown}' + (', …' if len(names) > _MOST_LISTED else '')
@@ -52,10 +56,19 @@ def find_nearest(word: object, options: Iterable[object]) -> str | None:
     Among more than two thousand options, and for words longer than any name of ROS, there is no
     search.
     """
-    names = _strings(options)
+    return _search(word, _strings(options))
+
+
+def _search(word: object, names: frozenset[str]) -> str | None:
     if not isinstance(word, str) or len(word) > _LONGEST_WORD or len(names) > _MOST_OPTIONS:
         return None
-    return _find_nearest(word.lower(), tuple(sorted(names)))
+    return _find_nearest(word.lower(), _first_of_equals(names))
+
+
+@lru_cache(maxsize=64)
+def _first_of_equals(names: frozenset[str]) -> frozenset[str]:
+    """Return names as they were given first: the caches keep them once."""
+    return names
 
 
 def _strings(options: Iterable[object]) -> frozenset[str]:
@@ -63,11 +76,11 @@ def _strings(options: Iterable[object]) -> frozenset[str]:
 
 
 @lru_cache(maxsize=4096)
-def _find_nearest(word: str, choices: tuple[str, ...]) -> str | None:
+def _find_nearest(word: str, choices: frozenset[str]) -> str | None:
     lowered = _lower(choices)
     if word in lowered:
         return lowered[word]
-    close = difflib.get_close_matches(word, _preselect(word, lowered), n=5, cutoff=0.6)
+    close = difflib.get_close_matches(word, _preselect(word, choices), n=5, cutoff=0.6)
     if not close:
         return None
     # Of those that look alike, the one that takes the fewest edits; else the first.
@@ -94,23 +107,33 @@ def count_edits(word: str, other: str) -> int:
 
 
 @lru_cache(maxsize=64)
-def _lower(choices: tuple[str, ...]) -> dict[str, str]:
-    return {choice.lower(): choice for choice in reversed(choices)}
+def _lower(choices: frozenset[str]) -> dict[str, str]:
+    return {choice.lower(): choice for choice in sorted(choices, reverse=True)}
 
 
-def _preselect(word: str, options: Iterable[str]) -> list[str]:
+def _preselect(word: str, choices: frozenset[str]) -> list[str]:
     """Return the options to compare: of many, those that share most pairs of letters."""
-    short = [option for option in options if len(option) <= _LONGEST_WORD]
-    if len(short) <= _PRESELECTED:
-        return short
-    pairs = _pairs(word)
-    return heapq.nlargest(
-        _PRESELECTED,
-        short,
-        key=lambda option: len(pairs & _pairs(option)) / (len(word) + len(option)),
-    )
+    options = [option for option in _lower(choices) if len(option) <= _LONGEST_WORD]
+    if len(options) <= _FEW:
+        return options
+    by_pair = _group_by_pairs(choices)
+    shared: Counter[str] = Counter()
+    for pair in _pairs(word):
+        shared.update(by_pair.get(pair, ()))
+    most = heapq.nlargest(_FEW, shared.items(), key=itemgetter(1))
+    scores = ((count / (len(word) + len(option)), option) for option, count in most)
+    return [option for _, option in heapq.nlargest(_PRESELECTED, scores)]
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=64)
+def _group_by_pairs(choices: frozenset[str]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for option in _lower(choices):
+        if len(option) <= _LONGEST_WORD:
+            for pair in _pairs(option):
+                groups.setdefault(pair, []).append(option)
+    return groups
+
+
 def _pairs(word: str) -> frozenset[str]:
     return frozenset(f' {word}'[i : i + 2] for i in range(len(word)))

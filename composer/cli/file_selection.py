@@ -107,7 +107,7 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
     if word == '-' or os.path.lexists(word) or (word and not glob.has_magic(word)):
         matches = [word]
     else:
-        matches = sorted(glob.glob(word, recursive=True))  # noqa: PTH207 - pathlib's cannot glob absolute patterns
+        matches = _match(word)
         if not matches:
             yield None, False
     for match in matches:
@@ -119,6 +119,24 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
         yield from ((inside, False) for inside in found)
         if not found:
             yield None, False
+
+
+def _match(pattern: str) -> list[str]:
+    """Return what a pattern matches, without what is hidden."""
+    path = Path(pattern)
+    parts = set(path.parts)
+    try:
+        # In contrast to `glob`, links to folders are not followed: two that lead back have no end.
+        found = Path(path.anchor).glob(str(path.relative_to(path.anchor)))
+        shown = [each for each in found if not any(map(_is_hidden, {*each.parts} - parts))]
+    except (ValueError, IndexError, NotImplementedError):
+        # Two stars within a name count as one, and an empty pattern matches nothing.
+        return sorted(glob.glob(pattern))  # noqa: PTH207 - pathlib's refuses it
+    return sorted(map(str, shown))
+
+
+def _is_hidden(part: str) -> bool:
+    return part.startswith('.') and part not in ('.', '..')
 
 
 def _walk(folder: Path) -> Iterator[Path]:

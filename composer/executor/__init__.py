@@ -37,6 +37,15 @@ Locks are held for moments, and nothing is called under them but the next in thi
 Callbacks, takes and waits run under none.
 """
 
+import rclpy.executors
+
+from composer.errors import ComposerError
+
+if not hasattr(rclpy.executors, 'TimeoutObject'):
+    # Before the imports that an older rclpy breaks.
+    message = 'the executor needs rclpy 7.1 (ROS 2 Jazzy) or newer, and this one is older'
+    raise ComposerError(message, help='source a newer ROS 2, or install its rclpy')
+
 from composer.executor.composer_executor import ComposerExecutor
 from composer.executor.descriptors import LostDescriptorError
 from composer.executor.sources.qos_events import checked_seldom

@@ -1,10 +1,10 @@
-"""What a forked child does with the executors of its parent: it shuts them down and lets them be.
+"""What a forked child does with the executors of its parent: it lets them be.
 
 An epoll, an eventfd or a kernel timer is one thing in both processes: what the child reads, sets
-or unregisters, the parent misses. So the child puts new ones under the same numbers
-(`replace_descriptors`). The parent's threads are not in the child, but the locks that they held
-are: `reset_locks` frees them. Nothing is destroyed, because the middleware would have to do that,
-and its threads and locks are in the same state.
+or unregisters, the parent misses. So the child closes them, and puts a silent one under those
+numbers to which the middleware writes (`replace_descriptors`). The parent's threads are not in the
+child, but the locks that they held are, in the executor and in the middleware. So the child uses
+nothing of them and destroys nothing: whoever wants to spin is refused (`RefusedSpinner`).
 
 A child that was forked in a callback ends when that callback does.
 """
@@ -14,7 +14,9 @@ import sys
 import traceback
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import NoReturn
+
+from composer.errors import ComposerError
 
 
 def replace_descriptors(descriptors: Iterable[int], new: int) -> None:
@@ -23,13 +25,14 @@ def replace_descriptors(descriptors: Iterable[int], new: int) -> None:
         os.dup2(new, descriptor, inheritable=False)
 
 
-def reset_locks(owners: Iterable[Any]) -> None:
-    """Free the locks that are attributes of `owners`, whichever thread held them."""
-    for owner in owners:
-        for value in vars(owner).values():
-            # What the standard library's modules call in a child.
-            with suppress(AttributeError):
-                value._at_fork_reinit()  # noqa: SLF001
+class RefusedSpinner:
+    """Stands in a forked child for what the executor of its parent spins with."""
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith('__'):
+            raise AttributeError(name)
+        message = 'a forked child cannot use an executor of its parent'
+        raise ComposerError(message, help='create the executor in the child')
 
 
 def end_child(error: BaseException | None = None) -> NoReturn:

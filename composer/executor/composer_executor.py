@@ -3,6 +3,7 @@
 import atexit
 import os
 import threading
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,6 +13,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor, TimeoutObject
 from rclpy.task import Future, Task
 
+from composer.executor.after_fork import RefusedSpinner
 from composer.executor.deadlines import DelayedCall
 from composer.executor.event_loop import ImmediateCallback
 from composer.executor.scheduler import ExecutorTask, ScheduledTask
@@ -19,6 +21,15 @@ from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
 
 _MAX_THREADS = 256
+_NEVER_CALLED = (
+    '_make_handler',
+    '_take_client',
+    '_take_guard_condition',
+    '_take_service',
+    '_take_subscription',
+    '_take_timer',
+    '_take_waitable',
+)
 
 
 class ComposerExecutor(MultiThreadedExecutor):
@@ -31,6 +42,9 @@ class ComposerExecutor(MultiThreadedExecutor):
     - `spin_once` waits up to 50 ms for the end of the callback that it began.
     - `shutdown` waits for running callbacks, as rclpy documents; but not for those that call it.
     - Several threads may spin at the same time, and callbacks may, whatever `num_threads` is.
+    - It takes messages itself: a subclass that overrides rclpy's `_take_*` or `_make_handler` is
+      warned. `can_execute` may be overridden; `wake` makes the executor ask again.
+    - A forked child cannot use it.
     - While `spin` and `spin_until_future_complete` run, `sys.getswitchinterval()` of the process
       is at most 1 ms: see `switch_interval`.
 
@@ -40,6 +54,7 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     Attributes:
         calls_immediately: That `create_task` calls an `ImmediateCallback` at once.
+        has_own_rules: Whether a subclass says what may be executed.
         is_forked: Whether this process is a child that was forked after the executor was made.
     """
 
@@ -48,15 +63,30 @@ class ComposerExecutor(MultiThreadedExecutor):
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
         super().__init__(num_threads, context=context)  # Its pool is never used.
         self.is_forked = False
+        self.has_own_rules = type(self).can_execute is not ComposerExecutor.can_execute
         self._spinner = Spinner(self, num_threads or _MAX_THREADS, self._guard, self._sigint_gc)
         _executors.add(self)
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        super().__init_subclass__(**arguments)
+        for name in _NEVER_CALLED:
+            if getattr(cls, name, None) is not getattr(MultiThreadedExecutor, name, None):
+                message = f'{cls.__name__}.{name} is never called by ComposerExecutor'
+                warnings.warn(message, stacklevel=2)
+
+    def can_execute(self, entity: Any) -> bool:
+        """Tell whether the callback of `entity` may be executed; a subclass may have its rules."""
+        return bool(entity.callback_group.can_execute(entity))
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
         """Add a callback or coroutine to be executed during `spin`; returns its future."""
         if type(callback) is ImmediateCallback:
-            callback(*args)
+            if not self.is_forked:
+                callback(*args)
             return None
         task: Any = ExecutorTask(callback, args, kwargs, executor=self)
+        if self.is_forked:
+            return task  # A future may have created it. It runs when the executor spins: never.
         self._spinner.scheduler.add_task(ScheduledTask(task))
         return task
 
@@ -71,7 +101,7 @@ class ComposerExecutor(MultiThreadedExecutor):
     @contextmanager
     def waiting(self) -> Iterator[None]:
         """Let a callback wait for others: meanwhile it does not count against `num_threads`."""
-        if not self._spinner.workers.hand_over_in_callback():
+        if self.is_forked or not self._spinner.workers.hand_over_in_callback():
             yield
             return
         self._spinner.scheduler.add_waiting(1)
@@ -82,6 +112,7 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def add_node(self, node: Any) -> bool:
         """Run the callbacks of `node`; returns False if the executor has it already."""
+        scheduler = self._spinner.scheduler  # Refused in a forked child.
         with _moving:
             if node in self._nodes:
                 return False
@@ -91,7 +122,7 @@ class ComposerExecutor(MultiThreadedExecutor):
             with self._nodes_lock:
                 self._nodes.add(node)
             node.executor = self
-        self._spinner.scheduler.retry_suspended()
+        scheduler.retry_suspended()
         self.wake()
         return True
 
@@ -114,6 +145,8 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def wake(self) -> None:
         """Look again at the entities, their groups, the context and what is waited for."""
+        if self.is_forked:
+            return
         self._spinner.registry.is_stale = True
         self._spinner.scheduler.retry_deferred()
         self._spinner.wake()
@@ -175,6 +208,8 @@ class ComposerExecutor(MultiThreadedExecutor):
         Returns:
             False if callbacks still ran after that time; then this can be called again.
         """
+        if self.is_forked:
+            return True
         self._is_shutdown = True
         if not self._spinner.stop(timeout_sec):
             return False
@@ -203,15 +238,15 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.stop(None)
         self._spinner.wait_set_thread.close()
 
-    def reset_after_fork(self) -> None:
-        """Be shut down, without destroying anything: this is a forked child."""
+    def leave_to_parent(self) -> None:
+        """Refuse to spin and destroy nothing: this is a forked child."""
         self.is_forked = self._is_shutdown = True
-        _kept_for_parent.append(
-            (self._spinner, dict(vars(self._spinner.registry)), self._sigint_gc)
-        )
+        _kept_for_parent.append((self._spinner, self._sigint_gc))
+        self._spinner.leave_to_parent()
+        refused: Any = RefusedSpinner()
+        self._spinner = refused
         self._guard = self._sigint_gc = None
         self._nodes = set()
-        self._spinner.reset_after_fork()
 
     def __del__(self) -> None:
         """Do what rclpy does; `__init__` may have failed half-way."""
@@ -238,11 +273,11 @@ def _halt_all() -> None:
 _kept_for_parent: list[Any] = []
 
 
-def _reset_all_after_fork() -> None:
+def _leave_all_to_parent() -> None:
     _moving._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001
     for executor in tuple(_executors):
-        executor.reset_after_fork()
+        executor.leave_to_parent()
     _executors.clear()
 
 
-os.register_at_fork(after_in_child=_reset_all_after_fork)
+os.register_at_fork(after_in_child=_leave_all_to_parent)

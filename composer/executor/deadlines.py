@@ -60,7 +60,9 @@ class Deadlines:
         self.jumped: deque[JumpingClock] = deque()
         self.wake = wake
         self._lock = threading.Lock()
-        self._heap: list[tuple[int, int, Timed]] = []
+        # Lists of a deadline, a number and what is timed; None in its place if that is replaced.
+        self._heap: list[list[Any]] = []
+        self._entries: dict[Timed, list[Any]] = {}
         self._numbers = itertools.count()
         self._heap_limit = _MIN_HEAP_LIMIT
         self._clocks: dict[int, JumpingClock] = {}
@@ -69,9 +71,13 @@ class Deadlines:
         """Replace the deadline of `timed`; None for no deadline."""
         with self._lock:
             timed.deadline_ns = deadline_ns
+            replaced = self._entries.pop(timed, None)
+            if replaced is not None:
+                # What is gone would be kept in memory until its deadline, with its node.
+                replaced[-1] = None
             if deadline_ns is None:
                 return
-            entry = (deadline_ns, next(self._numbers), timed)
+            entry = self._entries[timed] = [deadline_ns, next(self._numbers), timed]
             heapq.heappush(self._heap, entry)
             if len(self._heap) > self._heap_limit:
                 self._drop_replaced()
@@ -86,8 +92,9 @@ class Deadlines:
         with self._lock:
             now = monotonic_ns()
             while self._heap and self._heap[0][0] <= now:
-                deadline_ns, _number, timed = heapq.heappop(self._heap)
-                if timed.deadline_ns == deadline_ns:
+                timed = heapq.heappop(self._heap)[-1]
+                if timed is not None:
+                    del self._entries[timed]
                     timed.deadline_ns = None
                     due.append(timed)
             if self._heap:
@@ -125,7 +132,7 @@ class Deadlines:
                 follower.rearm()
 
     def _drop_replaced(self) -> None:
-        self._heap = [entry for entry in self._heap if entry[2].deadline_ns == entry[0]]
+        self._heap = [entry for entry in self._heap if entry[-1] is not None]
         heapq.heapify(self._heap)
         self._heap_limit = max(_MIN_HEAP_LIMIT, 2 * len(self._heap))
 

@@ -9,7 +9,6 @@ from time import monotonic_ns
 from typing import Any
 
 from composer.errors import ComposerError
-from composer.executor.after_fork import replace_descriptors
 
 _libc = ctypes.CDLL(None, use_errno=True)
 _libc_holding_gil = ctypes.PyDLL(None)
@@ -157,13 +156,6 @@ class TimerFd:
         if fd < 0:
             raise OSError(ctypes.get_errno(), 'timerfd_create failed')
         return fd
-
-    def reset_after_fork(self) -> None:
-        """Replace the kernel timer, which this process shares with its parent."""
-        if self.fd >= 0:
-            new = self._create()
-            replace_descriptors((self.fd,), new)
-            os.close(new)
 
     def expire_at(self, deadline_ns: int) -> None:
         """Expire once at `deadline_ns` of `time.monotonic_ns()`; at once if that has passed."""

@@ -105,10 +105,6 @@ class EntityRegistry:
                 for source in entities.sources.values():
                     self._close(source)
 
-    def reset_after_fork(self) -> None:
-        """Forget the sources: the parent process listens to the entities."""
-        self._nodes = {}
-
     def _refresh_node(self, node: Any) -> None:
         seen = self._nodes.setdefault(node, _NodeEntities())
         lists = (

@@ -14,6 +14,7 @@ from typing import Any
 
 from rclpy.task import Future
 
+from composer.executor.after_fork import end_child
 from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.scheduler import ExecutorTask, ScheduledTask, Session
@@ -180,6 +181,7 @@ class CallbackRunner:
 
     def __init__(self, parts: ExecutorParts) -> None:
         self._executor = parts.executor
+        self._has_own_rules = parts.executor.has_own_rules
         self._scheduler = parts.scheduler
         self._deadlines = parts.deadlines
         self._paused: set[ScheduledTask] = set()
@@ -199,16 +201,21 @@ class CallbackRunner:
     def _execute_source(self, source: EventSource) -> bool:
         outcome: Any = NOTHING
         suspended = False
-        begun = source.group.unrestricted
+        entity = source.entity
+        begun = False
         try:
-            begun = begun or source.entity.callback_group.beginning_execution(source.entity)
+            if not self._has_own_rules or self._executor.can_execute(entity):
+                group = source.group
+                begun = group.unrestricted or entity.callback_group.beginning_execution(entity)
             if begun:
                 outcome = source.run()
                 if outcome is not None and outcome is not NOTHING:
                     suspended = self._begin(outcome, source)
+                elif self._executor.is_forked:
+                    end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
             outcome = None
-            self._executor.report(error)
+            self._report(error)
         finally:
             if begun and not suspended:
                 self._end_execution(source)
@@ -240,6 +247,12 @@ class CallbackRunner:
         try:
             coroutine.send(None)
         except StopIteration:
+            has_ended = True
+        else:
+            has_ended = False
+        if self._executor.is_forked:
+            end_child()
+        if has_ended:
             return False
         self._suspend(ScheduledTask(ExecutorTask(coroutine, executor=self._executor), source))
         return True
@@ -252,15 +265,22 @@ class CallbackRunner:
             suspended = not (task.done() or task.cancelled())
             error = None if suspended else task.exception()
             if error is not None:
-                self._executor.report(error)
+                self._report(error)
+            elif self._executor.is_forked:
+                end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
-            self._executor.report(error)
+            self._report(error)
         finally:
             if suspended:
                 self._suspend(scheduled)
             elif scheduled.source is not None:
                 self._end_execution(scheduled.source)
             self._scheduler.finish(scheduled.source, suspended=suspended)
+
+    def _report(self, error: BaseException) -> None:
+        if self._executor.is_forked:
+            end_child(error)
+        self._executor.report(error)
 
     def _suspend(self, task: ScheduledTask) -> None:
         future = _awaited_future(task.task)

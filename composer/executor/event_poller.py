@@ -104,18 +104,18 @@ class EventPoller:
         event_fd = self.event_fds.by_number.get(event[0])
         return 0 if event_fd is None else event_fd.rank
 
-    def reset_after_fork(self) -> None:
-        """Replace the descriptors shared with the parent process; the new ones are silent."""
+    def leave_to_parent(self) -> None:
+        """Close the descriptors that this process, a forked child, shares with its parent."""
         self._waiting_threads.clear()
-        self.deadlines.timer.reset_after_fork()
+        self.deadlines.timer.close()
         if self._epoll.closed:
             return
-        eventfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        replace_descriptors((self._wake_fd, *self.event_fds.by_number), eventfd)
-        os.close(eventfd)
-        with select.epoll() as epoll:
-            replace_descriptors((self._epoll.fileno(),), epoll.fileno())
-        self.event_fds.by_number.clear()
+        silent = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        replace_descriptors(self.event_fds.by_number, silent)
+        os.close(silent)
+        self._epoll.close()
+        wake_fd, self._wake_fd = self._wake_fd, -1
+        os.close(wake_fd)
 
     def close(self) -> None:
         """Close the descriptors; nothing else may be called after that."""

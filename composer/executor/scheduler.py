@@ -340,13 +340,6 @@ class Scheduler:
             self.is_closed = True
             self.is_spinning = False
 
-    def reset_after_fork(self, running: int) -> None:
-        """Start nothing any more; `running` of the running callbacks are in this process."""
-        self.is_closed = True
-        self.is_spinning = False
-        self.running = running
-        self.waiting = 0
-
     def _release(self, source: QueuedSource) -> None:
         group = source.group
         if group.exclusive or not group.reentrant:

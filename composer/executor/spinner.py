@@ -1,5 +1,6 @@
 """What spinning is: puts the parts of one executor together, and lets them run."""
 
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -10,7 +11,6 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from composer.executor.after_fork import end_child, reset_locks
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.event_loop import CallbackRunner, EventLoop
 from composer.executor.scheduler import Session
@@ -83,14 +83,13 @@ class Spinner:
         self._executor = executor
         self._waiting_callbacks: set[object] = set()
         self._are_callbacks_free = False
+        self._closing = threading.Lock()
         self._errors: deque[BaseException] = deque()
 
     # Errors and wake-ups
 
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins, unless it only means a lost context."""
-        if self.workers.is_forked:
-            end_child(error)
         if isinstance(error, _rclpy.RCLError) and not self.is_context_valid():
             return
         self._errors.append(error)
@@ -217,18 +216,15 @@ class Spinner:
         # Other callbacks that shut down, too, keep their threads a little longer.
         end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC
         self.workers.end(end_sec if wait_for_threads else 0.0)
-        if not self.workers.has_threads():
-            self.poller.close()
+        with self._closing:  # Another thread may shut down, too.
+            if not self.workers.has_threads():
+                self.poller.close()
 
-    def reset_after_fork(self) -> None:
-        """Be shut down: this is a forked child, and all of this belongs to its parent."""
-        others = (self.wait_set_thread, self.registry, self.workers)
-        reset_locks((self, self._executor, self.scheduler, self.poller, self.poller.deadlines))
-        reset_locks(others)
+    def leave_to_parent(self) -> None:
+        """Let nobody go on here: this is a forked child, and all of this belongs to its parent."""
         self.is_shutdown = True
-        self.scheduler.reset_after_fork(int(self.workers.is_in_callback()))
-        for part in (self.poller, *others):
-            part.reset_after_fork()
+        self.poller.leave_to_parent()
+        self.workers.leave_to_parent()
 
     def _wait_for_end(self, timeout_sec: float | None) -> bool:
         """Wait until no callback runs, except those that wait here themselves."""

@@ -145,11 +145,6 @@ class WaitSetThread:
         if thread is not None and thread is not threading.current_thread():
             thread.join(_FLUSH_SEC)
 
-    def reset_after_fork(self) -> None:
-        """Forget the thread, which is not in the child."""
-        self._closing = True
-        self._thread = None
-
     def _run(self) -> None:
         try:
             self._wait_and_check()

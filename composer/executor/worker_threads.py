@@ -18,7 +18,6 @@ from threading import get_ident
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
-from composer.executor.after_fork import end_child
 from composer.executor.descriptors import LostDescriptorError, TimerFd
 
 if TYPE_CHECKING:
@@ -55,8 +54,6 @@ class Worker:
             _set_up_thread()
             while self.job is not None:
                 self.job(self)
-                if self._threads.is_forked:
-                    end_child()
                 self.job = None
                 self._threads.wait_for_job(self)
 
@@ -87,7 +84,6 @@ class WorkerThreads:
 
     Attributes:
         leader: The worker that leads, or None.
-        is_forked: Whether this process is a child that was forked after this was made.
     """
 
     def __init__(
@@ -98,7 +94,6 @@ class WorkerThreads:
     ) -> None:
         self.lock = threading.Lock()
         self.leader: Worker | None = None
-        self.is_forked = False
         self._standby: Worker | None = None
         self._lead = lead
         self._on_takeover = on_takeover
@@ -239,15 +234,9 @@ class WorkerThreads:
             if not self._count:
                 self._timer.close()
 
-    def reset_after_fork(self) -> None:
-        """Forget the threads, but for one whose callback forked this process."""
-        self.is_forked = True
-        self.leader = self._standby = None
-        self._idle.clear()
-        mine = get_ident()
-        self._workers = {mine: self._workers[mine]} if mine in self._workers else {}
-        self._count = len(self._workers)
-        self._timer.reset_after_fork()
+    def leave_to_parent(self) -> None:
+        """Close the timer that this process, a forked child, shares with its parent."""
+        self._timer.close()
 
     def has_threads(self) -> bool:
         """Tell whether any thread is left."""

@@ -80,6 +80,7 @@ class Sandbox(SandboxedEnvironment):
     def __init__(self) -> None:
         super().__init__(undefined=StrictUndefined)
         self.budget = limits.Budget()
+        self.explained = 0
         self.globals: dict[str, Any] = {'range': self.globals['range'], **FUNCTIONS}
         self.filters = {name: self.filters[name] for name in sorted(_FILTERS)}
         self._parsed: dict[str, nodes.Expr] = {}

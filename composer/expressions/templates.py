@@ -27,6 +27,7 @@ from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
+from composer.input_limits import MAX_FINDINGS
 from composer.spelling import find_nearest, suggest
 from composer.yaml_text.scalars import format_scalar
 
@@ -41,6 +42,9 @@ _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
 _ENV = re.compile(r"""\benv\(\s*['"]([^'"]*)['"]""")
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
+
+# The nearest name is searched for so many undefined ones: each search takes a millisecond.
+_MOST_SEARCHED = 100
 
 
 class TemplateEvaluator:
@@ -133,7 +137,10 @@ class TemplateEvaluator:
         except Exception as error:  # noqa: BLE001 - an expression may raise whatever it calls
             self.document.dropped.add(path)
             # It may succeed with the real value.
-            if not sampled or isinstance(error, UndefinedError):
+            is_sure = not sampled or isinstance(error, UndefinedError)
+            # To explain one takes long, and nobody sees more.
+            if is_sure and self._sandbox.explained <= MAX_FINDINGS:
+                self._sandbox.explained += 1
                 origin = self._hidden_origin(text, expressions)
                 self.document.diagnostics.append(self._explain(error, span, origin))
             return text
@@ -197,7 +204,8 @@ class TemplateEvaluator:
             found := _UNDEFINED_NAME.fullmatch(str(error.message))
         ):
             name = found.group(1)
-            scope = {*self._values, 'here', *self._sandbox.globals}
+            is_searched = self._sandbox.explained <= _MOST_SEARCHED
+            scope = {*self._values, 'here', *self._sandbox.globals} if is_searched else set()
             declared = self._values or find_nearest(name, scope)
             listed = 'in scope are' if declared else None
             return diagnostic_at(

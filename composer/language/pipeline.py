@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer import confidential
+from composer.diagnostics import Diagnostic
 from composer.language.arguments import values_from_words
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
@@ -67,6 +68,11 @@ def load_system_text(
 
 def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
+    if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
+        # What is wrong with it would tell what is in it.
+        message = 'this is a link to a file outside of the project that is not a system'
+        system.data = None
+        system.diagnostics = [Diagnostic('unreadable-file', message, str(path))]
     if system.data is not None:
         _load_file(system, partial(values_from_words, words=words))
         Includer(system, _load_file).include_all()

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
+from composer.input_limits import MAX_FINDINGS
 from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader
@@ -268,7 +269,9 @@ class _Reader:
         self._report(node.span, f"this value has no '{PARAMETERS_KEY}' above it", help_text)
 
     def _report(self, span: Span, message: str, help_text: str | None = None) -> None:
-        self.findings.append(diagnostic_at(span, RULE, message, help=help_text))
+        # Nobody sees more, and each takes its time.
+        if len(self.findings) <= MAX_FINDINGS:
+            self.findings.append(diagnostic_at(span, RULE, message, help=help_text))
 
 
 def _join(prefix: str, key: str) -> str:

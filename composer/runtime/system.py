@@ -192,10 +192,12 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
-        if not self._guardian.begin_stop():
+        is_guarded = self._guardian.begin_stop()
+        if not is_guarded:
             self._on_broken('The descriptor of the guardian was closed.')
         try:
-            self.has_ended = self._stop()
+            # Without its sockets, which are closed then, too, the middleware would not end.
+            self.has_ended = self._stop() and is_guarded
         except BaseException as error:  # noqa: BLE001 - the process must end, whatever is broken
             self._stop_request.set_code(ExitCode.FAILED)
             with suppress(BaseException):

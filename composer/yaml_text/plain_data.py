@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
-from composer.input_limits import MAX_DEPTH, MAX_VALUES
+from composer.input_limits import MAX_DEPTH, MAX_FINDINGS, MAX_VALUES
 from composer.yaml_text.scalars import (
     TAG_MAP,
     TAG_SEQ,
@@ -125,6 +125,8 @@ class _Constructor:
         return node.text
 
     def _duplicate(self, key: str, node: TreeNode, span: Span) -> None:
+        if len(self.findings) > MAX_FINDINGS:
+            return
         first = Related('first used here', span)
         self.findings.append(
             diagnostic_at(
@@ -161,7 +163,9 @@ class _Constructor:
         self._merging -= 1
 
     def _report(self, node: TreeNode, rule: str, message: str, help: str | None = None) -> None:  # noqa: A002
-        self.findings.append(diagnostic_at(node.span, rule, message, help=help))
+        # Nobody sees more, and each takes its time.
+        if len(self.findings) <= MAX_FINDINGS:
+            self.findings.append(diagnostic_at(node.span, rule, message, help=help))
 
     def _stop(self, span: Span, rule: str, message: str) -> None:
         raise CompositionError(diagnostic_at(span, rule, message))

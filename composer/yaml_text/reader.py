@@ -5,7 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, SourceFile
-from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, format_size, read_file
+from composer.input_limits import (
+    MAX_FILE_BYTES,
+    MAX_LINES,
+    UnreadableFileError,
+    format_size,
+    read_file,
+)
 from composer.yaml_text.document import Document
 from composer.yaml_text.plain_data import construct_data
 from composer.yaml_text.positions import SourceMap
@@ -42,6 +48,8 @@ def decode_content(content: bytes, name: str) -> str | Diagnostic:
     """Return the text of a file, or why it cannot be used: it must be UTF-8, and not too large."""
     if len(content) > MAX_FILE_BYTES:
         return _unreadable(name, f'the file is larger than {format_size(MAX_FILE_BYTES)}')
+    if content.count(b'\n') + content.count(b'\r') > MAX_LINES:
+        return _unreadable(name, f'the file has more than {MAX_LINES:,} lines')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as error:

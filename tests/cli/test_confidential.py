@@ -107,3 +107,14 @@ def test_lines_of_files_outside_the_project_are_not_shown(project, capsys, text)
     (project / 'pyproject.toml').unlink()
     run(['check', 'a.yaml'])
     assert text.splitlines()[0] in capsys.readouterr().out or 'version' in text
+
+
+def test_a_link_in_the_project_shows_no_lines_either(project, capsys):
+    (project.parent / 'other').write_text('root:*:1::\n')
+    (project / 'a.yaml').symlink_to('../other')
+
+    assert run(['check', 'a.yaml']) == 1
+    assert capsys.readouterr().out == (
+        'a.yaml: error[unreadable-file]: this is a link to a file outside of the project that is '
+        'not a system\n\n'
+    )

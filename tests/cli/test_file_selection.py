@@ -159,3 +159,19 @@ def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):
     tree(one_yaml=SYSTEM)
     os.mkfifo(tmp_path / 'pipe.yaml')
     assert select('.') == (['one.yaml'], [])
+
+
+def test_a_pattern_ends_where_links_lead_back(tree, tmp_path):
+    tree(one_yaml=SYSTEM)
+    for name in ('a', 'b'):
+        (tmp_path / name).symlink_to('.')
+    assert select('**/*.yaml') == (['one.yaml'], [])
+    assert select(f'{tmp_path}/**/*.yaml') == ([str(tmp_path / 'one.yaml')], [])
+
+
+def test_a_pattern_matches_nothing_that_is_hidden(tree, tmp_path):
+    tree(one_yaml=SYSTEM)
+    (tmp_path / '.tool').mkdir()
+    (tmp_path / '.tool' / 'two.yaml').write_text(SYSTEM)
+    assert select('**/*.yaml') == (['one.yaml'], [])
+    assert select('.tool/*.yaml') == (['.tool/two.yaml'], [])

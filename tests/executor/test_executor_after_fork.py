@@ -17,6 +17,8 @@ import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
+from functools import partial
+from composer.errors import ComposerError
 from composer.executor import ComposerExecutor
 
 rclpy.init()
@@ -114,12 +116,24 @@ def test_a_child_ends_with_its_callback_and_the_parent_misses_nothing(
     assert (said in stderr) if said else (stderr == '')
 
 
-def test_a_child_finds_the_executor_shut_down(domain_id):
-    in_child = (
-        'executor.create_task(print); executor.wake(); executor.spin_once(); executor.spin(); '
-        'sys.exit(4 if executor.shutdown() else 5)'
-    )
-    codes, in_order, arrived, _, stderr = _run(domain_id, 'fork', in_child)
+_USE = """
+    executor.create_task(print)
+    executor.wake()
+    executor.remove_node(node)
+    for refused in (executor.spin, executor.spin_once, partial(executor.add_node, node)):
+        try:
+            refused()
+        except ComposerError as error:
+            assert 'forked child' in str(error)
+        else:
+            sys.exit(5)
+    sys.exit(4 if executor.shutdown() else 6)
+"""
+
+
+@pytest.mark.parametrize('rest', ['', 'descriptors = [os.open(os.devnull, 0) for _ in range(99)]'])
+def test_a_child_is_refused_the_executor(domain_id, rest):
+    codes, in_order, arrived, _, stderr = _run(domain_id, 'fork', rest + _USE)
     assert codes == [4] * 5
     assert in_order
     assert arrived

@@ -1,6 +1,7 @@
 """Deadlines that are replaced while others are awaited."""
 
 import select
+import weakref
 from time import monotonic_ns
 from typing import Any
 
@@ -58,6 +59,16 @@ def test_what_is_postponed_does_not_keep_others_waiting(deadlines: Any, changes:
         deadlines.run_due()
     assert due == ['second']
     assert monotonic_ns() >= begun + 20 * MS
+
+
+def test_what_is_taken_back_is_not_kept(deadlines: Any) -> None:
+    timed = Timed('first', [])
+    deadlines.set(timed, monotonic_ns() + HOUR)
+    deadlines.set(timed, monotonic_ns() + 2 * HOUR)
+    deadlines.set(timed, None)
+    kept = weakref.ref(timed)
+    del timed
+    assert kept() is None
 
 
 def test_two_threads_may_follow_the_same_jump(deadlines: Any) -> None:

@@ -78,6 +78,26 @@ def test_callbacks_that_all_shut_down_wait_for_none_of_them(node: Any, executor:
     assert executor.shutdown()
 
 
+def test_many_threads_may_shut_down_at_once(context: Context) -> None:
+    errors: list[BaseException] = []
+
+    def shut_down(executor: Any) -> None:
+        try:
+            assert executor.shutdown(DEADLINE_SEC)
+        except BaseException as error:  # noqa: BLE001
+            errors.append(error)
+
+    for _ in range(20):
+        executor = ComposerExecutor(context=context)
+        executor.spin_once(timeout_sec=0)
+        threads = [threading.Thread(target=shut_down, args=(executor,)) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(DEADLINE_SEC)
+    assert errors == []
+
+
 def test_shutdown_waits_for_a_callback_when_the_context_has_ended(
     node: Any, executor: Any, context: Context
 ) -> None:

@@ -355,6 +355,51 @@ def test_a_callback_may_spin_though_there_is_one_thread(context: Context) -> Non
     executor.shutdown()
 
 
+def test_a_subclass_may_say_what_is_executed(context: Context) -> None:
+    class Picky(ComposerExecutor):
+        open_to: Any = None
+
+        def can_execute(self, entity: Any) -> bool:
+            return entity is self.open_to and super().can_execute(entity)
+
+    executor = Picky(context=context)
+    node = rclpy.create_node('node', context=context)
+    ticks: list[int] = []
+    for number in range(2):
+        node.create_timer(0.01, lambda number=number: ticks.append(number))
+    guard = node.create_guard_condition(lambda: ticks.append(2))
+    executor.add_node(node)
+    with spinning(executor):
+        executor.open_to = list(node.timers)[1]
+        wait_for(lambda: len(ticks) > 3)
+        assert set(ticks) == {1}
+        executor.open_to = guard
+        guard.trigger()
+        wait_for(lambda: 2 in ticks)
+
+
+def test_a_subclass_is_told_that_its_takes_are_never_called() -> None:
+    with pytest.warns(UserWarning, match='Taking._take_timer is never called'):
+
+        class Taking(ComposerExecutor):
+            def _take_timer(self, tmr: Any) -> Any:
+                return super()._take_timer(tmr)
+
+
+def test_an_rclpy_that_is_too_old_is_called_that(start_program: Any) -> None:
+    program = """
+import rclpy.executors
+from composer.errors import ComposerError
+del rclpy.executors.TimeoutObject
+try:
+    import composer.executor
+except ComposerError as error:
+    print(error)
+"""
+    output, _ = start_program('-c', program).communicate(timeout=DEADLINE_SEC)
+    assert output.startswith('the executor needs rclpy 7.1 (ROS 2 Jazzy) or newer')
+
+
 def test_num_threads_means_what_it_does_in_rclpy(context: Context) -> None:
     executor = ComposerExecutor(num_threads=3, context=context)
     assert executor._executor._max_workers == 3

@@ -1,5 +1,6 @@
 """Modules are read as text: what can be called is told, and nothing is run."""
 
+import importlib.util
 import inspect
 import sys
 from pathlib import Path
@@ -326,3 +327,36 @@ def test_names_of_a_module_that_are_one_text_for_good(tmp_path):
         'def change():\n    global E\n    E = 1\n'
     )
     assert read_module(path).texts == {'A': 'a', 'B': 'b'}
+
+
+@pytest.mark.parametrize(
+    'name', ['_pydecimal', 'argparse', 'pydoc_data.topics', 'tkinter', 'typing']
+)
+def test_large_modules_of_the_standard_library_are_read(name):
+    path = Path(importlib.util.find_spec(name).origin)
+    source = read_module(path)
+    assert (source.unread, source.syntax_error) == (None, None)
+    assert source.functions or source.constants
+
+
+def test_a_module_of_twenty_thousand_lines_is_read(tmp_path):
+    path = tmp_path / 'module.py'
+    function = (
+        'def f{}(node, message):\n    if message.data > 0:\n        node.publish("x", a=1)\n\n'
+    )
+    path.write_text(''.join(map(function.format, range(5000))))
+    source = read_module(path)
+    assert source.unread is None
+    assert len(source.functions) == 5000
+
+
+def test_modules_are_read_until_they_are_too_many(tmp_path):
+    for name in 'ab':
+        (tmp_path / f'{name}.py').write_text('def f(node): ...\n')
+    finder = ModuleFinder([tmp_path])
+    finder._tokens_left = 15
+    assert finder.find('a').unread is None
+    assert (
+        finder.find('b').unread
+        == f'{tmp_path}/b.py and the modules before it are too many to be read'
+    )

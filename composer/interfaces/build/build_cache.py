@@ -131,10 +131,13 @@ def provide_cached(
             the folder is damaged.
 
     Raises:
-        CacheError: the cache cannot be written.
+        CacheError: the cache cannot be written, or has a colon in its path.
         UntrustedFolderError: another user can change the folder.
     """
     place = find_cache() / name
+    if os.pathsep in str(place):
+        message = f"built interface packages cannot be in '{place.parent}': no program finds them"
+        raise CacheError(message, help="name a folder without ':' in XDG_CACHE_HOME")
     try:
         if not is_intact(place):
             with interrupting():

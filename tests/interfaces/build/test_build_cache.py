@@ -128,6 +128,16 @@ def test_a_cache_that_cannot_be_written_is_an_error(home: Path) -> None:
     assert caught.value.help == 'make room there, or name another folder in XDG_CACHE_HOME'
 
 
+def test_a_cache_that_search_paths_cannot_name_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('XDG_CACHE_HOME', f'{tmp_path}/a:b')
+    with pytest.raises(CacheError) as caught:
+        provide('one', refuse)
+    assert caught.value.help == "name a folder without ':' in XDG_CACHE_HOME"
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize('number', [errno.ENOSPC, errno.EDQUOT])
 def test_a_full_disk_is_called_that(home: Path, number: int) -> None:
     def fail(_: BuildFolder) -> None:
