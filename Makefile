@@ -1,42 +1,47 @@
 # Everything lives in .venv, which this file makes. Where a ROS 2 is sourced, that one is used.
+# With ROS=kilted, it is .venv-kilted, which has the wheels of Kilted instead of Jazzy's.
 CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
-BIN := .venv/bin
+VENV := .venv
 ifdef ROS_DISTRO
 EXTRAS := graph,test
 VENV_FLAGS := --system-site-packages
+else ifeq ($(ROS),kilted)
+VENV := .venv-kilted
+EXTRAS := ros-kilted,interfaces,graph,ros-kilted-test,test
 else
 EXTRAS := ros,interfaces,graph,ros-test,test
 endif
+BIN := $(VENV)/bin
 
 .PHONY: up test check format docs bench clean
 
-up: .venv/ready
+up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
 
-test: .venv/ready
+test: $(VENV)/ready
 	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
 
-check: .venv/ready
+check: $(VENV)/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-format: .venv/ready
+format: $(VENV)/ready
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: .venv/ready
+docs: $(VENV)/ready
 	$(BIN)/python docs/generate.py
 
-bench: .venv/ready
+bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks.run --json build/bench.json $(ARGS)
 
 clean:
-	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv .venv-kilted build dist .mypy_cache .pytest_cache .ruff_cache
 
-.venv/ready: pyproject.toml Makefile
-	@echo 'setting up .venv, which takes about a minute'
-	@$(PYTHON) -m venv $(VENV_FLAGS) .venv
+$(VENV)/ready: pyproject.toml Makefile
+	@echo 'setting up $(VENV), which takes about a minute'
+	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
 	@touch $@

@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks.rows import Job, Row
 
-_RCLPY_PACKAGES = ('ros-jazzy-rclpy', 'rclpy')
+_RCLPY_PACKAGES = ('ros-rclpy', 'rclpy')
 
 
 @dataclass(slots=True)
