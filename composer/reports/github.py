@@ -22,7 +22,7 @@ def render_report(report: Report) -> str:
 
 
 def _command(finding: Diagnostic) -> str:
-    properties = {'file': relative_path(finding.file)}
+    properties = {'file': escape(relative_path(finding.file))}
     if finding.span:
         end = finding.span.column + max(finding.span.length, 1)
         properties |= {

@@ -118,3 +118,20 @@ def test_a_link_in_the_project_shows_no_lines_either(project, capsys):
         'a.yaml: error[unreadable-file]: this is a link to a file outside of the project that is '
         'not a system\n\n'
     )
+
+
+def test_a_definition_that_is_a_link_to_something_else_does_not_show_its_words(project, capsys):
+    (project.parent / 'other').write_text('root:abc:1::\nTOKEN=abc x\n')
+    (project / 'pkg' / 'msg').mkdir(parents=True)
+    (project / 'pkg' / 'msg' / 'Point.msg').symlink_to('../../../other')
+    (project / 'a.yaml').write_text(
+        'version: 1\ninterfaces: {pkg: pkg}\nnodes: {n: {publishers: {p: pkg/msg/Point}}}\n'
+    )
+
+    assert run(['check', 'a.yaml']) == 1
+    shown = capsys.readouterr().out
+    assert (
+        'pkg/msg/Point.msg: error[unreadable]: this is a link to a file outside of the project '
+        'that is not a definition\n'
+    ) in shown
+    assert 'abc' not in shown

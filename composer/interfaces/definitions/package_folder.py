@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from composer.confidential import may_show_lines
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.input_limits import (
     MAX_DEFINITION_BYTES,
@@ -159,6 +160,10 @@ def _read_file(reading: _Reading, path: Path) -> None:
     for section, part in zip(sections, PARTS[kind], strict=False):
         _check_section(reading, section, f'{full_name}{part}')
     has_no_errors = len(reading.diagnostics) == before
+    if not has_no_errors and path.is_symlink() and not may_show_lines(str(path)):
+        # What is wrong with it would tell what is in it.
+        message = 'this is a link to a file outside of the project that is not a definition'
+        reading.diagnostics[before:] = [_about_file(path, 'unreadable', message)]
     if has_no_errors and load_parser().is_valid_package_name(reading.package):
         _describe(reading, full_name, sections)
 
