@@ -354,7 +354,7 @@ def interfaces_env_command(files: tuple[Path, ...], shell: str) -> int:
 @interfaces_group.command('list')
 @click.argument('package', required=False)
 def interfaces_list_command(package: str | None) -> int:
-    """List all interfaces that are installed or built, or those of PACKAGE."""
+    """List the interfaces that are installed or built, all or of PACKAGE."""
     from composer.cli.interfaces import list_all
 
     return list_all(package)

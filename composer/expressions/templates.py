@@ -190,8 +190,8 @@ class TemplateEvaluator:
     def _names_in(self, text: str, expressions: list[slice]) -> frozenset[str]:
         names: set[str] = set()
         for expression in expressions:
-            # Errors are reported when it is evaluated.
-            with suppress(TemplateError):
+            # Errors are reported when it is evaluated; jinja2 reads no numbers of many digits.
+            with suppress(TemplateError, ValueError):
                 names |= self._sandbox.names_in(code_of(text, expression))
         return frozenset(names)
 

@@ -173,7 +173,7 @@ class SubscriptionSource(EventSource):
             event_fd = self.event_fd
             is_unknown = count >= UNKNOWN_COUNT or event_fd is None or event_fd.is_shared
             self.observer.on_announced(None if is_unknown else count)
-        super().on_events(count)
+        self.parts.scheduler.add_events(self, count)
 
     def run(self) -> Any:
         """See the base class."""
@@ -192,7 +192,9 @@ class SubscriptionSource(EventSource):
                 observer.note_nothing_taken(arrived)
             self._note_nothing_taken(revision)
             return NOTHING
-        self._note_taken()
+        event_fd = self.event_fd
+        if event_fd is not None and event_fd.is_shared:
+            self._note_taken()  # Without the check, each message would cost a call.
         callback = entity.callback
         if entity._callback_type is Subscription.CallbackType.MessageOnly:  # noqa: SLF001
             result = callback(taken[0])
