@@ -213,9 +213,9 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._is_shutdown = True
         if not self._spinner.stop(timeout_sec):
             return False
-        self._spinner.tear_down(self.get_nodes(), wait_for_threads=wait_for_threads)
         with self._nodes_lock:
             self._nodes: set[Any] = set()
+        self._spinner.tear_down(wait_for_threads=wait_for_threads)
         with self._shutdown_lock:
             for guard in (self._guard, self._sigint_gc):
                 if guard is not None:

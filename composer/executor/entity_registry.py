@@ -97,6 +97,13 @@ class EntityRegistry:
                 source.observer = observer
                 source.on_events(UNKNOWN_COUNT)
 
+    def drop_all(self) -> None:
+        """Stop listening to everything."""
+        with self._lock:
+            for node in tuple(self._nodes):
+                with suppress(InvalidHandle):
+                    self.drop(node)
+
     def drop(self, node: Any) -> None:
         """Stop listening to the entities of `node`."""
         with self._lock:

@@ -62,10 +62,8 @@ class EventLoop:
         workers, scheduler, poller = self.workers, self._parts.scheduler, self._parts.poller
         try:
             while self._goes_on(me):
-                if scheduler.unlooked:
-                    self._look(me)
-                    continue
-                if self._execute_ready(me) or scheduler.running:
+                execute = self._look if scheduler.unlooked else self._execute_ready
+                if execute(me) or scheduler.running:
                     if not self._is_spinning() or poller.peek() or not self._is_idle():
                         continue
                     if scheduler.running:
@@ -94,21 +92,24 @@ class EventLoop:
         if self._parts.scheduler.admitted:
             self._notify()
 
-    def _look(self, me: Worker) -> None:
-        """Look at everything for the sessions that were opened, and execute what is ready."""
+    def _look(self, me: Worker) -> bool:
+        """`_execute_ready` for the sessions that were opened, after a look at everything."""
         scheduler = self._parts.scheduler
         sessions = tuple(scheduler.unlooked)
-        self._registry.refresh_if_stale()
-        self._runner.resume_paused()
-        if any(session.admits_one for session in sessions):
-            self._registry.flush()
+        admits_one = any(session.admits_one for session in sessions)
+        if admits_one:
+            self._registry.refresh_if_stale()
+            self._runner.resume_paused()
+        self._registry.flush()
+        if admits_one:
             self._parts.poller.peek()
-        while self._execute_ready(me) and any(map(_is_waiting, sessions)):
+        while (is_more := self._execute_ready(me)) and any(map(_is_waiting, sessions)):
             pass  # What was ready had nothing to take.
         if self.workers.leader is me:
             scheduler.set_looked(sessions)
             if any(session.is_late for session in sessions):
                 self._notify()
+        return is_more
 
     def _execute_ready(self, me: Worker) -> bool:
         """Execute about what is ready now; False if there is no more, or `me` was replaced."""

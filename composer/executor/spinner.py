@@ -207,11 +207,9 @@ class Spinner:
         self.wake()
         return self._wait_for_end(timeout_sec)
 
-    def tear_down(self, nodes: list[Any], *, wait_for_threads: bool) -> None:
-        """Stop listening to `nodes`, end the threads, and close what they waited for."""
-        for node in nodes:
-            with suppress(InvalidHandle):
-                self.registry.drop(node)
+    def tear_down(self, *, wait_for_threads: bool) -> None:
+        """Stop listening to all nodes, end the threads, and close what they waited for."""
+        self.registry.drop_all()
         self.wait_set_thread.close()
         # Other callbacks that shut down, too, keep their threads a little longer.
         end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC

@@ -70,6 +70,7 @@ class WaitSetThread:
         self._thread: threading.Thread | None = None
         self._closing = False
         self._users: set[object] = set()
+        self._is_new = False
         self._waited_for: set[WaitSetSource] = set()
         self._signalled_until = 0.0
         self._events_from = 0.0
@@ -100,6 +101,7 @@ class WaitSetThread:
                 self._thread = threading.Thread(
                     target=self._run, name='executor-wait-set', daemon=True
                 )
+                self._is_new = True
                 try:
                     self._thread.start()
                 except RuntimeError:
@@ -132,8 +134,12 @@ class WaitSetThread:
             )
 
     def flush_if_used(self) -> None:
-        """`flush` if there is anything to wait for."""
-        if self._waited_for:
+        """`flush` if there is anything to wait for, or the thread has just begun.
+
+        Its first round keeps the GIL for milliseconds, which must not be those of a callback.
+        """
+        if self._waited_for or self._is_new:
+            self._is_new = False
             self.flush()
 
     def close(self) -> None:
