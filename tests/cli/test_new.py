@@ -138,9 +138,10 @@ def test_its_tests_fail_if_the_system_does_not_work(project, domain_id):
     ],
 )
 def test_a_name_is_one_of_a_ros_package(folder, capsys, name, near):
+    shown = name.replace('\n', '\n  ')
     assert run(['new', name]) == 2
     assert capsys.readouterr().err == (
-        f"error: '{name}' cannot name a project: use lower-case letters, digits and underscores, "
+        f"error: '{shown}' cannot name a project: use lower-case letters, digits and underscores, "
         f"starting with a letter\n  help: try '{near}'\n"
     )
     assert not list(folder.iterdir())

@@ -330,13 +330,13 @@ def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
     text = text.replace('timers:\n', f'on_start: parts:{behaviour}\n').replace(
         f"              tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}\n", ''
     )
-    check_that_a_signal_ends_it(compose(text, CODE))
+    check_that_a_signal_ends_it(compose(text, CODE), code=130)
 
 
-def check_that_a_signal_ends_it(child, waiting=1):
+def check_that_a_signal_ends_it(child, waiting=1, code=0):
     child.wait_for_line('waiting', times=waiting)
 
-    assert child.stop(signal.SIGINT) == 0, child.output
+    assert child.stop(signal.SIGINT) == code, child.output
     assert 'rror' not in child.output
     assert 'did not end' not in child.output
 
