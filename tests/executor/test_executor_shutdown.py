@@ -6,7 +6,6 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
-from contextlib import suppress
 from itertools import count
 from typing import Any
 
@@ -276,10 +275,14 @@ def test_spin_ends_when_a_signal_ends_the_context_while_events_are_asked_for(
     node: Any, executor: Any, context: Context, monkeypatch: Any
 ) -> None:
     list_happened = Readiness.list_happened
+    signalled: list[int] = []
 
     def ask_in_vain(readiness: Any, events: Any) -> Any:
-        with suppress(RuntimeError):  # The second time.
-            context.handle.shutdown()  # As rclpy's handler of signals does it.
+        if not signalled:
+            signalled.append(1)
+            # As rclpy's thread for signals does it.
+            executor._sigint_gc.trigger()
+            context.handle.shutdown()
         return list_happened(readiness, events)
 
     monkeypatch.setattr(Readiness, 'list_happened', ask_in_vain)
