@@ -19,6 +19,7 @@ from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
 import composer
+from composer.processes.guardian_client import GuardianClient
 from composer.runtime.behaviours.calls import BehaviourCall
 from composer.runtime.behaviours.running_calls import RunningCalls
 from composer.runtime.health.statistics import CallTimes
@@ -29,6 +30,7 @@ _ROUNDS = 15
 _CALLS = 50_000
 _CALL_ROUNDS = 41
 _TIMEOUT_SEC = 60.0
+_STOP_SEC = 5.0
 
 # By message type, what the behaviour does: two make a new message, one passes it on.
 ANSWERS: dict[str, tuple[type, Callable[[Any], Any]]] = {
@@ -166,7 +168,8 @@ def _start_composed(type_name: str, answer: Callable[[Any], Any]) -> System:
         message = f'the system cannot be read: {loaded.diagnostics}'
         raise ValueError(message)
     functions = {'parts:answer': lambda _node, message: answer(message)}
-    system = System(loaded.spec, loaded.positions, functions)
+    guardian = GuardianClient(_STOP_SEC, _STOP_SEC, owns_process=True)
+    system = System(loaded.spec, loaded.positions, functions, guardian)
     system.start()
     return system
 

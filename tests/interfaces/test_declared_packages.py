@@ -19,4 +19,5 @@ def test_definitions_are_read_once_for_checks_and_a_start(tmp_path: Path) -> Non
     declared = load_declared(load_system(path), InterfaceCatalogue())
     shutil.rmtree(folder)
     assert declared.findings == []
-    assert provide_declared(declared, print) == ['std_msgs']
+    (provided,) = provide_declared(declared, print)
+    assert provided.package == 'std_msgs'

@@ -316,10 +316,14 @@ def test_parameters_are_served_beside_a_behaviour_that_blocks_and_after_a_restar
         assert 'use_sim_time' in response.result.names
 
 
-@pytest.mark.parametrize('moment', ['ready in', 'not a moment'])
-def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose, moment):
+@pytest.mark.parametrize(
+    ('moment', 'codes'),
+    # The system may be up before the signal of a stop in `on_start` arrives.
+    [('ready in', {0}), ('not a moment', {0, 130})],
+)
+def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose, moment, codes):
     nodes = ''.join(f'  node_{number}: {{}}\n' for number in range(60))
     child = compose(f'version: 1\nnodes:\n  first: {{on_start: parts:announce}}\n{nodes}', CODE)
     child.wait_for_line(moment)
-    assert child.stop() == 0
+    assert child.stop() in codes
     assert not child.matching('ERROR')
