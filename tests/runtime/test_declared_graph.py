@@ -140,8 +140,11 @@ def test_nodes_are_in_their_namespaces(graph, wait_for):
 )
 def test_publishers_have_exactly_the_topics_of_the_file(graph, wait_for, node, namespace, topics):
     expected = {topic: [kind] for topic, kind in topics.items()}
-    # Every node has this one.
-    expected |= {'/rosout': ['rcl_interfaces/msg/Log']}
+    # Every node has these, the second one with its parameter services soon after the start.
+    expected |= {
+        '/rosout': ['rcl_interfaces/msg/Log'],
+        '/parameter_events': ['rcl_interfaces/msg/ParameterEvent'],
+    }
 
     def seen():
         return dict(graph.get_publisher_names_and_types_by_node(node, namespace))
