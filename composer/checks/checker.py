@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.checks.behaviours.behaviour_bodies import check_bodies
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
@@ -32,7 +33,6 @@ from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
 from composer.language.pipeline import load_system
-from composer.python_source.behaviour_uses import UseReader
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_process_parameters,
     check_annotations,
     check_uses,
+    check_bodies,
 )
 SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
@@ -84,7 +85,7 @@ def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> Check
         return None
     interfaces = load_declared(system, installed)
     modules = ModuleFinder(project_search_path(system.files))
-    return CheckContext(system, system.spec, interfaces, modules, UseReader(modules))
+    return CheckContext(system, system.spec, interfaces, modules)
 
 
 def check_system(

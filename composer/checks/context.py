@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
+from composer.inference.reader import BehaviourReader
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from composer.interfaces.declared_packages import DeclaredPackages
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, SystemSpec
-    from composer.python_source.behaviour_uses import UseReader
     from composer.python_source.module_finder import ModuleFinder
     from composer.yaml_text.positions import DataPath
 
@@ -28,19 +28,22 @@ class CheckContext:
 
     Attributes:
         interfaces: The types of the system, and the errors in the packages that it declares.
-        uses: Reads what behaviours do with their nodes.
     """
 
     system: LoadedSystem
     spec: SystemSpec
     interfaces: DeclaredPackages
     modules: ModuleFinder
-    uses: UseReader
 
     @cached_property
     def topology(self) -> Topology:
         """What connects the nodes."""
         return build_topology(self.system, self.spec, self.has_real_type)
+
+    @cached_property
+    def behaviours(self) -> BehaviourReader:
+        """What reads the behaviours."""
+        return BehaviourReader(self.modules, self.catalogue, self.has_real_type)
 
     @property
     def catalogue(self) -> InterfaceCatalogue:

@@ -58,7 +58,7 @@ def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> 
         return Annotation(builtin=name)
     first, separator, rest = name.partition('.')
     full = imports.get(first)
-    return Annotation(interface=_interface(full + separator + rest)) if full else Annotation()
+    return Annotation(interface=find_interface(full + separator + rest)) if full else Annotation()
 
 
 def _read_subscript(expression: ast.Subscript) -> Annotation:
@@ -80,7 +80,7 @@ def _dotted(expression: ast.expr | None) -> str:
     return '.'.join([expression.id, *reversed(parts)]) if isinstance(expression, ast.Name) else ''
 
 
-def _interface(name: str) -> str | None:
+def find_interface(name: str) -> str | None:
     """Return the interface of a dotted name, as generated packages name it, or `None`."""
     # The classes are in modules with a leading underscore, such as `std_msgs.msg._string`.
     parts = [part for part in name.split('.') if not part.startswith('_')]

@@ -69,7 +69,7 @@ class FunctionSource:
         return _read_signature(self.definition.args) if self.definition else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ModuleSource:
     """The names that a module defines.
 
@@ -85,6 +85,7 @@ class ModuleSource:
         error_line: The line of this error, counted from 1, if it is known.
         unread: Why its source is not read although it may be valid, or `None`.
         tokens: How many words and signs it has.
+        body: Its statements.
     """
 
     path: Path | None
@@ -98,14 +99,19 @@ class ModuleSource:
     error_line: int | None = None
     unread: str | None = None
     tokens: int = 0
+    body: tuple[ast.stmt, ...] = field(default=(), repr=False)
 
-    def place_of(self, line: int) -> Span:
-        """Return the span of a line; its path is relative to the current folder if possible."""
+    @cached_property
+    def source(self) -> SourceFile:
+        """Its text; the path is relative to the current folder if possible."""
         path, here = self.path or Path(), Path.cwd()
         name = str(path.relative_to(here) if path.is_relative_to(here) else path)
-        source = SourceFile(name, self.lines)
-        text = source.line(line)
-        return Span(source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
+        return SourceFile(name, self.lines)
+
+    def place_of(self, line: int) -> Span:
+        """Return the span of a line."""
+        text = self.source.line(line)
+        return Span(self.source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
 
 
 def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSource:
@@ -144,6 +150,7 @@ def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSourc
         lines,
         reader.is_open,
         tokens=tokens,
+        body=tuple(tree.body),
     )
 
 

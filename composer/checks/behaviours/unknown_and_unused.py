@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Related
+from composer.checks.behaviours.behaviour_bodies import bound_at
+from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import (
     BEHAVIOUR_KEYS,
     ENTITY_KINDS,
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
     from composer.entity_kinds import EntityKind
+    from composer.inference.reading import NodeUse, Reading
     from composer.language.bindings import Binding
-    from composer.python_source.behaviour_uses import BehaviourUses, FoundUse
     from composer.yaml_text.positions import DataPath
 
 # Parameters that every node of rclpy declares.
@@ -41,28 +42,18 @@ _ENTITY_DEPTH = 2
 
 def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use what their node declares, and use all of it."""
-    lost = _lost_by_node(context)
     uses = {
-        name: [(binding, context.uses.uses_of(binding)) for binding in _bindings(context, node)]
+        name: [(each, context.behaviours.read(node, each)) for each in _bindings(context, node)]
         for name, node in context.spec.nodes.items()
     }
-    for name, node in context.spec.nodes.items():
-        # A behaviour may declare parameters with rclpy.
-        is_open = any(found.reaches_ros for _, found in uses[name])
-        for binding, found in uses[name]:
-            told = _without_parameters(found) if is_open else found
-            yield from _check_names(context, node, binding, told, lost.get(name, []))
+    yield from _check_names(context, uses)
+    lost = _lost_by_node(context)
     whole = [
         (node, [found for _, found in uses[name]])
         for name, node in context.spec.nodes.items()
         if not any(_may_hide_a_use(path) for path in lost.get(name, []))
     ]
     yield from _check_unused(context, whole)
-
-
-def _without_parameters(uses: BehaviourUses) -> BehaviourUses:
-    kept = tuple(each for each in uses.found if each.use.kind != 'parameter')
-    return replace(uses, found=kept)
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
@@ -80,21 +71,47 @@ def _lost_by_node(context: CheckContext) -> dict[str, list[DataPath]]:
 
 
 def _check_names(
-    context: CheckContext,
-    node: NodeSpec,
-    binding: Binding,
-    uses: BehaviourUses,
-    lost: list[DataPath],
+    context: CheckContext, uses: dict[str, list[tuple[Binding, Reading]]]
 ) -> Iterator[Diagnostic]:
-    reported: set[tuple[str, str]] = set()
-    for found in uses.found:
-        use = found.use
-        key = (use.kind, use.name)
-        if key in reported or not use.is_certain or use.is_guarded or use.has_default:
-            continue
-        if not _is_declared(node, use.kind, use.name, lost):
-            reported.add(key)
-            yield _explain_name(context, node, binding, found)
+    """Check the names that behaviours use, each place once."""
+    lost = _lost_by_node(context)
+    declared = _declared_by_behaviour(context, uses)
+    found: dict[tuple[Span, str], Diagnostic] = {}
+    for name, node in context.spec.nodes.items():
+        # A behaviour may declare parameters with rclpy.
+        is_open = any(reading.reaches_ros for _, reading in uses[name])
+        for binding, reading in uses[name]:
+            for use in reading.uses:
+                if use.is_guarded or use.has_default or (is_open and use.kind == 'parameter'):
+                    continue
+                if _is_declared(node, use.kind, use.name, lost.get(name, [])):
+                    continue
+                if not use.is_certain and not _is_typo(node, use, declared[binding.behaviour.name]):
+                    continue
+                finding = _explain_name(context, node, binding, use)
+                key = (use.place, finding.rule)
+                before = found.get(key)
+                found[key] = before.with_related(finding.related) if before else finding
+    yield from found.values()
+
+
+def _declared_by_behaviour(
+    context: CheckContext, uses: dict[str, list[tuple[Binding, Reading]]]
+) -> dict[str, set[tuple[str, str]]]:
+    """Return, of each behaviour, what any of the nodes declares that are bound to it."""
+    found: dict[str, set[tuple[str, str]]] = {}
+    for name, node in context.spec.nodes.items():
+        names = {(kind.noun, each) for kind in USED_KINDS for each in getattr(node, kind.section)}
+        for binding, _ in uses[name]:
+            found.setdefault(binding.behaviour.name, set()).update(names)
+    return found
+
+
+def _is_typo(node: NodeSpec, use: NodeUse, declared: set[tuple[str, str]]) -> bool:
+    """Return whether a name that is used on a condition of the file is wrong in any case."""
+    section = KIND_OF_NOUN[use.kind].section
+    is_near = find_nearest(use.name, getattr(node, section)) is not None
+    return is_near and (use.kind, use.name) not in declared
 
 
 def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> bool:
@@ -111,33 +128,31 @@ def _is_unknown(path: DataPath) -> bool:
 
 
 def _explain_name(
-    context: CheckContext, node: NodeSpec, binding: Binding, found: FoundUse
+    context: CheckContext, node: NodeSpec, binding: Binding, use: NodeUse
 ) -> Diagnostic:
-    use, behaviour = found.use, binding.behaviour
     kind = KIND_OF_NOUN[use.kind]
     declares_not = f"node '{node.name}' declares no {use.kind} '{use.name}'"
     rule = f'unknown-{kind.slug}'
-    message = f"{declares_not}, which '{behaviour.function}' uses"
+    message = declares_not
     if use.is_optional:
         rule = 'missing-parameter'
-        message = f"{declares_not}, and '{behaviour.function}' gets None for it"
-    return context.at_value(
-        behaviour.path,
+        message = f'{declares_not}, so this is None'
+    return diagnostic_at(
+        use.place,
         rule,
         message,
-        part=behaviour.function,
         help=suggest(
             use.name,
             getattr(node, kind.section),
             'it declares',
             f"declare it under '{kind.section}:'",
         ),
-        related=[Related(f"'{use.name}' is used here", found.place)],
+        related=[bound_at(context, binding)],
     )
 
 
 def _check_unused(
-    context: CheckContext, nodes: list[tuple[NodeSpec, list[BehaviourUses]]]
+    context: CheckContext, nodes: list[tuple[NodeSpec, list[Reading]]]
 ) -> Iterator[Diagnostic]:
     """Warn of what no behaviour uses; an entry that nodes share is used if one node uses it."""
     are_read = any(each.reads_others for _, uses in nodes for each in uses)
@@ -145,7 +160,7 @@ def _check_unused(
     used: set[Span] = set()
     for node, uses in nodes:
         open_kinds = _open_kinds(node, uses, are_read=are_read)
-        names = {(found.use.kind, found.use.name) for each in uses for found in each.found}
+        names = {(use.kind, use.name) for each in uses for use in each.uses}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
         names |= set(_meant(node, names))
         for kind in USED_KINDS:
@@ -171,7 +186,7 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
             yield from ((kind, each) for each in (declared if near is None else (near,)))
 
 
-def _open_kinds(node: NodeSpec, uses: list[BehaviourUses], *, are_read: bool) -> frozenset[str]:
+def _open_kinds(node: NodeSpec, uses: list[Reading], *, are_read: bool) -> frozenset[str]:
     """Return the kinds of which any entity may be used.
 
     Args:

@@ -88,9 +88,9 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
             if context.was_dropped(binding.behaviour.path):
                 continue
             names = {
-                found.use.name
-                for found in context.uses.uses_of(binding).found
-                if found.use.kind == 'service client' and found.use.waits and found.use.is_certain
+                use.name
+                for use in context.behaviours.read(node, binding).uses
+                if use.kind == 'service client' and use.waits and use.is_certain
             }
             for name in sorted(names):
                 if (node.name, name) in servers:

@@ -1,0 +1,1 @@
+"""Infer what behaviours do with their nodes and messages, without running them."""

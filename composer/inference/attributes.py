@@ -1,0 +1,323 @@
+"""Attributes: what is read from something, and what may be stored in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.inference.message_types import in_python, value_of
+from composer.inference.run import name_place
+from composer.inference.values import (
+    NODE,
+    UNKNOWN,
+    Argument,
+    ArrayField,
+    Awaitable,
+    BoundMethod,
+    Class,
+    Constant,
+    External,
+    Function,
+    Generated,
+    Instance,
+    Mapping,
+    Message,
+    MessageClass,
+    NodeValue,
+    PartOfNode,
+    Place,
+    ProjectModule,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    join,
+)
+from composer.interfaces.field_errors import unknown_field
+from composer.python_source.annotations import find_interface
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from composer.inference.evaluator import Evaluator
+
+# What `composer.Node` has; a test holds these names against the classes.
+NODE_METHODS = frozenset(
+    {
+        'call',
+        'call_async',
+        'get_parameters',
+        'now',
+        'publish',
+        'send_goal',
+        'set_parameters',
+        'shutdown',
+        'with_own_state',
+    }
+)
+NODE_ATTRIBUTES = frozenset({'logger', 'name', 'own_state', 'parameters', 'ros', 'state'})
+STORED_IN_NODE = NODE_ATTRIBUTES - {'logger'}
+NAMES_OF_PART: dict[str, frozenset[str]] = {
+    'logger': frozenset(
+        {
+            'debug',
+            'error',
+            'fatal',
+            'get_child',
+            'get_effective_level',
+            'info',
+            'is_enabled_for',
+            'log',
+            'name',
+            'set_level',
+            'warn',
+            'warning',
+        }
+    ),
+    'time': frozenset({'clock_type', 'from_msg', 'nanoseconds', 'seconds_nanoseconds', 'to_msg'}),
+    'goal': frozenset({'cancel', 'feedback', 'result', 'result_async', 'status'}),
+}
+_SHOWN_PARTS = {
+    'logger': "the node's logger",
+    'time': 'a time',
+    'goal': 'a goal',
+}
+_OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
+_OF_MESSAGES = frozenset({'SLOT_TYPES', 'get_fields_and_field_types'})
+_COROUTINE = frozenset({'close', 'send', 'throw'})
+
+
+class Attributes:
+    """Reads and stores attributes.
+
+    Args:
+        evaluator: Knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    # Reading
+
+    def read(self, owner: Value, name: str, place: Place) -> Value:
+        """Return what an attribute may be; one that no alternative has is a problem."""
+        found: list[Value] = []
+        problem: tuple[str, str, str | None] | None = None
+        for each in alternatives(owner):
+            value = self._read(each, name, place)
+            if isinstance(value, tuple):
+                problem = problem or value
+            else:
+                found.append(value)
+        if problem and not found:
+            rule, message, help_text = problem
+            self._evaluator.run.report(rule, place, message, help_text)
+        return join(found) if found and not problem else UNKNOWN
+
+    def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
+        """Return an attribute, or a problem: the rule, what is wrong, and help."""
+        if name.startswith('__'):
+            if isinstance(owner, NodeValue | PartOfNode):
+                self._evaluator.escape(owner)
+            return UNKNOWN
+        match owner:
+            case NodeValue():
+                return self._read_node(name)
+            case PartOfNode():
+                return self._read_part(owner, name, place)
+            case Message() | MessageClass():
+                return self._read_message(owner, name)
+            case External():
+                full_name = f'{owner.name}.{name}'
+                interface = find_interface(full_name)
+                return MessageClass(interface) if interface else External(full_name)
+            case ProjectModule():
+                return self._read_module(owner, name)
+            case Instance():
+                return self._read_instance(owner, name)
+            case Class():
+                return self._evaluator.class_attribute(owner, name, None) or UNKNOWN
+            case ArrayField():
+                return self._read_array(owner, name)
+            case Awaitable():
+                if name in _COROUTINE or name.startswith('cr_'):
+                    return UNKNOWN
+                message = f"'{name}' is read of a coroutine, which has not been awaited"
+                return 'missing-await', message, 'put await before the call'
+            case Constant() | Scalar() | Mapping() | Sequence():
+                return self._read_builtin(owner, name)
+        return UNKNOWN
+
+    def _read_node(self, name: str) -> Value | tuple[str, str, str | None]:
+        if name == 'name':
+            return self._evaluator.run.facts.name()
+        if name == 'ros':
+            self._evaluator.run.reading.reaches_ros = True
+            self._evaluator.run.reading.open_kinds.add('parameter')
+            return UNKNOWN
+        if name in NODE_ATTRIBUTES:
+            return PartOfNode(name)
+        if name in NODE_METHODS:
+            return BoundMethod(NODE, name)
+        return _missing('the node', name, NODE_METHODS | NODE_ATTRIBUTES)
+
+    def _read_part(
+        self, owner: PartOfNode, name: str, place: Place
+    ) -> Value | tuple[str, str, str | None]:
+        run = self._evaluator.run
+        match owner.name:
+            case 'parameters' if name in _OF_MAPPING:
+                return BoundMethod(owner, name)
+            case 'parameters':
+                run.use('parameter', name, place)
+                return run.facts.value_of_parameter(name)
+            case 'state':
+                run.use_state(name, place)
+                return UNKNOWN
+            case 'own_state':
+                return BoundMethod(owner, name)
+        if name not in NAMES_OF_PART[owner.name]:
+            return _missing(_SHOWN_PARTS[owner.name], name, NAMES_OF_PART[owner.name])
+        if owner.name == 'goal' and name == 'feedback':
+            return Generated(Message(f'{owner.type}_Feedback') if owner.type else UNKNOWN, UNKNOWN)
+        if name in ('status', 'name'):
+            return Scalar(str)
+        return BoundMethod(owner, name)
+
+    def _read_message(
+        self, owner: Message | MessageClass, name: str
+    ) -> Value | tuple[str, str, str | None]:
+        description = self._evaluator.run.types.describe(owner.type)
+        field = description.field(name) if description else None
+        if field is not None:
+            return value_of(field.type) if isinstance(owner, Message) else UNKNOWN
+        # Descriptions of installed packages lack constants, which have names in capitals.
+        if description is None or name in _OF_MESSAGES or name.isupper() or name[0] == '_':
+            return UNKNOWN
+        error = unknown_field(owner.type, name, [each.name for each in description.fields])
+        return 'unknown-field', str(error).replace(owner.type, in_python(owner.type)), error.help
+
+    def _read_module(self, owner: ProjectModule, name: str) -> Value | tuple[str, str, str | None]:
+        if self._evaluator.run.modules.has_name(owner.module, name):
+            return self._evaluator.top_value(owner.module, name)
+        if self._evaluator.is_module_in(owner.module, name):
+            return UNKNOWN
+        path = owner.module.path
+        known = self._evaluator.run.modules.top(owner.module).statements
+        message = f"{path.name if path else 'the module'} has no '{name}'"
+        return 'undefined-name', message, suggest(name, known)
+
+    def _read_instance(self, owner: Instance, name: str) -> Value:
+        found = self._evaluator.class_attribute(owner.of, name, owner)
+        stored = owner.attributes.get(name)
+        if stored is None:
+            return found or UNKNOWN
+        # What other behaviours store in it is not known here.
+        is_lasting = isinstance(stored, NodeValue | PartOfNode | BoundMethod | Function | Instance)
+        if is_lasting or self._evaluator.is_stored_once(owner.of, name):
+            return stored
+        return UNKNOWN
+
+    def _read_array(self, owner: ArrayField, name: str) -> Value | tuple[str, str, str | None]:
+        nested = owner.type.nested
+        if nested is None or hasattr(list, name):
+            return BoundMethod(owner, name)
+        message = f"'{name}' is read of an array of {nested}"
+        return 'unknown-field', message, 'read it of an item: of [0], or in a loop'
+
+    def _read_builtin(
+        self, owner: Constant | Scalar | Mapping | Sequence, name: str
+    ) -> Value | tuple[str, str, str | None]:
+        kind = dict if isinstance(owner, Mapping) else owner.kind
+        if kind is type(None):
+            return UNKNOWN
+        if hasattr(kind, name):
+            return BoundMethod(owner, name)
+        help_text = suggest(name, [each for each in dir(kind) if each[0] != '_'])
+        return 'unknown-attribute', f"a {kind.__name__} has no attribute '{name}'", help_text
+
+    def read_item(self, owner: Value, index: Value, place: Place) -> Value:
+        """Return what `owner[index]` may be, of a part of the node."""
+        run = self._evaluator.run
+        if not isinstance(owner, PartOfNode) or owner.name != 'parameters':
+            return UNKNOWN
+        found: list[Value] = []
+        for each in alternatives(index):
+            if isinstance(each, Constant) and isinstance(each.value, str):
+                run.use('parameter', each.value, name_place(Argument(index, place), each))
+                found.append(run.facts.value_of_parameter(each.value))
+            else:
+                run.reading.open_kinds.add('parameter')
+                found.append(UNKNOWN)
+        return join(found)
+
+    def note_containment(self, item: Value, container: Value, place: Place) -> None:
+        """`'x' in node.parameters` uses a parameter, and works without it."""
+        if container != PartOfNode('parameters'):
+            return
+        for each in alternatives(item):
+            if isinstance(each, Constant) and isinstance(each.value, str):
+                self._evaluator.run.use(
+                    'parameter', each.value, place, is_optional=True, has_default=True
+                )
+
+    # Storing
+
+    def store(self, owner: Value, name: str, value: Value, place: Place) -> None:
+        """Store an attribute; a message holds only its fields."""
+        owners = alternatives(owner)
+        if len(owners) == 1 or all(isinstance(each, Instance) for each in owners):
+            for each in owners:
+                self._store(each, name, value, place)
+        else:
+            self._evaluator.escape(value)
+
+    def _store(self, owner: Value, name: str, value: Value, place: Place) -> None:
+        run = self._evaluator.run
+        match owner:
+            case PartOfNode(name='state'):
+                run.reading.state_set.add(name)
+                self._evaluator.escape(value)
+            case PartOfNode(name='parameters'):
+                self._refuse_parameter(name, place)
+            case NodeValue() if name not in STORED_IN_NODE:
+                message = f"the node takes no attribute '{name}'"
+                run.report('unknown-attribute', place, message, f'keep it in node.state.{name}')
+            case Message():
+                self._store_field(owner, name, value, place)
+            case Instance():
+                owner.set(name, value)
+            case _:
+                self._evaluator.escape(value)
+
+    def _refuse_parameter(self, name: str, place: Place) -> None:
+        self._evaluator.run.report(
+            'unset-parameter',
+            place,
+            f"this does not set the parameter '{name}'",
+            f'write node.set_parameters(node.name, {{{name!r}: …}})',
+        )
+
+    def store_item(self, index: Value, place: Place) -> None:
+        """Refuse `node.parameters['x'] = …`."""
+        name = index.value if isinstance(index, Constant) else '…'
+        self._refuse_parameter(str(name), place)
+
+    def _store_field(self, owner: Message, name: str, value: Value, place: Place) -> None:
+        description = self._evaluator.run.types.describe(owner.type)
+        if description is None:
+            self._evaluator.escape(value)
+            return
+        field = description.field(name)
+        if field is None:
+            error = unknown_field(owner.type, name, [each.name for each in description.fields])
+            message = str(error).replace(owner.type, in_python(owner.type))
+            if not name.startswith('_'):
+                self._evaluator.run.report('unknown-field', place, message, error.help)
+            return
+        self._evaluator.payloads.check_field(owner.type, field, value, place)
+
+
+def _missing(owner: str, name: str, known: Iterable[str]) -> tuple[str, str, str | None]:
+    message = f"{owner} has no attribute '{name}'"
+    return 'unknown-attribute', message, suggest(name, known, 'it has')

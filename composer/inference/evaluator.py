@@ -1,0 +1,513 @@
+"""The parts that evaluate a behaviour, and what they share: names, functions and classes."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.attributes import Attributes
+from composer.inference.calls import Calls
+from composer.inference.expressions import Expressions
+from composer.inference.message_types import item_of
+from composer.inference.payloads import Payloads
+from composer.inference.scopes import LocalNames, Scope, find_local_names
+from composer.inference.statements import Statements
+from composer.inference.values import (
+    NODE,
+    NONE,
+    UNKNOWN,
+    Alternatives,
+    Argument,
+    Arguments,
+    ArrayField,
+    Awaitable,
+    BoundMethod,
+    Class,
+    Constant,
+    External,
+    Function,
+    Generated,
+    Instance,
+    Mapping,
+    Message,
+    MessageClass,
+    NodeValue,
+    Partial,
+    PartOfNode,
+    Place,
+    ProjectModule,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    join,
+)
+from composer.python_source.annotations import find_interface
+from composer.python_source.modules import FunctionKind, FunctionSource
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from composer.inference.run import Run
+    from composer.python_source.modules import ModuleSource
+
+# How deep helpers of helpers are followed.
+_DEEPEST = 12
+_TRANSPARENT = {
+    'contextlib.contextmanager',
+    'functools.cache',
+    'functools.lru_cache',
+    'functools.wraps',
+    'builtins.staticmethod',
+    'typing.no_type_check',
+    'typing.final',
+    'typing_extensions.override',
+    'typing.override',
+}
+
+
+class Evaluator:
+    """Evaluates expressions and follows statements and functions, in one run.
+
+    Attributes:
+        lasting_doubts: Of each function under way, the doubts that last until its end.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self.lasting_doubts: list[int] = [0]
+        self.expressions = Expressions(self)
+        self.statements = Statements(self)
+        self.calls = Calls(self)
+        self.attributes = Attributes(self)
+        self.payloads = Payloads(self)
+        self._active: list[ast.AST] = []
+        self._results: dict[tuple[object, ...], Value] = {}
+        self._local_names: dict[int, LocalNames] = {}
+
+    def evaluate(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what an expression may be."""
+        return self.expressions.evaluate(node, scope)
+
+    # Names
+
+    def look_up(self, node: ast.Name, scope: Scope) -> Value:
+        """Return what a name stands for."""
+        name = node.id
+        current: Scope | None = scope
+        while current is not None:
+            if name in current.local:
+                value = current.latest(name) if current is not scope else None
+                if current.names is not None and name in current.names:
+                    value = current.names[name]
+                return UNKNOWN if value is None else value
+            current = current.outer
+        modules = self.run.modules
+        if not modules.has_name(scope.module, name):
+            place = Place(scope.module, node)
+            known = [*modules.top(scope.module).statements, *scope.all_names()]
+            message = f"'{name}' is not defined"
+            self.run.report('undefined-name', place, message, suggest(name, known))
+            return UNKNOWN
+        return self.top_value(scope.module, name)
+
+    def top_value(self, module: ModuleSource, name: str) -> Value:
+        """Return what a name at the top of a module stands for."""
+
+        def evaluate(statement: ast.stmt, is_conditional: bool) -> Value:  # noqa: FBT001
+            if isinstance(statement, ast.Import | ast.ImportFrom):
+                return self.imported(module, statement, name)
+            scope = Scope(module)
+            with self.run.silence(), self.run.guard(is_guard=is_conditional):
+                self.statements.follow_all([statement], scope)
+            return (scope.names or {}).get(name, UNKNOWN)
+
+        return self.run.modules.value(module, name, evaluate)
+
+    def imported(self, module: ModuleSource, statement: ast.AST, name: str) -> Value:
+        """Return what an import stores under a name."""
+        full_name = self.run.modules.imported(module, statement, name)
+        if not full_name:
+            return UNKNOWN
+        home, inner = self.run.modules.split(full_name)
+        if home is not None:
+            if not inner:
+                return ProjectModule(home)
+            if self.run.modules.has_name(home, inner):
+                return self.top_value(home, inner)
+            return UNKNOWN
+        interface = find_interface(full_name)
+        return MessageClass(interface) if interface else External(full_name)
+
+    def is_module_in(self, package: ModuleSource, name: str) -> bool:
+        """Return whether a package has a module of this name."""
+        path = package.path
+        if path is None or path.name != '__init__.py':
+            return False
+        return (path.parent / f'{name}.py').exists() or (path.parent / name).is_dir()
+
+    def read_target(self, target: ast.expr, scope: Scope) -> Value:
+        """Return what the target of `+=` holds."""
+        if isinstance(target, ast.Name):
+            return self.look_up(target, scope)
+        if isinstance(target, ast.Attribute):
+            owner = self.evaluate(target.value, scope)
+            return self.attributes.read(owner, target.attr, Place(scope.module, target))
+        return UNKNOWN
+
+    def home_of(self, scope: Scope) -> Scope:
+        """Return the scope of the function itself: comprehensions have their own."""
+        while scope.function is not None and scope.outer is not None:
+            if scope.outer.function is not scope.function:
+                break
+            scope = scope.outer
+        return scope
+
+    def narrow(self, test: ast.expr, scope: Scope, *, is_true: bool) -> None:
+        """Use what is known after a test."""
+        match test:
+            case ast.UnaryOp(op=ast.Not()):
+                self.narrow(test.operand, scope, is_true=not is_true)
+            case ast.BoolOp():
+                if isinstance(test.op, ast.And) == is_true:
+                    for each in test.values:
+                        self.narrow(each, scope, is_true=is_true)
+            case ast.Name():
+                self._drop_none(test, scope, has_value=is_true)
+            case ast.Compare(
+                left=ast.Name() as name, ops=[sign], comparators=[ast.Constant(None)]
+            ):
+                if isinstance(sign, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
+                    is_none = isinstance(sign, ast.Is | ast.Eq)
+                    self._drop_none(name, scope, has_value=is_none != is_true)
+            case ast.Call(func=ast.Name(id=function), args=[ast.Name() as name, *_]):
+                if function in ('isinstance', 'hasattr', 'callable', 'issubclass'):
+                    self._forget(name, scope)
+            case ast.Compare(left=ast.Call(func=ast.Name(id='type'), args=[ast.Name() as name])):
+                self._forget(name, scope)
+
+    def _drop_none(self, name: ast.Name, scope: Scope, *, has_value: bool) -> None:
+        value = scope.names.get(name.id) if scope.names is not None else None
+        if isinstance(value, Alternatives) and has_value:
+            kept = [each for each in value.values if each != NONE]
+            scope.set(name.id, join(kept) if kept else UNKNOWN)
+
+    def _forget(self, name: ast.Name, scope: Scope) -> None:
+        """Forget what a name stands for if the test of its type is not decided by that."""
+        value = scope.names.get(name.id) if scope.names is not None else None
+        if value is not None and not isinstance(value, NodeValue | Message):
+            scope.set(name.id, UNKNOWN)
+
+    # What is in something
+
+    def item_of(self, value: Value) -> Value:
+        """Return what an item of something iterated is."""
+        return join(self._item_of(each) for each in alternatives(value))
+
+    def _item_of(self, value: Value) -> Value:
+        match value:
+            case ArrayField():
+                return item_of(value.type)
+            case Sequence():
+                return value.item()
+            case Generated():
+                return value.yielded
+            case Mapping() if not (value.is_open or value.is_lost) and value.entries:
+                return join(constant(key) for key in value.entries)
+            case Constant() | Scalar() if value.kind is str:
+                return Scalar(str)
+            case PartOfNode(name='parameters'):
+                self.run.reading.open_kinds.add('parameter')
+        return UNKNOWN
+
+    def entered(self, value: Value) -> Value:
+        """Return what `with value as name` stores."""
+        return join(
+            each.yielded if isinstance(each, Generated) else UNKNOWN
+            for each in alternatives(value)
+        )
+
+    def escape(self, value: Value) -> None:
+        """Note that something unknown has a value: it may change it, or call it."""
+        match value:
+            case Alternatives():
+                for each in value.values:
+                    self.escape(each)
+            case NodeValue():
+                self.run.reading.open_all()
+            case PartOfNode(name='parameters'):
+                self.run.reading.open_kinds.add('parameter')
+            case PartOfNode(name='state'):
+                self.run.reading.is_state_open = True
+            case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
+                self._escape_method(value)
+            case Mapping() | Sequence() if not value.is_lost:
+                value.is_lost = True
+                held = value.entries.values() if isinstance(value, Mapping) else value.items
+                for each, _ in list(held):
+                    self.escape(each)
+            case Function() if not value.is_read and value.definition not in self._active:
+                self._follow_later(value)
+            case Partial():
+                self.calls.invoke_later(value)
+            case Instance():
+                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
+                    self.run.reading.open_all()
+
+    def _escape_method(self, method: BoundMethod) -> None:
+        kinds = {
+            'publish': 'publisher',
+            'call': 'service client',
+            'call_async': 'service client',
+            'send_goal': 'action client',
+            'get': 'parameter',
+        }
+        if method.name in kinds:
+            self.run.reading.open_kinds.add(kinds[method.name])
+        elif method.name == 'get_parameters':
+            self.run.reading.reads_others = True
+
+    # Functions
+
+    def define(
+        self, node: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda, scope: Scope
+    ) -> Function:
+        """Return the function that a definition makes."""
+        is_top = scope.function is None and scope.outer is None
+        function = Function(scope.module, node, None if is_top else scope)
+        for default in (*node.args.defaults, *node.args.kw_defaults):
+            if default is not None:
+                self.evaluate(default, scope)
+        if not is_top:
+            self.home_of(scope).inner.append(function)
+        return function
+
+    def define_decorated(
+        self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope
+    ) -> Value:
+        """Return what a definition makes, with its decorators."""
+        value: Value = self.define(node, scope)
+        for decorator in reversed(node.decorator_list):
+            by = self.evaluate(decorator, scope)
+            if isinstance(by, External) and by.name in _TRANSPARENT:
+                continue
+            place = Place(scope.module, decorator)
+            value = self.calls.invoke(by, Arguments((Argument(value, place),)), place)
+        return value
+
+    def is_coroutine(self, function: Function) -> bool:
+        """Return whether a call returns a coroutine, which runs when it is awaited."""
+        return kind_of(function) is FunctionKind.COROUTINE
+
+    def follow(self, function: Function, arguments: Arguments, *, waits: bool) -> Value:
+        """Return what a call of a function may return, and read what it does."""
+        function.is_read = True
+        key = self._key_of(function, arguments, waits=waits)
+        if key is not None and key in self._results:
+            return self._results[key]
+        if function.definition in self._active or len(self._active) >= _DEEPEST:
+            self.calls.escape_all(arguments)
+            return UNKNOWN
+        scope = self.enter(function, arguments, waits=waits)
+        result = result_of(function, scope)
+        if key is not None:
+            self._results[key] = result
+        return result
+
+    def _key_of(
+        self, function: Function, arguments: Arguments, *, waits: bool
+    ) -> tuple[object, ...] | None:
+        """Return what a call has to have in common with another one to give the same."""
+        values = [argument.value for argument in arguments.all()]
+        if any(isinstance(each, Mapping | Sequence | Instance | Alternatives) for each in values):
+            return None
+        names = tuple(name for name, _ in arguments.named)
+        run = self.run
+        at = (bool(run.doubts), bool(run.guards), run.is_silent, waits, arguments.is_open)
+        owner = function.owner if not isinstance(function.owner, Instance) else id(function.owner)
+        return (id(function.definition), id(function.outer), owner, names, at, *values)
+
+    def enter(self, function: Function, arguments: Arguments, *, waits: bool) -> Scope:
+        """Follow the body of a function; return its scope at its end."""
+        definition = function.definition
+        if id(definition) not in self._local_names:
+            self._local_names[id(definition)] = find_local_names(definition)
+        names = self._local_names[id(definition)]
+        scope = Scope(
+            function.module, function, function.outer, names.local, names.unsure, waits=waits
+        )
+        self._bind(function, arguments, scope)
+        self._active.append(definition)
+        self.lasting_doubts.append(0)
+        try:
+            if isinstance(definition, ast.Lambda):
+                value = self.evaluate(definition.body, scope)
+                scope.returned.append((value, Place(function.module, definition.body)))
+                scope.names = None
+            else:
+                self.statements.follow_all(definition.body, scope)
+                if scope.names is not None:
+                    scope.returned.append((NONE, Place(function.module, definition)))
+            for inner in scope.inner:
+                if not inner.is_read:
+                    # Nobody seems to call it.
+                    self.run.doubts += 1
+                    self._follow_later(inner)
+                    self.run.doubts -= 1
+        finally:
+            self.run.doubts -= self.lasting_doubts.pop()
+            self._active.pop()
+        return scope
+
+    def _follow_later(self, function: Function) -> None:
+        """Read a function that something else may call, with anything."""
+        with self.run.condition():
+            self.follow(function, Arguments(is_open=True), waits=False)
+
+    def _bind(self, function: Function, arguments: Arguments, scope: Scope) -> None:
+        """Store the arguments of a call in the parameters."""
+        parameters = function.definition.args
+        positional = [*parameters.posonlyargs, *parameters.args]
+        given = list(arguments.positional)
+        if function.owner is not None:
+            given.insert(0, Argument(function.owner, Place(function.module, function.definition)))
+        named = dict(arguments.named)
+        for parameter, argument in zip(positional, given, strict=False):
+            scope.set(parameter.arg, argument.value)
+        rest = given[len(positional) :]
+        defaults = dict(
+            zip(
+                [each.arg for each in reversed(positional)],
+                reversed(parameters.defaults),
+                strict=False,
+            )
+        )
+        defaults |= {
+            each.arg: default
+            for each, default in zip(parameters.kwonlyargs, parameters.kw_defaults, strict=True)
+            if default is not None
+        }
+        for parameter in (*positional[len(given) :], *parameters.kwonlyargs):
+            name = parameter.arg
+            if name in named:
+                scope.set(name, named.pop(name).value)
+            elif name in defaults and not arguments.is_open:
+                outer = function.outer or Scope(function.module)
+                with self.run.silence():
+                    scope.set(name, self.evaluate(defaults[name], outer))
+            else:
+                scope.set(name, UNKNOWN)
+        if parameters.vararg:
+            items = [(argument.value, argument.place) for argument in rest]
+            scope.set(parameters.vararg.arg, Sequence(items, tuple, arguments.is_open))
+        if parameters.kwarg:
+            entries: dict[object, tuple[Value, Place]] = {
+                name: (argument.value, argument.place) for name, argument in named.items()
+            }
+            scope.set(
+                parameters.kwarg.arg, Mapping(entries, arguments.is_open, self.run.conditions)
+            )
+
+    # Classes
+
+    def instantiate(self, of: Class, arguments: Arguments) -> Value:
+        """Return an object of a class."""
+        made = Instance(of)
+        init = self.class_attribute(of, '__init__', made)
+        if isinstance(init, Function):
+            self.follow(init, arguments, waits=True)
+        elif self._is_dataclass(of):
+            fields = [
+                each.target.id
+                for each in of.definition.body
+                if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name)
+            ]
+            for name, argument in zip(fields, arguments.positional, strict=False):
+                made.set(name, argument.value)
+            for name, argument in arguments.named:
+                made.set(name, argument.value)
+        else:
+            self.calls.escape_all(arguments)
+            return made if not of.definition.bases else UNKNOWN
+        return made
+
+    def _is_dataclass(self, of: Class) -> bool:
+        names = {
+            ast.unparse(each.func if isinstance(each, ast.Call) else each)
+            for each in of.definition.decorator_list
+        }
+        return bool(names & {'dataclass', 'dataclasses.dataclass'})
+
+    def class_attribute(self, of: Class, name: str, owner: Instance | None) -> Value | None:
+        """Return what a class stores under a name; a method is bound to `owner`."""
+        for statement in of.definition.body:
+            if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
+                if statement.name == name:
+                    return self._method(of, statement, owner)
+            elif isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value:
+                targets = (
+                    statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+                )
+                if any(isinstance(each, ast.Name) and each.id == name for each in targets):
+                    is_plain = not of.definition.bases and not self._is_dataclass(of)
+                    value = self.evaluate(statement.value, self._scope_of(of))
+                    return value if is_plain and self.is_stored_once(of, name) else UNKNOWN
+        for base in of.definition.bases:
+            found = self.evaluate(base, self._scope_of(of))
+            if isinstance(found, Class) and found is not of:
+                inherited = self.class_attribute(found, name, owner)
+                if inherited is not None:
+                    return inherited
+        return None
+
+    def _scope_of(self, of: Class) -> Scope:
+        return of.outer or Scope(of.module)
+
+    def _method(
+        self, of: Class, node: ast.FunctionDef | ast.AsyncFunctionDef, owner: Instance | None
+    ) -> Value:
+        decorators = {ast.unparse(each) for each in node.decorator_list}
+        function = Function(of.module, node, of.outer)
+        if 'staticmethod' in decorators:
+            return function
+        if 'classmethod' in decorators:
+            function.owner = of
+            return function
+        if owner is None:
+            return function
+        function.owner = owner
+        if decorators & {'property', 'cached_property', 'functools.cached_property'}:
+            return self.follow(function, Arguments(), waits=True)
+        return UNKNOWN if decorators else function
+
+    def is_stored_once(self, of: Class, name: str) -> bool:
+        """Return whether the module stores an attribute of this name in one place only."""
+        key = (id(of.module), name)
+        if key not in self.run.modules.attribute_stores:
+            self.run.modules.attribute_stores[key] = sum(
+                isinstance(node, ast.Attribute)
+                and node.attr == name
+                and not isinstance(node.ctx, ast.Load)
+                for statement in of.module.body
+                for node in ast.walk(statement)
+            )
+        return self.run.modules.attribute_stores[key] <= 1
+
+
+def kind_of(function: Function) -> FunctionKind:
+    """Return what a call of a function returns."""
+    if isinstance(function.definition, ast.Lambda):
+        return FunctionKind.PLAIN
+    return FunctionSource(function.definition).kind or FunctionKind.PLAIN
+
+
+def result_of(function: Function, scope: Scope) -> Value:
+    """Return what a call gave, from its scope at its end."""
+    returned = join([value for value, _ in scope.returned]) if scope.returned else NONE
+    kind = kind_of(function)
+    if kind is FunctionKind.COROUTINE:
+        return Awaitable(returned)
+    if kind.is_generator:
+        yielded = join([value for value, _ in scope.yielded]) if scope.yielded else UNKNOWN
+        return Generated(yielded, returned)
+    return returned

@@ -1,0 +1,339 @@
+"""Expressions: what each may be."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.message_types import item_of
+from composer.inference.operators import combine, compare, negate
+from composer.inference.scopes import Scope
+from composer.inference.values import (
+    NONE,
+    UNKNOWN,
+    Alternatives,
+    ArrayField,
+    Awaitable,
+    Constant,
+    Generated,
+    Mapping,
+    Place,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    is_chosen,
+    join,
+    truth_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from composer.inference.evaluator import Evaluator
+
+_KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
+_UNREAD = (ast.Slice,)
+
+
+class Expressions:
+    """Evaluates expressions.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def evaluate(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what an expression may be."""
+        self._evaluator.run.step()
+        method = getattr(self, f'_{type(node).__name__.lower()}', None)
+        if method is None:
+            self._evaluate_all(ast.iter_child_nodes(node), scope)
+            return UNKNOWN
+        value: Value = method(node, scope)
+        return value
+
+    def _evaluate_all(self, nodes: Iterable[ast.AST], scope: Scope) -> None:
+        for node in nodes:
+            if isinstance(node, ast.expr):
+                self.evaluate(node, scope)
+            else:
+                self._evaluate_all(ast.iter_child_nodes(node), scope)
+
+    # Names and literals
+
+    def _constant(self, node: ast.Constant, scope: Scope) -> Value:
+        if node.value is ... or isinstance(node.value, complex):
+            return UNKNOWN
+        return constant(node.value, Place(scope.module, node))
+
+    def _name(self, node: ast.Name, scope: Scope) -> Value:
+        return self._evaluator.look_up(node, scope)
+
+    def _joinedstr(self, node: ast.JoinedStr, scope: Scope) -> Value:
+        text: str | None = ''
+        chosen = False
+        for part in node.values:
+            if isinstance(part, ast.Constant):
+                value: Value = constant(part.value)
+            elif isinstance(part, ast.FormattedValue):
+                value = self.evaluate(part.value, scope)
+                if part.format_spec is not None:
+                    self.evaluate(part.format_spec, scope)
+                    value = Scalar(str, is_chosen(value))
+            else:
+                value = UNKNOWN
+            chosen |= is_chosen(value)
+            simple = isinstance(value, Constant) and isinstance(value.value, str | int | bool)
+            text = f'{text}{value.value}' if text is not None and simple else None  # type: ignore[union-attr]
+        if text is None:
+            return Scalar(str, chosen)
+        return constant(text, Place(scope.module, node), is_chosen=chosen)
+
+    def _list(self, node: ast.List | ast.Tuple | ast.Set, scope: Scope) -> Value:
+        items: list[tuple[Value, Place]] = []
+        is_open = False
+        for each in node.elts:
+            if isinstance(each, ast.Starred):
+                is_open = self._extend(items, each, scope) or is_open
+            else:
+                items.append((self.evaluate(each, scope), Place(scope.module, each)))
+        return Sequence(items, _KINDS[type(node)], is_open)
+
+    _tuple = _set = _list
+
+    def _extend(self, items: list[tuple[Value, Place]], node: ast.Starred, scope: Scope) -> bool:
+        """Add the items of `*value`; return whether there may be others."""
+        value = self.evaluate(node.value, scope)
+        if isinstance(value, Sequence) and not value.is_lost:
+            items += value.items
+            return value.is_open
+        items.append((self._evaluator.item_of(value), Place(scope.module, node)))
+        return True
+
+    def _dict(self, node: ast.Dict, scope: Scope) -> Value:
+        made = Mapping({}, depth=self._evaluator.run.conditions)
+        for key, value in zip(node.keys, node.values, strict=True):
+            held = self.evaluate(value, scope)
+            if key is None:
+                self._evaluator.calls.update_mapping(made, held, Place(scope.module, value))
+                continue
+            name = self.evaluate(key, scope)
+            if isinstance(name, Constant):
+                place = Place(scope.module, key)
+                made.set(name.value, held, place, made.depth)
+            else:
+                made.is_open = True
+        return made
+
+    # Operators
+
+    def _binop(self, node: ast.BinOp, scope: Scope) -> Value:
+        # A sum of hundreds of terms nests as deep.
+        chain = [node]
+        while isinstance(chain[-1].left, ast.BinOp):
+            chain.append(chain[-1].left)
+        value = self.evaluate(chain[-1].left, scope)
+        for each in reversed(chain):
+            right = self.evaluate(each.right, scope)
+            if isinstance(value, Mapping) and isinstance(right, Mapping):
+                value = self._merge(value, right)
+            else:
+                value = combine(each.op, value, right)
+        return value
+
+    def _merge(self, left: Mapping, right: Mapping) -> Value:
+        if left.is_lost or right.is_lost:
+            return UNKNOWN
+        entries = {**left.entries, **right.entries}
+        return Mapping(entries, left.is_open or right.is_open, self._evaluator.run.conditions)
+
+    def _unaryop(self, node: ast.UnaryOp, scope: Scope) -> Value:
+        return negate(node.op, self.evaluate(node.operand, scope))
+
+    def _compare(self, node: ast.Compare, scope: Scope) -> Value:
+        left = self.evaluate(node.left, scope)
+        chosen = False
+        for sign, operand in zip(node.ops, node.comparators, strict=True):
+            right = self.evaluate(operand, scope)
+            if isinstance(sign, ast.In | ast.NotIn):
+                self._evaluator.attributes.note_containment(
+                    left, right, Place(scope.module, node.left)
+                )
+            said = compare(sign, left, right)
+            chosen |= is_chosen(said)
+            if len(node.ops) == 1:
+                return said
+            left = right
+        return Scalar(bool, chosen)
+
+    def _boolop(self, node: ast.BoolOp, scope: Scope) -> Value:
+        """`a and b` comes to `b` if `a` is true; of `a or b`, if `a` is false."""
+        goes_on = isinstance(node.op, ast.And)
+        evaluator = self._evaluator
+        found: list[Value] = []
+        entered = []
+        for index, each in enumerate(node.values):
+            value = evaluator.evaluate(each, scope)
+            is_last = index == len(node.values) - 1
+            truth = truth_of(value)
+            if truth is None or truth != goes_on or is_last:
+                found.append(value)
+            if truth is not None and truth != goes_on:
+                break
+            if not is_last:
+                evaluator.narrow(each, scope, is_true=goes_on)
+                doubt = evaluator.run.condition(is_doubt=truth is None and is_chosen(value))
+                doubt.__enter__()
+                entered.append(doubt)
+        for doubt in entered:
+            doubt.__exit__(None, None, None)
+        kept = [
+            each
+            for value in found[:-1]
+            for each in alternatives(value)
+            if truth_of(each) is not goes_on
+        ]
+        return join([*kept, *found[-1:]])
+
+    def _ifexp(self, node: ast.IfExp, scope: Scope) -> Value:
+        evaluator = self._evaluator
+        test = evaluator.evaluate(node.test, scope)
+        truth = truth_of(test)
+        found: list[Value] = []
+        before = scope.copy_names()
+        for branch, taken in ((node.body, True), (node.orelse, False)):
+            if truth is None or truth == taken:
+                evaluator.narrow(node.test, scope, is_true=taken)
+                with evaluator.run.condition(is_doubt=truth is None and is_chosen(test)):
+                    found.append(evaluator.evaluate(branch, scope))
+                scope.names = None if before is None else dict(before)
+        value = join(found)
+        return value if isinstance(value, Alternatives) or not is_chosen(test) else value
+
+    # What is in something
+
+    def _attribute(self, node: ast.Attribute, scope: Scope) -> Value:
+        owner = self.evaluate(node.value, scope)
+        return self._evaluator.attributes.read(owner, node.attr, Place(scope.module, node))
+
+    def _subscript(self, node: ast.Subscript, scope: Scope) -> Value:
+        owner = self.evaluate(node.value, scope)
+        index = self.evaluate(node.slice, scope)
+        is_slice = isinstance(node.slice, _UNREAD)
+        place = Place(scope.module, node.slice)
+        return join(
+            self._item(each, index, place, is_slice=is_slice) for each in alternatives(owner)
+        )
+
+    def _slice(self, node: ast.Slice, scope: Scope) -> Value:
+        self._evaluate_all(ast.iter_child_nodes(node), scope)
+        return UNKNOWN
+
+    def _item(self, owner: Value, index: Value, place: Place, *, is_slice: bool) -> Value:
+        match owner:
+            case ArrayField():
+                return owner if is_slice else item_of(owner.type)
+            case Mapping() if not owner.is_lost:
+                if isinstance(index, Constant):
+                    held = owner.entries.get(index.value)
+                    return held[0] if held else UNKNOWN
+                return join([v for v, _ in owner.entries.values()] or [UNKNOWN])
+            case Sequence() if not owner.is_lost and not is_slice:
+                at = index.value if isinstance(index, Constant) and index.kind is int else None
+                if (
+                    at is not None
+                    and not owner.is_open
+                    and -len(owner.items) <= at < len(owner.items)
+                ):
+                    return owner.items[at][0]
+                return owner.item()
+            case Constant(value=str()) | Scalar():
+                if owner.kind is str:
+                    return Scalar(str, is_chosen(owner))
+        return self._evaluator.attributes.read_item(owner, index, place)
+
+    # Calls, functions and what waits
+
+    def _call(self, node: ast.Call, scope: Scope) -> Value:
+        return self._evaluator.calls.call(node, scope)
+
+    def _lambda(self, node: ast.Lambda, scope: Scope) -> Value:
+        return self._evaluator.define(node, scope)
+
+    def _await(self, node: ast.Await, scope: Scope) -> Value:
+        if isinstance(node.value, ast.Call):
+            value = self._evaluator.calls.call(node.value, scope, is_awaited=True)
+        else:
+            value = self.evaluate(node.value, scope)
+        return join(
+            each.result if isinstance(each, Awaitable) else UNKNOWN for each in alternatives(value)
+        )
+
+    def _yield(self, node: ast.Yield, scope: Scope) -> Value:
+        value = self.evaluate(node.value, scope) if node.value else NONE
+        home = self._evaluator.home_of(scope)
+        home.yielded.append((value, Place(scope.module, node.value or node)))
+        return UNKNOWN
+
+    def _yieldfrom(self, node: ast.YieldFrom, scope: Scope) -> Value:
+        value = self.evaluate(node.value, scope)
+        home = self._evaluator.home_of(scope)
+        if isinstance(value, Generated):
+            home.yielded.append((value.yielded, Place(scope.module, node.value)))
+            return value.returned
+        home.yielded.append((self._evaluator.item_of(value), Place(scope.module, node.value)))
+        return UNKNOWN
+
+    def _namedexpr(self, node: ast.NamedExpr, scope: Scope) -> Value:
+        value = self.evaluate(node.value, scope)
+        self._evaluator.home_of(scope).set(node.target.id, value)
+        scope.set(node.target.id, value)
+        return value
+
+    def _starred(self, node: ast.Starred, scope: Scope) -> Value:
+        return self.evaluate(node.value, scope)
+
+    # Comprehensions
+
+    def _listcomp(self, node: ast.ListComp | ast.SetComp, scope: Scope) -> Value:
+        kind = list if isinstance(node, ast.ListComp) else set
+        inner = self._loop_over(node.generators, scope)
+        with self._evaluator.run.condition():
+            value = self.evaluate(node.elt, inner)
+        return Sequence([(value, Place(scope.module, node.elt))], kind, is_open=True)
+
+    _setcomp = _listcomp
+
+    def _generatorexp(self, node: ast.GeneratorExp, scope: Scope) -> Value:
+        inner = self._loop_over(node.generators, scope)
+        with self._evaluator.run.condition():
+            return Generated(self.evaluate(node.elt, inner), NONE)
+
+    def _dictcomp(self, node: ast.DictComp, scope: Scope) -> Value:
+        inner = self._loop_over(node.generators, scope)
+        made = Mapping({}, is_open=True, depth=self._evaluator.run.conditions)
+        with self._evaluator.run.condition():
+            keys = self.evaluate(node.key, inner)
+            value = self.evaluate(node.value, inner)
+        for key in alternatives(keys):
+            if isinstance(key, Constant):
+                made.set(key.value, value, Place(scope.module, node.key), made.depth)
+        return made
+
+    def _loop_over(self, generators: list[ast.comprehension], scope: Scope) -> Scope:
+        """Return the scope of a comprehension, in which its names stand for its items."""
+        inner = Scope(scope.module, scope.function, outer=scope, waits=scope.waits)
+        for generator in generators:
+            item = self._evaluator.item_of(self.evaluate(generator.iter, inner))
+            names = {each.id for each in ast.walk(generator.target) if isinstance(each, ast.Name)}
+            inner.local |= names
+            self._evaluator.statements.store(generator.target, item, inner)
+            for test in generator.ifs:
+                self.evaluate(test, inner)
+                self._evaluator.narrow(test, inner, is_true=True)
+        return inner

@@ -1,0 +1,100 @@
+"""What the types of messages have: fields, parts, and what fits into them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.inference.values import (
+    UNKNOWN,
+    ArrayField,
+    Message,
+    Scalar,
+    Value,
+)
+from composer.interfaces.descriptions import (
+    ActionDescription,
+    MessageDescription,
+    ServiceDescription,
+)
+
+if TYPE_CHECKING:
+    from composer.interfaces.catalogue import InterfaceCatalogue
+    from composer.interfaces.descriptions import FieldType
+
+PARTS = ('Request', 'Response', 'Goal', 'Result', 'Feedback')
+_PYTHON_TYPES: dict[str, type] = {
+    'bool': bool,
+    'byte': bytes,
+    'float32': float,
+    'float64': float,
+    'string': str,
+    'wstring': str,
+}
+
+
+class MessageTypes:
+    """The types of messages that behaviours meet."""
+
+    def __init__(self, catalogue: InterfaceCatalogue) -> None:
+        self.catalogue = catalogue
+        self._found: dict[str, MessageDescription | None] = {}
+
+    def describe(self, name: str) -> MessageDescription | None:
+        """Describe a message, or a part of a service or action: `std_srvs/srv/SetBool_Request`."""
+        if name not in self._found:
+            self._found[name] = self._describe(name)
+        return self._found[name]
+
+    def _describe(self, name: str) -> MessageDescription | None:
+        whole, part = split_part(name)
+        description = self.catalogue.describe(whole)
+        if isinstance(description, ServiceDescription | ActionDescription):
+            return getattr(description, part.lower(), None) if part else None
+        return description if isinstance(description, MessageDescription) else None
+
+    def are_alike(self, one: str, other: str) -> bool:
+        """Return whether two types are the same for a behaviour.
+
+        Types of one name in two packages are the same if they have the same fields, or if their
+        fields are unknown: the examples of ROS come in several packages.
+        """
+        if one == other:
+            return True
+        if one.rpartition('/')[2] != other.rpartition('/')[2]:
+            return False
+        first, second = self.describe(one), self.describe(other)
+        return first is None or second is None or _fields(first) == _fields(second)
+
+
+def _fields(description: MessageDescription) -> list[tuple[str, str]]:
+    return [(field.name, str(field.type)) for field in description.fields]
+
+
+def split_part(name: str) -> tuple[str, str]:
+    """Return an interface and its part, which is empty for a message."""
+    whole, _, part = name.rpartition('_')
+    return (whole, part) if part in PARTS else (name, '')
+
+
+def in_python(name: str) -> str:
+    """Return `std_srvs/srv/SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
+    whole, part = split_part(name)
+    return f'{whole}.{part}' if part else whole
+
+
+def value_of(field_type: FieldType) -> Value:
+    """Return what a field holds when it is read."""
+    if field_type.array:
+        return ArrayField(field_type)
+    if field_type.nested:
+        return Message(field_type.nested)
+    return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
+
+
+def item_of(field_type: FieldType) -> Value:
+    """Return what an item of an array is when it is read."""
+    # NumPy's numbers come out of arrays of numbers.
+    nested = field_type.nested
+    if nested:
+        return Message(nested)
+    return Scalar(str) if field_type.kind in ('string', 'wstring') else UNKNOWN

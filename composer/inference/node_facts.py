@@ -1,0 +1,69 @@
+"""What the file says of a node, for the reading of its behaviours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from composer.inference.values import CHOSEN, UNKNOWN, Scalar, Value, constant
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from composer.language.specs import EndSpec, NodeSpec
+
+# Questions and their answers.
+Log = dict[tuple[str, str], object]
+_PYTHON_TYPES: dict[str, type] = {'bool': bool, 'integer': int, 'double': float, 'string': str}
+
+
+@dataclass(slots=True)
+class NodeFacts:
+    """Answers of one node, all of which are noted: for another node that gives the same ones, the
+    reading of a behaviour is the same.
+
+    Args:
+        has_real_type: Whether the type of an entity is the one that is meant.
+    """
+
+    node: NodeSpec
+    has_real_type: Callable[[EndSpec], bool]
+    log: Log = field(default_factory=dict)
+
+    def type_of(self, section: str, name: str) -> str | None:
+        """Return the type of an entity; `None` if there is none, or none that is known."""
+        return self._ask(section, name)  # type: ignore[return-value]
+
+    def value_of_parameter(self, name: str) -> Value:
+        """Return what a parameter may be: the value that it starts with, or another one."""
+        return self._ask('parameter', name)  # type: ignore[return-value]
+
+    def name(self) -> Value:
+        """Return the name of the node."""
+        return self._ask('name', '')  # type: ignore[return-value]
+
+    def agrees_with(self, log: Log) -> bool:
+        """Return whether this node answers as another one did."""
+        return all(self._answer(*question) == answer for question, answer in log.items())
+
+    def _ask(self, topic: str, name: str) -> object:
+        answer = self.log[topic, name] = self._answer(topic, name)
+        return answer
+
+    def _answer(self, topic: str, name: str) -> object:
+        if topic == 'name':
+            return constant(self.node.name, is_chosen=True)
+        if topic == 'parameter':
+            return self._answer_parameter(name)
+        entity: Any = getattr(self.node, topic).get(name)
+        return entity.type if entity is not None and self.has_real_type(entity) else None
+
+    def _answer_parameter(self, name: str) -> Value:
+        parameter = self.node.parameters.get(name)
+        if parameter is None:
+            return UNKNOWN
+        if isinstance(parameter.value, bool | int | float | str):
+            return constant(parameter.value, is_chosen=True)
+        kind = _PYTHON_TYPES.get(parameter.type or '')
+        return Scalar(kind, is_chosen=True) if kind else CHOSEN

@@ -1,0 +1,179 @@
+"""Operators: what comes out of `+`, `<`, `not` and the like."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from typing import TYPE_CHECKING, Any
+
+from composer.inference.values import (
+    CHOSEN,
+    UNKNOWN,
+    Constant,
+    Mapping,
+    Message,
+    MessageClass,
+    NodeValue,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    is_chosen,
+    join,
+    truth_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+}
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+_BITS = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
+_NUMBERS = (bool, int, float)
+# Larger numbers and longer texts are not computed.
+_GREATEST = 2**64
+_LONGEST = 200
+# What an operator may meet in pairs.
+_MOST_PAIRS = 16
+
+
+def combine(sign: ast.operator, left: Value, right: Value) -> Value:
+    """Return what a binary operator makes of two values."""
+    pairs = [(one, other) for one in alternatives(left) for other in alternatives(right)]
+    if len(pairs) > _MOST_PAIRS:
+        return UNKNOWN
+    return join(_combine(sign, *pair) for pair in pairs)
+
+
+def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
+    chosen = is_chosen(left) or is_chosen(right)
+    if isinstance(left, Constant) and isinstance(right, Constant):
+        compute = _ARITHMETIC.get(type(sign))
+        if compute and _is_small(left.value) and _is_small(right.value):
+            try:
+                return constant(compute(left.value, right.value), is_chosen=chosen)
+            except (ArithmeticError, TypeError, ValueError):
+                return CHOSEN if chosen else UNKNOWN
+    kinds = (_kind(left), _kind(right))
+    result = _result(sign, *kinds)
+    if result is not None:
+        return Scalar(result, chosen)
+    return CHOSEN if chosen else UNKNOWN
+
+
+def _is_small(value: object) -> bool:
+    if isinstance(value, str):
+        return len(value) < _LONGEST
+    return isinstance(value, _NUMBERS) and (value != value or abs(value) < _GREATEST)  # noqa: PLR0124
+
+
+def _kind(value: Value) -> type | None:
+    return value.kind if isinstance(value, Constant | Scalar) else None
+
+
+def _result(sign: ast.operator, left: type | None, right: type | None) -> type | None:
+    if left is str and isinstance(sign, ast.Mod):
+        return str
+    if left is None or right is None:
+        return None
+    if left is str and right is str and isinstance(sign, ast.Add):
+        return str
+    if left not in _NUMBERS or right not in _NUMBERS:
+        return None
+    if isinstance(sign, _BITS):
+        return int if int in (left, right) else None
+    if isinstance(sign, ast.Div) or float in (left, right):
+        return float
+    return int if type(sign) in _ARITHMETIC else None
+
+
+def negate(sign: ast.unaryop, value: Value) -> Value:
+    """Return what a unary operator makes of a value."""
+    if isinstance(sign, ast.Not):
+        truth = truth_of(value)
+        if truth is None:
+            return Scalar(bool, is_chosen(value))
+        return constant(not truth, is_chosen=is_chosen(value))
+    return join(_negate(sign, each) for each in alternatives(value))
+
+
+def _negate(sign: ast.unaryop, value: Value) -> Value:
+    if isinstance(value, Constant) and value.kind in (int, float):
+        if isinstance(sign, ast.USub):
+            return Constant(value.kind, -value.value, value.is_chosen, value.origin)
+        if isinstance(sign, ast.UAdd):
+            return value
+    if isinstance(value, Scalar) and value.kind in (int, float):
+        return value
+    return UNKNOWN
+
+
+def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
+    """Return what a comparison says, as far as it is known."""
+    known = _compare(sign, left, right)
+    chosen = is_chosen(left) or is_chosen(right)
+    return Scalar(bool, chosen) if known is None else constant(known, is_chosen=chosen)
+
+
+def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:
+    if isinstance(sign, ast.Is | ast.IsNot):
+        same = _is_same(left, right)
+        return None if same is None else same == isinstance(sign, ast.Is)
+    if isinstance(sign, ast.In | ast.NotIn):
+        held = _is_in(left, right)
+        return None if held is None else held == isinstance(sign, ast.In)
+    if isinstance(left, Constant) and isinstance(right, Constant):
+        try:
+            return bool(_COMPARISONS[type(sign)](left.value, right.value))
+        except TypeError:
+            return None
+    return None
+
+
+def _is_same(left: Value, right: Value) -> bool | None:
+    """Return whether two values are one: of interest for `None`, and for classes."""
+    pairs = {_are_one(one, other) for one in alternatives(left) for other in alternatives(right)}
+    return pairs.pop() if len(pairs) == 1 else None
+
+
+def _are_one(left: Value, right: Value) -> bool | None:
+    if isinstance(left, Constant) and isinstance(right, Constant):
+        singletons = (None, True, False)
+        known = left.value in singletons and right.value in singletons
+        return left == right if known or left.kind is not right.kind else None
+    for one, other in ((left, right), (right, left)):
+        if isinstance(one, Constant) and one.value is None:
+            certain = (Message, MessageClass, NodeValue, Mapping, Sequence)
+            return False if isinstance(other, certain) else None
+    if isinstance(left, MessageClass) and isinstance(right, MessageClass):
+        return left == right
+    return None
+
+
+def _is_in(item: Value, container: Value) -> bool | None:
+    if not isinstance(item, Constant):
+        return None
+    if isinstance(container, Constant) and isinstance(container.value, str):
+        return item.value in container.value if isinstance(item.value, str) else None
+    if isinstance(container, Mapping) and not container.is_lost:
+        return True if item.value in container.entries else None if container.is_open else False
+    if isinstance(container, Sequence) and not (container.is_lost or container.is_open):
+        values = [value for value, _ in container.items]
+        if all(isinstance(value, Constant) for value in values):
+            return item in values
+    return None

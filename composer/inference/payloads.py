@@ -1,0 +1,270 @@
+"""Payloads: whether what a behaviour gives away can become a message of the type it has to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from composer.inference.message_types import in_python
+from composer.inference.values import (
+    ArrayField,
+    Constant,
+    Mapping,
+    Message,
+    NodeValue,
+    PartOfNode,
+    Place,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+)
+from composer.interfaces.field_errors import (
+    FieldError,
+    format_field_error,
+    no_message,
+    unknown_field,
+)
+from composer.interfaces.field_values import (
+    INTEGER_RANGES,
+    OCTET_KINDS,
+    check_length,
+    read_items,
+    scalar_reader,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.inference.evaluator import Evaluator
+    from composer.inference.message_types import MessageTypes
+    from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
+
+_FLOATS = ('float32', 'float64')
+_TEXTS = ('string', 'wstring')
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """A value that does not fit, and where it is written."""
+
+    rule: str
+    message: str
+    place: Place
+    help: str | None = None
+
+
+class Payloads:
+    """Checks payloads.
+
+    Args:
+        evaluator: Knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def check(self, type_name: str | None, value: Value, place: Place) -> None:
+        """Check what becomes a message: a message, a mapping or a bare value."""
+        if type_name is None:
+            return
+        fit = _Fit(type_name, self._evaluator.run.types)
+        self._report(fit.message(type_name, each, place, ()) for each in alternatives(value))
+
+    def check_field(
+        self, type_name: str, field: FieldDescription, value: Value, place: Place
+    ) -> None:
+        """Check what a field of a message is to hold."""
+        fit = _Fit(type_name, self._evaluator.run.types)
+        self._report(
+            fit.field(field.type, each, place, (field.name,)) for each in alternatives(value)
+        )
+
+    def _report(self, several: Iterator[Iterator[Misfit]]) -> None:
+        """Report what does not fit, if none of the alternatives does."""
+        found = [list(misfits) for misfits in several]
+        if not all(found):
+            return
+        for misfit in found[0]:
+            self._evaluator.run.report(misfit.rule, misfit.place, misfit.message, misfit.help)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Compares values with the types of a message."""
+
+    root: str
+    types: MessageTypes
+
+    def message(
+        self, type_name: str, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
+        description = self.types.describe(type_name)
+        if description is None:
+            return
+        match value:
+            case Message():
+                yield from self._other_message(description, value, place, path)
+            case Mapping() if not value.is_lost:
+                yield from self._entries(description, value, path)
+            case Mapping() | NodeValue() | PartOfNode(name='time'):
+                return
+            case Constant() | Scalar() | Sequence() | ArrayField() | PartOfNode():
+                yield from self._bare(description, value, place, path)
+
+    def _other_message(
+        self,
+        description: MessageDescription,
+        value: Message,
+        place: Place,
+        path: tuple[str | int, ...],
+    ) -> Iterator[Misfit]:
+        fields = description.fields
+        if self.types.are_alike(value.type, description.name):
+            return
+        if len(fields) == 1 and fields[0].type.nested:
+            yield from self.field(fields[0].type, value, place, (*path, fields[0].name))
+            return
+        error = no_message(description.name, None, [field.name for field in fields])
+        text = f'expected {in_python(description.name)}, got {in_python(value.type)}'
+        yield self._misfit('field-type', text, place, path, error.help)
+
+    def _entries(
+        self, description: MessageDescription, value: Mapping, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
+        names = [field.name for field in description.fields]
+        for key, (held, place) in value.entries.items():
+            field = description.field(key) if isinstance(key, str) else None
+            if field is None:
+                error = unknown_field(description.name, key, names)
+                yield self._misfit('unknown-field', str(error), place, path, error.help)
+                continue
+            several = [
+                list(self.field(field.type, each, place, (*path, field.name)))
+                for each in alternatives(held)
+            ]
+            if all(several):
+                yield from several[0]
+
+    def _bare(
+        self,
+        description: MessageDescription,
+        value: Value,
+        place: Place,
+        path: tuple[str | int, ...],
+    ) -> Iterator[Misfit]:
+        """Compare the bare value of a message with a single field."""
+        fields = description.fields
+        if len(fields) == 1:
+            yield from self.field(fields[0].type, value, place, (*path, fields[0].name))
+        elif fields or value != Constant(type(None), None):
+            error = no_message(description.name, None, [field.name for field in fields])
+            text = f'expected {in_python(description.name)}, got {_shown(value)}'
+            yield self._misfit('field-type', text, place, path, error.help)
+
+    def field(
+        self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
+        """Yield what keeps a value from being held by a field."""
+        if field_type.array:
+            yield from self._array(field_type, value, place, path)
+        elif field_type.nested:
+            yield from self.message(field_type.nested, value, place, path)
+        else:
+            yield from self._scalar(field_type, value, place, path)
+
+    def _array(
+        self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
+        match value:
+            case Sequence() if not value.is_lost and value.kind is not set:
+                if not value.is_open:
+                    yield from self._tried(
+                        lambda: check_length(field_type, len(value.items)), place, path
+                    )
+                for index, (item, where) in enumerate(value.items):
+                    several = [
+                        list(self.field(field_type.item, each, where, (*path, index)))
+                        for each in alternatives(item)
+                    ]
+                    if all(several):
+                        yield from several[0]
+            case Constant():
+                yield from self._tried(lambda: read_items(field_type, value.value), place, path)
+            case Scalar() if value.kind is not bytes or field_type.kind not in OCTET_KINDS:
+                yield self._wrong(field_type, value, place, path)
+            case ArrayField():
+                is_text = field_type.kind in _TEXTS, value.type.kind in _TEXTS
+                nested = field_type.nested, value.type.nested
+                if is_text[0] != is_text[1] or (nested[0] is None) != (nested[1] is None) or (nested[0] and nested[1] and not self.types.are_alike(nested[0], nested[1])):
+                    yield self._wrong(field_type, value, place, path)
+            case Message() | Mapping():
+                if isinstance(value, Message) or not value.is_lost:
+                    yield self._wrong(field_type, value, place, path)
+
+    def _scalar(
+        self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
+        match value:
+            case Constant():
+                yield from self._tried(lambda: scalar_reader(field_type)(value.value), place, path)
+            case Scalar():
+                if not _may_hold(field_type.kind, value.kind):
+                    yield self._wrong(field_type, value, place, path)
+            case Message() | ArrayField() | Mapping() | Sequence() | PartOfNode():
+                if not getattr(value, 'is_lost', False):
+                    yield self._wrong(field_type, value, place, path)
+
+    def _tried(self, read: object, place: Place, path: tuple[str | int, ...]) -> Iterator[Misfit]:
+        try:
+            read()  # type: ignore[operator]
+        except FieldError as error:
+            yield self._misfit(error.rule, str(error), place, path, error.help)
+
+    def _wrong(
+        self, expected: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Misfit:
+        text = f'expected {expected}, got {_shown(value)}'
+        return self._misfit('field-type', text, place, path)
+
+    def _misfit(
+        self,
+        rule: str,
+        text: str,
+        place: Place,
+        path: tuple[str | int, ...],
+        help_text: str | None = None,
+    ) -> Misfit:
+        message = format_field_error(self.root, path, text)
+        return Misfit(rule, message.replace(self.root, in_python(self.root)), place, help_text)
+
+
+def _may_hold(kind: str, given: type) -> bool:
+    """Return whether a field of a kind may hold some value of a type of Python."""
+    if kind in _FLOATS:
+        return given in (int, float)
+    if kind in _TEXTS:
+        return given is str
+    if kind == 'bool':
+        return given is bool
+    return given is int or (kind == 'byte' and given is bytes and kind in INTEGER_RANGES)
+
+
+def _shown(value: Value) -> str:
+    """Return a value in a few words."""
+    match value:
+        case Constant():
+            return 'None' if value.value is None else f'{value.kind.__name__} {value.value!r}'
+        case Scalar():
+            return value.kind.__name__
+        case Message():
+            return in_python(value.type)
+        case ArrayField():
+            return f'an array: {value.type}'
+        case Mapping():
+            return 'dict'
+        case Sequence():
+            return value.kind.__name__
+        case PartOfNode():
+            return f'a {value.name}'
+    return type(value).__name__

@@ -1,0 +1,191 @@
+"""What the names at the top of a module stand for."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import sys
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from composer.inference.values import UNKNOWN, External, Value
+from composer.python_source.modules import ModuleSource
+from composer.python_source.syntax import BLOCKS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from composer.python_source.module_finder import ModuleFinder
+
+_INSTALLED = {'site-packages', 'dist-packages'}
+_BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+# Methods that change what they are called on.
+_CHANGING = {'add', 'append', 'clear', 'extend', 'insert', 'pop', 'remove', 'setdefault', 'update'}
+
+
+class TopNames:
+    """The names that the statements of a module store, without those that may change later."""
+
+    def __init__(self, body: Iterable[ast.stmt]) -> None:
+        self.statements: dict[str, list[tuple[ast.AST, bool]]] = {}
+        self.is_open = False
+        self._body = list(body)
+        pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(self._body)]
+        while pending:
+            statement, is_conditional = pending.pop()
+            for name in self._stored(statement):
+                self.statements.setdefault(name, []).append((statement, is_conditional))
+            if not isinstance(statement, _BINDING):
+                blocks = (getattr(statement, name, ()) for name in BLOCKS)
+                pending += [(each, True) for block in blocks for each in block]
+
+    def _stored(self, statement: ast.AST) -> Iterator[str]:
+        if isinstance(statement, _BINDING):
+            yield statement.name
+            self.is_open |= statement.name == '__getattr__'
+        elif isinstance(statement, ast.Import | ast.ImportFrom):
+            for alias in statement.names:
+                self.is_open |= alias.name == '*'
+                yield alias.asname or alias.name.partition('.')[0]
+        elif isinstance(statement, ast.ExceptHandler):
+            yield from filter(None, [statement.name])
+        elif not isinstance(statement, ast.match_case):
+            for node in _own(statement):
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                    yield node.id
+
+    @cached_property
+    def changed(self) -> frozenset[str]:
+        """Names that functions store, and those whose values are changed somewhere."""
+        found: set[str] = set()
+        for node in (each for statement in self._body for each in ast.walk(statement)):
+            match node:
+                case ast.Global(names=names):
+                    found |= set(names)
+                case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
+                    found.add(name)
+                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
+                    if method in _CHANGING:
+                        found.add(name)
+                case ast.AugAssign(target=ast.Name(id=name)):
+                    found.add(name)
+        return frozenset(found)
+
+
+def _own(statement: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a statement without those of the statements in it."""
+    pending: list[ast.AST] = [statement]
+    while pending:
+        node = pending.pop()
+        yield node
+        pending += [
+            each
+            for each in ast.iter_child_nodes(node)
+            if not isinstance(each, ast.stmt | ast.ExceptHandler | ast.match_case)
+        ]
+
+
+class ProjectModules:
+    """The modules of the project, and the names at their tops."""
+
+    def __init__(self, finder: ModuleFinder) -> None:
+        self._finder = finder
+        self._names: dict[int, str] = {}
+        self._tops: dict[int, TopNames] = {}
+        self._values: dict[tuple[int, str], Value] = {}
+        self._under_way: set[tuple[int, str]] = set()
+        # How often the code of a module stores an attribute of a name.
+        self.attribute_stores: dict[tuple[int, str], int] = {}
+
+    def find(self, name: str) -> ModuleSource | None:
+        """Return a module of the project, if it is one and can be read."""
+        module = self._finder.find(name)
+        if not isinstance(module, ModuleSource) or not is_of_project(module):
+            return None
+        self._names.setdefault(id(module), name)
+        return module
+
+    def top(self, module: ModuleSource) -> TopNames:
+        """Return the names at the top of a module."""
+        if id(module) not in self._tops:
+            self._tops[id(module)] = TopNames(module.body)
+        return self._tops[id(module)]
+
+    def has_name(self, module: ModuleSource, name: str) -> bool:
+        """Return whether a name may exist in a module."""
+        top = self.top(module)
+        known = name in top.statements or hasattr(builtins, name) or name in top.changed
+        return known or top.is_open or name.startswith('__')
+
+    def value(
+        self, module: ModuleSource, name: str, evaluate: Callable[[ast.AST, bool], Value]
+    ) -> Value:
+        """Return what a name at the top of a module stands for.
+
+        Args:
+            evaluate: Returns what a statement stores under the name.
+        """
+        key = (id(module), name)
+        if key in self._values:
+            return self._values[key]
+        if key in self._under_way:
+            return UNKNOWN
+        top = self.top(module)
+        statements = top.statements.get(name, [])
+        if not statements:
+            return External(f'builtins.{name}') if _is_builtin(top, name) else UNKNOWN
+        statement, is_conditional = statements[0]
+        is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+        # Of `try: import x`, and imports for type checkers, the first one counts.
+        is_known = len(statements) == 1 and (not is_conditional or is_import)
+        if not is_known or name in top.changed:
+            return UNKNOWN
+        self._under_way.add(key)
+        try:
+            self._values[key] = evaluate(statement, is_conditional)
+        finally:
+            self._under_way.discard(key)
+        return self._values[key]
+
+    def imported(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
+        """Return the full name of what an import stores under a name; empty if unknown."""
+        if isinstance(statement, ast.Import):
+            full = (alias.name for alias in statement.names if alias.asname == name)
+            return next(full, name)
+        if not isinstance(statement, ast.ImportFrom):
+            return ''
+        home = statement.module or ''
+        if statement.level:
+            base = self._names.get(id(module), '').split('.')
+            is_package = module.path is not None and module.path.name == '__init__.py'
+            kept = base[: len(base) - statement.level + is_package]
+            home = '.'.join([*kept, *filter(None, [home])])
+        for alias in statement.names:
+            if home and (alias.asname or alias.name) == name:
+                return f'{home}.{alias.name}'
+        return ''
+
+    def split(self, dotted: str) -> tuple[ModuleSource | None, str]:
+        """Return the module of the project with this full name, and the name in it, if any.
+
+        The module is `None` for what is not of the project.
+        """
+        top_level, _, _ = dotted.partition('.')
+        if top_level in sys.stdlib_module_names or top_level == 'rclpy':
+            return None, ''
+        if (module := self.find(dotted)) is not None:
+            return module, ''
+        home, _, name = dotted.rpartition('.')
+        return (self.find(home), name) if home else (None, '')
+
+
+def is_of_project(module: ModuleSource) -> bool:
+    """Return whether a module is neither installed nor of Python itself."""
+    if module.path is None or not module.body:
+        return False
+    parts = set(module.path.parts)
+    return not (parts & _INSTALLED) and not module.path.is_relative_to(sys.base_prefix)
+
+
+def _is_builtin(top: TopNames, name: str) -> bool:
+    return not top.is_open and hasattr(builtins, name)

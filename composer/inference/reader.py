@@ -1,0 +1,176 @@
+"""Read behaviours: each once for all nodes that say the same of what it uses."""
+
+from __future__ import annotations
+
+from collections import abc
+from typing import TYPE_CHECKING
+
+from composer.inference.evaluator import Evaluator, kind_of
+from composer.inference.message_types import MessageTypes
+from composer.inference.node_facts import Log, NodeFacts
+from composer.inference.project_modules import ProjectModules, is_of_project
+from composer.inference.reading import Reading, unknown_reading
+from composer.inference.run import Run, TooLongError
+from composer.inference.values import (
+    CHOSEN,
+    NODE,
+    NONE,
+    UNKNOWN,
+    Argument,
+    Arguments,
+    Function,
+    Instance,
+    Mapping,
+    Message,
+    Partial,
+    Place,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    join,
+)
+from composer.inference.wires import Wire, wire_of
+from composer.python_source.modules import FunctionKind, ModuleSource
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.inference.scopes import Scope
+    from composer.interfaces.catalogue import InterfaceCatalogue
+    from composer.language.bindings import Binding
+    from composer.language.specs import EndSpec, NodeSpec
+    from composer.python_source.module_finder import ModuleFinder
+
+
+class BehaviourReader:
+    """Reads what behaviours do.
+
+    Args:
+        has_real_type: Whether the type of an entity is the one that is meant.
+    """
+
+    def __init__(
+        self,
+        modules: ModuleFinder,
+        catalogue: InterfaceCatalogue,
+        has_real_type: Callable[[EndSpec], bool],
+    ) -> None:
+        self._finder = modules
+        self._modules = ProjectModules(modules)
+        self._types = MessageTypes(catalogue)
+        self._has_real_type = has_real_type
+        self._read: dict[object, list[tuple[Log, Reading]]] = {}
+
+    def read(self, node: NodeSpec, binding: Binding) -> Reading:
+        """Return what a behaviour does with its node."""
+        facts = NodeFacts(node, self._has_real_type)
+        wire = wire_of(binding, facts)
+        key = (binding.behaviour.name, wire, _frozen(binding.behaviour.arguments))
+        known = self._read.setdefault(key, [])
+        for log, reading in known:
+            if facts.agrees_with(log):
+                return reading
+        reading = self._read_anew(binding, facts, wire)
+        known.append((facts.log, reading))
+        return reading
+
+    def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:
+        module = self._finder.find(binding.behaviour.module)
+        if not isinstance(module, ModuleSource):
+            # Another check reports it.
+            return Reading()
+        if not is_of_project(module):
+            return unknown_reading()
+        self._modules.find(binding.behaviour.module)
+        run = Run(facts, self._modules, self._types)
+        try:
+            _follow(run, module, binding, wire)
+        except (TooLongError, RecursionError):
+            return unknown_reading()
+        run.reading.settle()
+        return run.reading
+
+
+def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> None:
+    """Read a behaviour, and check the payloads that it gives away."""
+    evaluator = Evaluator(run)
+    behaviour = binding.behaviour
+    if not run.modules.has_name(module, behaviour.function):
+        return
+    function = _function_of(evaluator, evaluator.top_value(module, behaviour.function))
+    if function is None:
+        run.reading.open_all()
+        return
+    callee, bound = function
+    place = Place(module, callee.definition)
+    given: Value = Message(wire.given) if wire.given else UNKNOWN
+    positional = [NODE, given][: len(binding.parameters)]
+    named = [(name, _of_file(value, place)) for name, value in behaviour.arguments.items()]
+    arguments = Arguments(
+        (*bound.positional, *(Argument(value, place) for value in positional)),
+        (*bound.named, *((name, Argument(value, place)) for name, value in named)),
+    )
+    callee.is_read = True
+    scope = evaluator.enter(callee, arguments, waits=True)
+    _check_payloads(evaluator, callee, scope, wire)
+
+
+def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Arguments] | None:
+    """Return the function that a behaviour is, and the arguments that it has already."""
+    match value:
+        case Function():
+            return value, Arguments()
+        case Partial():
+            inner = _function_of(evaluator, value.function)
+            if inner is None or inner[1] != Arguments():
+                return None
+            return inner[0], value.arguments
+        case Instance():
+            method = evaluator.class_attribute(value.of, '__call__', value)
+            return (method, Arguments()) if isinstance(method, Function) else None
+    return None
+
+
+def _of_file(value: object, place: Place) -> Value:
+    """Return the value of an argument under `with:`."""
+    if isinstance(value, list | tuple):
+        return Sequence([(_of_file(each, place), place) for each in value], list)
+    if isinstance(value, abc.Mapping):
+        return Mapping({key: (_of_file(each, place), place) for key, each in value.items()})
+    if value is None or isinstance(value, bool | int | float | str):
+        return constant(value, is_chosen=True)
+    return CHOSEN
+
+
+def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire) -> None:
+    kind = kind_of(callee)
+    is_generator = kind.is_generator
+    returned = wire.ended if is_generator else wire.returned
+    if kind is FunctionKind.ASYNC_GENERATOR:
+        # The last one that it yields is the result.
+        return
+    for value, place in scope.yielded if is_generator else ():
+        _check(evaluator, wire.yielded, value, place)
+    for value, place in scope.returned:
+        _check(evaluator, returned, value, place)
+    nothing = all(value == NONE for value, _ in scope.returned)
+    if wire.needs_payload and wire.returned and scope.returned and nothing and not is_generator:
+        _, place = scope.returned[-1]
+        evaluator.payloads.check(wire.returned, NONE, place)
+
+
+def _check(evaluator: Evaluator, type_name: str | None, value: Value, place: Place) -> None:
+    """Check a payload; none is published for `None`."""
+    several = [each for each in alternatives(value) if each != NONE]
+    if several:
+        evaluator.payloads.check(type_name, join(several), place)
+
+
+def _frozen(value: object) -> object:
+    """Return something that can be compared by a dictionary."""
+    if isinstance(value, abc.Mapping):
+        return tuple((key, _frozen(each)) for key, each in value.items())
+    if isinstance(value, list | tuple):
+        return tuple(map(_frozen, value))
+    return (type(value), value)

@@ -1,0 +1,166 @@
+"""One reading under way: what all its parts share."""
+
+from __future__ import annotations
+
+import ast
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Span
+from composer.inference.reading import NodeUse, Problem, Reading, StateUse
+from composer.inference.values import Place, is_chosen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.inference.message_types import MessageTypes
+    from composer.inference.node_facts import NodeFacts
+    from composer.inference.project_modules import ProjectModules
+    from composer.inference.values import Argument, Value
+
+# What one behaviour may take: statements and expressions, helpers included.
+_MOST_STEPS = 60_000
+
+
+class TooLongError(Exception):
+    """A behaviour is too long, or branches too often, to be followed."""
+
+
+class Run:
+    """A reading of one behaviour.
+
+    Attributes:
+        doubts: The number of conditions around the place that only the file decides.
+        guards: The number of statements around it that catch what a wrong name raises.
+        conditions: The number of conditions around it.
+        is_silent: Whether the place is read once more later.
+    """
+
+    def __init__(self, facts: NodeFacts, modules: ProjectModules, types: MessageTypes) -> None:
+        self.facts = facts
+        self.modules = modules
+        self.types = types
+        self.reading = Reading()
+        self.doubts = 0
+        self.guards = 0
+        self.conditions = 0
+        self.is_silent = False
+        self._steps = 0
+
+    def step(self) -> None:
+        """Count a step.
+
+        Raises:
+            TooLongError: There were too many.
+        """
+        self._steps += 1
+        if self._steps > _MOST_STEPS:
+            raise TooLongError
+
+    @contextmanager
+    def condition(self, *, is_doubt: bool = False) -> Iterator[None]:
+        """Note what is read meanwhile as read on a condition."""
+        self.conditions += 1
+        self.doubts += is_doubt
+        try:
+            yield
+        finally:
+            self.conditions -= 1
+            self.doubts -= is_doubt
+
+    @contextmanager
+    def guard(self, *, is_guard: bool) -> Iterator[None]:
+        """Note what is read meanwhile as guarded, if it is."""
+        self.guards += is_guard
+        try:
+            yield
+        finally:
+            self.guards -= is_guard
+
+    @contextmanager
+    def silence(self) -> Iterator[None]:
+        """Report nothing meanwhile."""
+        before, self.is_silent = self.is_silent, True
+        try:
+            yield
+        finally:
+            self.is_silent = before
+
+    def report(self, rule: str, place: Place, message: str, help_text: str | None = None) -> None:
+        """Note a problem, unless the behaviour is ready for it.
+
+        Where only the file decides whether the place is reached, it has to look like a typo: then
+        `help_text` begins with what may have been meant.
+        """
+        if self.guards or self.is_silent:
+            return
+        if self.doubts and not (help_text or '').startswith('did you mean'):
+            return
+        self.reading.problems.append(Problem(rule, message, span_of(place), help_text))
+
+    def use(
+        self,
+        kind: str,
+        name: str,
+        place: Place,
+        *,
+        is_optional: bool = False,
+        has_default: bool = False,
+        waits: bool = False,
+    ) -> None:
+        """Note the use of an entity by its name."""
+        self.reading.uses.append(
+            NodeUse(
+                kind,
+                name,
+                span_of(place, name),
+                is_optional=is_optional,
+                has_default=has_default,
+                is_certain=not self.doubts,
+                is_guarded=bool(self.guards),
+                waits=waits,
+            )
+        )
+
+    def use_state(self, name: str, place: Place, *, is_guarded: bool = False) -> None:
+        """Note that a name of `node.state` is read."""
+        guarded = is_guarded or bool(self.guards or self.doubts)
+        self.reading.state_read.append(StateUse(name, span_of(place, name), guarded))
+
+
+def name_place(argument: Argument, value: Value) -> Place:
+    """Return where a name is written: the constant itself, or where it is used."""
+    origin = getattr(value, 'origin', None)
+    return argument.place if origin is None or is_chosen(value) else origin
+
+
+def span_of(place: Place, name: str = '') -> Span:
+    """Return the characters of an expression on its last line; of a text, those of its content.
+
+    Args:
+        name: What to mark in it: the text, or the last name of a chain of attributes.
+    """
+    node, module = place.node, place.module
+    line: int = getattr(node, 'end_lineno', None) or getattr(node, 'lineno', 1)
+    source = module.source
+    text = source.line(line)
+    start = getattr(node, 'col_offset', 0) if getattr(node, 'lineno', line) == line else 0
+    end = getattr(node, 'end_col_offset', None) or start + 1
+    first, last = _characters(text, start), _characters(text, end)
+    if isinstance(node, ast.Attribute):
+        name = node.attr
+    elif isinstance(node, ast.keyword):
+        first, last = _characters(text, node.col_offset), _characters(text, node.col_offset)
+        last += len(node.arg or '')
+        line = node.lineno
+        return Span(source, line, first + 1, max(last - first, 1))
+    found = text[first:last].rfind(name) if name else -1
+    if found >= 0:
+        first += found
+        last = first + len(name)
+    return Span(source, line, first + 1, max(last - first, 1))
+
+
+def _characters(line: str, offset: int) -> int:
+    """Return the number of characters in the first `offset` bytes of a line."""
+    return offset if line.isascii() else len(line.encode()[:offset].decode(errors='ignore'))

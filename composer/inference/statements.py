@@ -1,0 +1,390 @@
+"""Statements: what they store, and on which conditions they are reached."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.operators import combine
+from composer.inference.scopes import Names, Scope, join_names
+from composer.inference.values import (
+    NONE,
+    UNKNOWN,
+    Alternatives,
+    Awaitable,
+    Class,
+    Constant,
+    Place,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    is_chosen,
+    join,
+    truth_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from collections.abc import Sequence as SequenceOf
+
+    from composer.inference.evaluator import Evaluator
+
+# What a wrong name raises, and what catches it.
+_CATCHING = {
+    'AttributeError',
+    'ComposerError',
+    'KeyError',
+    'LookupError',
+    'PayloadError',
+    'TypeError',
+    'UndeclaredError',
+    'UndeclaredParameterError',
+    'ValueError',
+}
+_CATCHING_ALL = {'BaseException', 'Exception'}
+# Statements of a handler that say that nothing is to be done.
+_DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
+
+
+class Statements:
+    """Follows statements.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def follow_all(self, statements: Iterable[ast.stmt], scope: Scope) -> None:
+        """Follow statements, as far as they are reached."""
+        for statement in statements:
+            if scope.names is None:
+                return
+            self._evaluator.run.step()
+            method = getattr(self, f'_{type(statement).__name__.lower()}', None)
+            if method is not None:
+                method(statement, scope)
+
+    # Stores
+
+    def store(self, target: ast.expr, value: Value, scope: Scope) -> None:
+        """Store a value, in a name or in something."""
+        match target:
+            case ast.Name():
+                scope.set(target.id, value)
+            case ast.Starred():
+                self.store(target.value, UNKNOWN, scope)
+            case ast.Tuple() | ast.List():
+                for each, part in zip(target.elts, self._parts(value, target.elts), strict=True):
+                    self.store(each, part, scope)
+            case ast.Attribute():
+                owner = self._evaluator.evaluate(target.value, scope)
+                place = Place(scope.module, target)
+                self._evaluator.attributes.store(owner, target.attr, value, place)
+            case ast.Subscript():
+                self._store_item(target, value, scope)
+
+    def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+        starred = any(isinstance(each, ast.Starred) for each in targets)
+        if isinstance(value, Sequence) and not (value.is_open or value.is_lost or starred):
+            if len(value.items) == len(targets):
+                return [item for item, _ in value.items]
+        return [self._evaluator.item_of(value)] * len(targets)
+
+    def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
+        owner = self._evaluator.evaluate(target.value, scope)
+        index = self._evaluator.evaluate(target.slice, scope)
+        self._evaluator.calls.store_item(owner, index, value, Place(scope.module, target.slice))
+
+    def _assign(self, node: ast.Assign, scope: Scope) -> None:
+        value = self._evaluator.evaluate(node.value, scope)
+        for target in node.targets:
+            self.store(target, value, scope)
+
+    def _annassign(self, node: ast.AnnAssign, scope: Scope) -> None:
+        if node.value is not None:
+            self.store(node.target, self._evaluator.evaluate(node.value, scope), scope)
+
+    def _augassign(self, node: ast.AugAssign, scope: Scope) -> None:
+        value = self._evaluator.evaluate(node.value, scope)
+        before = self._evaluator.read_target(node.target, scope)
+        if isinstance(before, Sequence):
+            self._evaluator.calls.extend(before, value, Place(scope.module, node.value))
+            return
+        self.store(node.target, combine(node.op, before, value), scope)
+
+    def _delete(self, node: ast.Delete, scope: Scope) -> None:
+        for target in node.targets:
+            if isinstance(target, ast.Name):
+                scope.set(target.id, UNKNOWN)
+            elif isinstance(target, ast.Subscript):
+                self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
+            elif isinstance(target, ast.Attribute):
+                self._evaluator.evaluate(target.value, scope)
+
+    # Definitions
+
+    def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
+        scope.set(node.name, self._evaluator.define_decorated(node, scope))
+
+    _asyncfunctiondef = _functiondef
+
+    def _classdef(self, node: ast.ClassDef, scope: Scope) -> None:
+        outer = None if scope.function is None else scope
+        scope.set(node.name, Class(scope.module, node, outer))
+
+    def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
+        for alias in node.names:
+            name = alias.asname or alias.name.partition('.')[0]
+            scope.set(name, self._evaluator.imported(scope.module, node, name))
+
+    _importfrom = _import
+
+    # Jumps
+
+    def _expr(self, node: ast.Expr, scope: Scope) -> None:
+        value = self._evaluator.evaluate(node.value, scope)
+        if isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
+            self._evaluator.run.report(
+                'missing-await',
+                Place(scope.module, node.value.func),
+                f"'{ast.unparse(node.value.func)}(…)' is never awaited, so it never runs",
+                'put await before it',
+            )
+
+    def _return(self, node: ast.Return, scope: Scope) -> None:
+        value = self._evaluator.evaluate(node.value, scope) if node.value else NONE
+        if isinstance(node.value, ast.expr):
+            scope.returned.append((value, Place(scope.module, node.value)))
+        else:
+            scope.returned.append((value, Place(scope.module, node)))
+        scope.names = None
+
+    def _raise(self, node: ast.Raise, scope: Scope) -> None:
+        for each in (node.exc, node.cause):
+            if each is not None:
+                self._evaluator.evaluate(each, scope)
+        scope.names = None
+
+    def _break(self, _: ast.Break | ast.Continue, scope: Scope) -> None:
+        if scope.names is not None:
+            scope.jumps.append(scope.names)
+        scope.names = None
+
+    _continue = _break
+
+    def _assert(self, node: ast.Assert, scope: Scope) -> None:
+        test = self._evaluator.evaluate(node.test, scope)
+        if truth_of(test) is False:
+            scope.names = None
+            return
+        self._evaluator.narrow(node.test, scope, is_true=True)
+
+    # Branches
+
+    def _if(self, node: ast.If, scope: Scope) -> None:
+        """Follow the branches that may be taken; a long chain of `elif` is not nested."""
+        ends: list[Names | None] = []
+        doubts = 0
+        while True:
+            test = self._evaluator.evaluate(node.test, scope)
+            truth = truth_of(test)
+            is_doubt = truth is None and is_chosen(test)
+            before = scope.copy_names()
+            if truth is not False:
+                self._evaluator.narrow(node.test, scope, is_true=True)
+                self._follow_branch(node.body, scope, is_doubt=is_doubt, doubts=doubts)
+                ends.append(scope.names)
+            scope.names = before
+            if truth is True:
+                scope.names = None
+                break
+            doubts += is_doubt
+            self._evaluator.narrow(node.test, scope, is_true=False)
+            if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+                node = node.orelse[0]
+                continue
+            self._follow_branch(node.orelse, scope, is_doubt=False, doubts=doubts)
+            break
+        ends.append(scope.names)
+        has_jumped = any(names is None for names in ends)
+        scope.names = join_names(ends)
+        if doubts and has_jumped:
+            # Whether the rest is reached is for the file to decide, too.
+            self._evaluator.run.doubts += doubts
+            self._evaluator.lasting_doubts[-1] += doubts
+
+    def _follow_branch(
+        self, body: list[ast.stmt], scope: Scope, *, is_doubt: bool, doubts: int
+    ) -> None:
+        run = self._evaluator.run
+        run.doubts += doubts
+        with run.condition(is_doubt=is_doubt):
+            self.follow_all(body, scope)
+        run.doubts -= doubts
+
+    def _match(self, node: ast.Match, scope: Scope) -> None:
+        subject = self._evaluator.evaluate(node.subject, scope)
+        ends: list[Names | None] = []
+        before = scope.copy_names()
+        for case in node.cases:
+            scope.names = None if before is None else dict(before)
+            for name in _captured(case.pattern):
+                scope.set(name, UNKNOWN)
+            if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
+                if case.pattern.name:
+                    scope.set(case.pattern.name, subject)
+            elif isinstance(node.subject, ast.Name) and isinstance(case.pattern, ast.MatchClass):
+                scope.set(node.subject.id, UNKNOWN)
+            if case.guard is not None:
+                self._evaluator.evaluate(case.guard, scope)
+            self._follow_branch(case.body, scope, is_doubt=is_chosen(subject), doubts=0)
+            ends.append(scope.names)
+        scope.names = join_names([before, *ends])
+
+    # Loops
+
+    def _for(self, node: ast.For | ast.AsyncFor, scope: Scope) -> None:
+        iterated = self._evaluator.evaluate(node.iter, scope)
+        item = self._evaluator.item_of(iterated)
+
+        def begin() -> None:
+            self.store(node.target, item, scope)
+
+        self._loop(node, scope, begin, is_doubt=False)
+
+    _asyncfor = _for
+
+    def _while(self, node: ast.While, scope: Scope) -> None:
+        test: list[Value] = [UNKNOWN]
+
+        def begin() -> None:
+            test[0] = self._evaluator.evaluate(node.test, scope)
+            if truth_of(test[0]) is False:
+                scope.names = None
+            else:
+                self._evaluator.narrow(node.test, scope, is_true=True)
+
+        is_endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
+        self._loop(node, scope, begin, is_doubt=False, is_endless=is_endless)
+
+    def _loop(
+        self,
+        node: ast.For | ast.AsyncFor | ast.While,
+        scope: Scope,
+        begin: object,
+        *,
+        is_doubt: bool,
+        is_endless: bool = False,
+    ) -> None:
+        """Follow a loop twice: what the first round stores, the second one finds."""
+        run = self._evaluator.run
+        jumps, scope.jumps = scope.jumps, []
+        before = scope.copy_names()
+        with run.condition(is_doubt=is_doubt):
+            with run.silence():
+                begin()  # type: ignore[operator]
+                self.follow_all(node.body, scope)
+            after = join_names([before, scope.names, *scope.jumps])
+            scope.names = _widened(before, after)
+            again = scope.copy_names()
+            scope.jumps = []
+            begin()  # type: ignore[operator]
+            self.follow_all(node.body, scope)
+        ends = [None if is_endless else again, None if is_endless else scope.names, *scope.jumps]
+        scope.jumps = jumps
+        scope.names = join_names(ends)
+        self.follow_all(node.orelse, scope)
+
+    # Guards
+
+    def _try(self, node: ast.Try, scope: Scope) -> None:
+        run = self._evaluator.run
+        before = scope.copy_names()
+        with run.guard(is_guard=any(map(_is_guard, node.handlers))):
+            self.follow_all(node.body, scope)
+        after = scope.names
+        if after is not None:
+            self.follow_all(node.orelse, scope)
+        ends = [scope.names]
+        caught = join_names([before, after])
+        for handler in node.handlers:
+            scope.names = None if caught is None else dict(caught)
+            if handler.name:
+                scope.set(handler.name, UNKNOWN)
+            with run.condition():
+                self.follow_all(handler.body, scope)
+            ends.append(scope.names)
+        scope.names = join_names(ends)
+        if node.finalbody:
+            is_over = scope.names is None
+            scope.names = caught if scope.names is None else scope.names
+            self.follow_all(node.finalbody, scope)
+            if is_over:
+                scope.names = None
+
+    _trystar = _try
+
+    def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        for item in node.items:
+            value = self._evaluator.evaluate(item.context_expr, scope)
+            if item.optional_vars is not None:
+                self.store(item.optional_vars, self._evaluator.entered(value), scope)
+        is_guard = any(_suppresses(item.context_expr) for item in node.items)
+        before = scope.copy_names()
+        with self._evaluator.run.guard(is_guard=is_guard):
+            self.follow_all(node.body, scope)
+        if is_guard:
+            scope.names = join_names([before, scope.names])
+
+    _asyncwith = _with
+
+
+def _widened(before: Names | None, after: Names | None) -> Names | None:
+    """Return what names stand for in any round: what changes is more than the first two values."""
+    if before is None or after is None:
+        return after
+    return {
+        name: value if before.get(name) == value else _widen(value)
+        for name, value in after.items()
+    }
+
+
+def _widen(value: Value) -> Value:
+    if not isinstance(value, Alternatives):
+        return value
+    return join(
+        Scalar(each.kind, each.is_chosen)
+        if isinstance(each, Constant) and each.kind in (int, float, str)
+        else each
+        for each in alternatives(value)
+    )
+
+
+def _is_guard(handler: ast.ExceptHandler) -> bool:
+    """Return whether a handler expects wrong names: it catches them, or ignores everything."""
+    names = {'BaseException'} if handler.type is None else _names_in(handler.type)
+    does_nothing = all(isinstance(each, _DOING_NOTHING) for each in handler.body)
+    return bool(names & _CATCHING) or (does_nothing and bool(names & _CATCHING_ALL))
+
+
+def _suppresses(expression: ast.expr) -> bool:
+    if not isinstance(expression, ast.Call) or not _names_in(expression.func) & {'suppress'}:
+        return False
+    caught = {name for argument in expression.args for name in _names_in(argument)}
+    return bool(caught & (_CATCHING | _CATCHING_ALL))
+
+
+def _names_in(expression: ast.expr) -> set[str]:
+    """Return all names in an expression, those of attributes included."""
+    nodes = list(ast.walk(expression))
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+
+
+def _captured(pattern: ast.pattern) -> set[str]:
+    names = {getattr(node, 'name', None) for node in ast.walk(pattern)}
+    names |= {getattr(node, 'rest', None) for node in ast.walk(pattern)}
+    return {name for name in names if name}

@@ -1,0 +1,357 @@
+"""What an expression of a behaviour may be, as far as its source tells.
+
+A value is compared by what it says, but for mappings, sequences, objects and functions: these can
+be changed, and are the same only if they are one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    import ast
+    from collections.abc import Iterable, Iterator
+
+    from composer.inference.scopes import Scope
+    from composer.interfaces.descriptions import FieldType
+    from composer.python_source.modules import ModuleSource
+    from composer.python_source.syntax import FunctionNode
+
+# Of more alternatives, nothing is known.
+_MOST_ALTERNATIVES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An expression or statement of a module."""
+
+    module: ModuleSource
+    node: ast.AST
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """Anything.
+
+    Attributes:
+        is_chosen: Whether the file decides on it: by an argument under `with:`, a parameter, or
+            the name of the node.
+    """
+
+    is_chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number, a text, bytes, a truth value or `None`.
+
+    Attributes:
+        kind: Its type, as 1 and `True` are equal.
+        origin: Where it is written.
+        is_chosen: As that of `Unknown`.
+    """
+
+    kind: type
+    value: Any
+    is_chosen: bool = False
+    origin: Place | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A number, text or the like of a type of Python, as in `float`."""
+
+    kind: type
+    is_chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message, request, response, goal, result or feedback, by its type's full name."""
+
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class MessageClass:
+    """The class of messages of a type."""
+
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayField:
+    """The value of a field that is an array."""
+
+    type: FieldType
+
+
+@dataclass(frozen=True, slots=True)
+class NodeValue:
+    """The node that a behaviour is called with."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartOfNode:
+    """`parameters`, `state`, `own_state` or `logger` of the node, and what comes out of it.
+
+    Attributes:
+        name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns.
+        type: Of a goal, its action.
+    """
+
+    name: str
+    type: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class BoundMethod:
+    """A method of something, not called yet."""
+
+    owner: Value
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class External:
+    """What an import gives that is not of the project: a module, or something in one."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Awaitable:
+    """A coroutine that has not been awaited."""
+
+    result: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Generated:
+    """A generator, by what it yields and what it returns."""
+
+    yielded: Value
+    returned: Value
+
+
+@dataclass(slots=True, eq=False)
+class Mapping:
+    """A dictionary.
+
+    Attributes:
+        entries: The values by their keys, and where each is written.
+        is_open: Whether it may have further entries.
+        depth: On how many conditions it was made.
+    """
+
+    entries: dict[object, tuple[Value, Place]]
+    is_open: bool = False
+    depth: int = 0
+    is_lost: bool = False
+
+    def set(self, key: object, value: Value, place: Place, depth: int) -> None:
+        """Store a value; one that is stored on a condition is one of two."""
+        before = self.entries.get(key)
+        if before is not None and depth > self.depth:
+            value = join([before[0], value])
+        self.entries[key] = (value, place)
+
+
+@dataclass(slots=True, eq=False)
+class Sequence:
+    """A list, tuple or set.
+
+    Attributes:
+        items: Its items, as far as they are known, and where each is written.
+        kind: The type of Python.
+        is_open: Whether it may have more or fewer items.
+        is_lost: Whether something unknown may have changed it.
+    """
+
+    items: list[tuple[Value, Place]]
+    kind: type
+    is_open: bool = False
+    is_lost: bool = False
+
+    def item(self) -> Value:
+        """Return what any of its items may be."""
+        if self.is_lost or (self.is_open and not self.items):
+            return UNKNOWN
+        return join(value for value, _ in self.items) if self.items else UNKNOWN
+
+
+@dataclass(slots=True, eq=False)
+class Function:
+    """A function of the project.
+
+    Attributes:
+        outer: The scope around it; `None` for the module's own.
+        owner: What its first parameter is bound to, if it is a method.
+        is_read: Whether a call of it has been followed.
+    """
+
+    module: ModuleSource
+    definition: FunctionNode | ast.Lambda
+    outer: Scope | None = None
+    owner: Value | None = None
+    is_read: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class Class:
+    """A class of the project."""
+
+    module: ModuleSource
+    definition: ast.ClassDef
+    outer: Scope | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Instance:
+    """An object of a class of the project.
+
+    Attributes:
+        attributes: What was stored in it, wherever that was.
+    """
+
+    of: Class
+    attributes: dict[str, Value] = field(default_factory=dict)
+
+    def set(self, name: str, value: Value) -> None:
+        """Note what an attribute may be."""
+        before = self.attributes.get(name)
+        self.attributes[name] = value if before is None else join([before, value])
+
+
+@dataclass(slots=True, eq=False)
+class Partial:
+    """A function with some of its arguments: `functools.partial`."""
+
+    function: Value
+    arguments: Arguments
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectModule:
+    """A module of the project."""
+
+    module: ModuleSource
+
+
+@dataclass(frozen=True, slots=True)
+class Alternatives:
+    """One of several values."""
+
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument of a call, and where it is written."""
+
+    value: Value
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """The arguments of a call.
+
+    Attributes:
+        positional: Those by position.
+        named: Those by keyword.
+        is_open: Whether there are others: `*names`, `**names`.
+    """
+
+    positional: tuple[Argument, ...] = ()
+    named: tuple[tuple[str, Argument], ...] = ()
+    is_open: bool = False
+
+    def get(self, position: int, name: str) -> Argument | None:
+        """Return an argument by its position or its name."""
+        if position < len(self.positional):
+            return self.positional[position]
+        return next((each for key, each in self.named if key == name), None)
+
+    def all(self) -> Iterator[Argument]:
+        """Yield all arguments."""
+        yield from self.positional
+        yield from (argument for _, argument in self.named)
+
+
+Value: TypeAlias = (
+    Unknown
+    | Constant
+    | Scalar
+    | Message
+    | MessageClass
+    | ArrayField
+    | NodeValue
+    | PartOfNode
+    | BoundMethod
+    | External
+    | Awaitable
+    | Generated
+    | Mapping
+    | Sequence
+    | Function
+    | Class
+    | Instance
+    | Partial
+    | ProjectModule
+    | Alternatives
+)
+
+UNKNOWN = Unknown()
+CHOSEN = Unknown(is_chosen=True)
+NODE = NodeValue()
+NONE = Constant(type(None), None)
+
+
+def constant(value: object, origin: Place | None = None, *, is_chosen: bool = False) -> Constant:
+    """Return the value of a constant."""
+    return Constant(type(value), value, is_chosen, origin)
+
+
+def alternatives(value: Value) -> tuple[Value, ...]:
+    """Return what a value may be: several, or itself."""
+    return value.values if isinstance(value, Alternatives) else (value,)
+
+
+def join(values: Iterable[Value]) -> Value:
+    """Return the value that is one of several."""
+    found: dict[Value, None] = {}
+    for value in values:
+        found.update(dict.fromkeys(alternatives(value)))
+    if len(found) == 1:
+        return next(iter(found))
+    if not found or len(found) > _MOST_ALTERNATIVES:
+        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+    if any(isinstance(value, Unknown) for value in found):
+        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+    return Alternatives(tuple(found))
+
+
+def is_chosen(value: Value) -> bool:
+    """Return whether the file decides on a value."""
+    return any(getattr(each, 'is_chosen', False) for each in alternatives(value))
+
+
+def truth_of(value: Value) -> bool | None:
+    """Return whether a value counts as true, `None` if that is not known."""
+    found = {_truth_of(each) for each in alternatives(value)}
+    return found.pop() if len(found) == 1 else None
+
+
+def _truth_of(value: Value) -> bool | None:
+    match value:
+        case Constant():
+            return bool(value.value)
+        case NodeValue() | MessageClass() | Function() | Class() | BoundMethod() | Partial():
+            return True
+        case Message() | ProjectModule() | External() | Awaitable():
+            return True
+        case Mapping() | Sequence() if not value.is_open and not value.is_lost:
+            return bool(value.entries if isinstance(value, Mapping) else value.items)
+    return None

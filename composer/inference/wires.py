@@ -1,0 +1,57 @@
+"""The types around a behaviour: of what it is given, and of what it gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from composer.entity_kinds import PUBLISHED
+
+if TYPE_CHECKING:
+    from composer.inference.node_facts import NodeFacts
+    from composer.language.bindings import Binding
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """The types of what a behaviour gets and of what it gives; `None` for none, or unknown.
+
+    Attributes:
+        given: The type of its second argument.
+        yielded: The type that each yielded payload becomes.
+        returned: The type that a returned payload becomes.
+        ended: The type that a payload becomes which a generator returns.
+        needs_payload: Whether a response has to be returned.
+    """
+
+    given: str | None = None
+    yielded: str | None = None
+    returned: str | None = None
+    ended: str | None = None
+    needs_payload: bool = False
+
+
+def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
+    """Return the types around a behaviour of a node."""
+    kind, key = binding.kind, binding.key
+    if kind is None or binding.entity is None:
+        return Wire()
+    own = facts.type_of(kind.section, binding.entity.name) if kind.channel else None
+    published = getattr(binding.entity, 'publish', None) if kind.publishes else None
+    sent = facts.type_of('publishers', published) if published else None
+
+    def type_of(part: str | None) -> str | None:
+        if part == PUBLISHED:
+            return sent
+        if part is None or own is None:
+            return None
+        return f'{own}_{part}' if part else own
+
+    return Wire(
+        given=type_of(key.given),
+        yielded=type_of(key.yielded),
+        returned=type_of(key.returned),
+        # Timers do not publish what a generator returns at its end.
+        ended=None if key.returned == PUBLISHED else type_of(key.returned),
+        needs_payload=key.returned not in (None, PUBLISHED),
+    )
