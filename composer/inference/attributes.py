@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 from typing import TYPE_CHECKING
 
-from composer.inference.message_types import in_python, value_of
+from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.run import name_place
 from composer.inference.values import (
+    CHOSEN,
     NODE,
     UNKNOWN,
     Argument,
@@ -30,6 +32,7 @@ from composer.inference.values import (
     Sequence,
     Value,
     alternatives,
+    constant,
     join,
 )
 from composer.interfaces.field_errors import unknown_field
@@ -81,9 +84,17 @@ _SHOWN_PARTS = {
     'logger': "the node's logger",
     'time': 'a time',
     'goal': 'a goal',
+    'own_state': 'own_state',
+    'changes': 'the changes',
 }
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 _OF_MESSAGES = frozenset({'SLOT_TYPES', 'get_fields_and_field_types'})
+
+
+def _function() -> None:
+    """Have the attributes of functions."""
+
+
 _COROUTINE = frozenset({'close', 'send', 'throw'})
 
 
@@ -144,6 +155,9 @@ class Attributes:
                     return UNKNOWN
                 message = f"'{name}' is read of a coroutine, which has not been awaited"
                 return 'missing-await', message, 'put await before the call'
+            case BoundMethod(owner=NodeValue() | PartOfNode()) if not hasattr(_function, name):
+                message = f"'{name}' is read of the method '{owner.name}', which is not called"
+                return 'unknown-attribute', message, f'write {owner.name}().{name}'
             case Constant() | Scalar() | Mapping() | Sequence():
                 return self._read_builtin(owner, name)
         return UNKNOWN
@@ -174,8 +188,15 @@ class Attributes:
             case 'state':
                 run.use_state(name, place)
                 return UNKNOWN
-            case 'own_state':
-                return BoundMethod(owner, name)
+            case 'own_state' | 'changes':
+                if hasattr(dict, name):
+                    return BoundMethod(owner, name)
+                help_text = f'it is a dictionary: write [{name!r}]'
+                return (
+                    'unknown-attribute',
+                    f"{_SHOWN_PARTS[owner.name]} has no '{name}'",
+                    help_text,
+                )
         if name not in NAMES_OF_PART[owner.name]:
             return _missing(_SHOWN_PARTS[owner.name], name, NAMES_OF_PART[owner.name])
         if owner.name == 'goal' and name == 'feedback':
@@ -190,10 +211,20 @@ class Attributes:
         description = self._evaluator.run.types.describe(owner.type)
         field = description.field(name) if description else None
         if field is not None:
-            return value_of(field.type) if isinstance(owner, Message) else UNKNOWN
-        # Descriptions of installed packages lack constants, which have names in capitals.
-        if description is None or name in _OF_MESSAGES or name.isupper() or name[0] == '_':
+            is_made = isinstance(owner, MessageClass) or owner.is_made
+            return value_of(field.type, is_made=is_made) if isinstance(owner, Message) else UNKNOWN
+        if isinstance(owner, MessageClass) and name in PARTS and '/msg/' not in owner.type:
+            return MessageClass(f'{owner.type}_{name}')
+        if description is None or name in _OF_MESSAGES or name[0] == '_':
             return UNKNOWN
+        if self._evaluator.run.modules.is_patched(name):
+            return UNKNOWN
+        if name.isupper():
+            if self._evaluator.run.types.may_have_constant(owner.type, name):
+                return UNKNOWN
+            known = self._evaluator.run.types.constants(owner.type)
+            message = f"{in_python(owner.type)} has no constant '{name}'"
+            return 'unknown-field', message, suggest(name, known, 'it has')
         error = unknown_field(owner.type, name, [each.name for each in description.fields])
         return 'unknown-field', str(error).replace(owner.type, in_python(owner.type)), error.help
 
@@ -239,12 +270,28 @@ class Attributes:
     def read_item(self, owner: Value, index: Value, place: Place) -> Value:
         """Return what `owner[index]` may be, of a part of the node."""
         run = self._evaluator.run
-        if not isinstance(owner, PartOfNode) or owner.name != 'parameters':
+        if isinstance(owner, Message):
+            name = index.value if isinstance(index, Constant) else '…'
+            message = f'{in_python(owner.type)} is a message, and has no items'
+            run.report('unknown-field', place, message, f'write .{name}')
+            return UNKNOWN
+        if isinstance(owner, PartOfNode) and owner.name == 'own_state':
+            if isinstance(index, Constant):
+                run.use_own_state(str(index.value), name_place(Argument(index, place), index))
+            else:
+                run.reading.is_own_state_open = True
+            return UNKNOWN
+        if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []
         for each in alternatives(index):
             if isinstance(each, Constant) and isinstance(each.value, str):
-                run.use('parameter', each.value, name_place(Argument(index, place), each))
+                run.use(
+                    'parameter',
+                    each.value,
+                    name_place(Argument(index, place), each),
+                    is_change=owner.name == 'changes',
+                )
                 found.append(run.facts.value_of_parameter(each.value))
             else:
                 run.reading.open_kinds.add('parameter')
@@ -253,13 +300,34 @@ class Attributes:
 
     def note_containment(self, item: Value, container: Value, place: Place) -> None:
         """`'x' in node.parameters` uses a parameter, and works without it."""
-        if container != PartOfNode('parameters'):
+        if not isinstance(container, PartOfNode):
             return
+        run = self._evaluator.run
         for each in alternatives(item):
-            if isinstance(each, Constant) and isinstance(each.value, str):
-                self._evaluator.run.use(
-                    'parameter', each.value, place, is_optional=True, has_default=True
+            if not isinstance(each, Constant) or not isinstance(each.value, str):
+                continue
+            where = name_place(Argument(item, place), each)
+            if container.name in ('parameters', 'changes'):
+                is_change = container.name == 'changes'
+                run.use(
+                    'parameter',
+                    each.value,
+                    where,
+                    is_optional=True,
+                    has_default=True,
+                    is_change=is_change,
                 )
+            elif container.name == 'own_state':
+                run.reading.own_state_set.add(each.value)
+
+    def contained(self, sign: ast.cmpop, item: Value, container: Value) -> Value | None:
+        """Return whether a name is among the parameters, as the file decides."""
+        if container != PartOfNode('parameters') or not isinstance(sign, ast.In | ast.NotIn):
+            return None
+        if not isinstance(item, Constant) or self._evaluator.run.reading.reaches_ros:
+            return CHOSEN
+        value = self._evaluator.run.facts.value_of_parameter(str(item.value))
+        return constant((value != UNKNOWN) == isinstance(sign, ast.In), is_chosen=True)
 
     # Storing
 
@@ -280,6 +348,10 @@ class Attributes:
                 self._evaluator.escape(value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)
+            case PartOfNode(name='own_state'):
+                message = f"own_state takes no attribute '{name}'"
+                help_text = f'it is a dictionary: write [{name!r}]'
+                run.report('unknown-attribute', place, message, help_text)
             case NodeValue() if name not in STORED_IN_NODE:
                 message = f"the node takes no attribute '{name}'"
                 run.report('unknown-attribute', place, message, f'keep it in node.state.{name}')

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from composer.inference.known_functions import KNOWN_RESULTS
 from composer.inference.message_types import in_python
-from composer.inference.reading import ParameterSet
+from composer.inference.reading import RemoteParameter
 from composer.inference.run import name_place, span_of
+from composer.inference.signatures import explain_misfit, signature_of
 from composer.inference.values import (
+    CHOSEN,
     NODE,
     NONE,
     UNKNOWN,
@@ -51,6 +53,7 @@ _SECTIONS = {
     'call_async': ('service_clients', 'service client'),
     'send_goal': ('action_clients', 'action client'),
 }
+_LONGEST_RANGE = 256
 _TEXT_METHODS = frozenset(
     {
         'capitalize',
@@ -84,11 +87,14 @@ class Calls:
         place = Place(scope.module, node)
         if function == External('builtins.super') or function == External('builtins.locals'):
             return UNKNOWN
-        waits = scope.waits
-        return join(
-            self.invoke(each, arguments, place, waits=waits, is_awaited=is_awaited)
-            for each in alternatives(function)
-        )
+        self._evaluator.call_places.append(place)
+        try:
+            return join(
+                self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
+                for each in alternatives(function)
+            )
+        finally:
+            self._evaluator.call_places.pop()
 
     def _arguments(self, node: ast.Call, scope: Scope) -> Arguments:
         positional: list[Argument] = []
@@ -139,8 +145,12 @@ class Calls:
         """
         match function:
             case BoundMethod(owner=owner, name=name) if owner == NODE:
+                if not self._fits('node', name, arguments, place):
+                    return UNKNOWN
                 return self._call_node(name, arguments, waits=waits, is_awaited=is_awaited)
             case BoundMethod():
+                if isinstance(function.owner, PartOfNode):
+                    self._fits(function.owner.name, function.name, arguments, place)
                 return self._call_method(function, arguments, place)
             case MessageClass():
                 return self._construct(function, arguments)
@@ -164,15 +174,39 @@ class Calls:
                     return self._evaluator.follow(method, arguments, waits=waits)
             case External():
                 return self._call_library(function.name, arguments, place)
+            case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
+                self._refuse(function, place)
         self.escape_all(arguments)
         return UNKNOWN
+
+    def _refuse(self, function: Value, place: Place) -> None:
+        """Report a call of what cannot be called; `None` may be something else later."""
+        if function == NONE or getattr(function, 'is_lost', False):
+            return
+        called = place.node.func if isinstance(place.node, ast.Call) else place.node
+        text = 'this cannot be called'
+        self._evaluator.run.report('bad-call', Place(place.module, called), text)
+
+    def _fits(self, owner: str, name: str, arguments: Arguments, place: Place) -> bool:
+        """Return whether a method can be called so; report it if not."""
+        signature = signature_of(owner, name)
+        misfit = explain_misfit(signature, arguments) if signature else None
+        if misfit is None:
+            return True
+        shown = str(signature)
+        self._evaluator.run.report(
+            'bad-call', place, f'{name}{shown} is called with other arguments: {misfit}'
+        )
+        return False
 
     def invoke_later(self, partial: Partial) -> None:
         """Note that something unknown may call a function with these arguments and others."""
         given = partial.arguments
         arguments = Arguments(given.positional, given.named, is_open=True)
         function = partial.function
-        if (isinstance(function, Function) and given.positional) or (function == BoundMethod(NODE, 'publish') and given.positional):
+        if (isinstance(function, Function) and given.positional) or (
+            function == BoundMethod(NODE, 'publish') and given.positional
+        ):
             with self._evaluator.run.condition():
                 self.invoke(function, arguments, given.positional[0].place, waits=False)
         else:
@@ -239,18 +273,47 @@ class Calls:
         run = self._evaluator.run
         if method == 'get_parameters':
             run.reading.reads_others = True
+            names = arguments.get(1, 'names')
+            if names is not None and isinstance(names.value, Sequence):
+                keys = [(name, place, UNKNOWN) for name, place in names.value.items]
+                self._note_remote(arguments, keys)
             return UNKNOWN
         node_name, values = arguments.get(0, 'node_name'), arguments.get(1, 'values')
         if node_name is None or values is None:
             return NONE
-        target = node_name.value
-        if isinstance(target, Constant) and isinstance(values.value, Mapping):
-            for key, (_, place) in values.value.entries.items():
-                if isinstance(key, str):
-                    run.reading.parameters_set.append(
-                        ParameterSet(str(target.value), key, span_of(place, key))
-                    )
+        if isinstance(values.value, Mapping):
+            self._note_remote(
+                arguments,
+                [
+                    (constant(key), place, value)
+                    for key, (value, place) in values.value.entries.items()
+                ],
+            )
         return NONE
+
+    def _note_remote(
+        self, arguments: Arguments, several: list[tuple[Value, Place, Value]]
+    ) -> None:
+        """Note parameters of another node, if the code names both."""
+        node_name = arguments.get(0, 'node_name')
+        for target in alternatives(node_name.value) if node_name else ():
+            if not isinstance(target, Constant) or not isinstance(target.value, str):
+                continue
+            at = span_of(name_place(node_name, target), target.value) if node_name else None
+            for key, place, value in several:
+                if isinstance(key, Constant) and isinstance(key.value, str) and at:
+                    where = getattr(value, 'origin', None) or place
+                    self._evaluator.run.reading.remote_parameters.append(
+                        RemoteParameter(
+                            target.value,
+                            at,
+                            key.value,
+                            span_of(place, key.value),
+                            value if isinstance(value, Constant) else None,
+                            span_of(where),
+                            is_certain=not self._evaluator.run.doubts,
+                        )
+                    )
 
     # Messages
 
@@ -258,7 +321,7 @@ class Calls:
         """Check the fields that a message is made with."""
         evaluator = self._evaluator
         description = evaluator.run.types.describe(function.type)
-        made = Message(function.type)
+        made = Message(function.type, is_made=True)
         if description is None:
             self.escape_all(arguments)
             return made
@@ -289,8 +352,10 @@ class Calls:
         owner, name = method.owner, method.name
         first = arguments.get(0, '')
         match owner:
-            case PartOfNode(name='parameters'):
-                return self._read_parameters(name, arguments)
+            case PartOfNode(name='parameters' | 'changes'):
+                return self._read_parameters(owner, name, arguments)
+            case PartOfNode(name='own_state'):
+                return self._call_own_state(name, arguments)
             case PartOfNode(name='time') if name == 'to_msg':
                 return Message('builtin_interfaces/msg/Time')
             case PartOfNode(name='goal') if name in ('result', 'result_async'):
@@ -306,12 +371,39 @@ class Calls:
                 self.escape_all(arguments)
                 if name in _TEXT_METHODS:
                     return Scalar(str, is_chosen(owner))
+                if name in ('split', 'rsplit', 'splitlines'):
+                    return Sequence([(Scalar(str), place)], list, is_open=True, origin=place)
                 return Scalar(bytes) if name == 'encode' else UNKNOWN
         if first is not None:
             self.escape_all(arguments)
         return UNKNOWN
 
-    def _read_parameters(self, name: str, arguments: Arguments) -> Value:
+    def _call_own_state(self, name: str, arguments: Arguments) -> Value:
+        """Note which keys are set; what is kept there is known only right after that."""
+        reading = self._evaluator.run.reading
+        key, value = arguments.get(0, ''), arguments.get(1, '')
+        if name == 'update':
+            reading.own_state_set |= {each for each, _ in arguments.named}
+            for argument in arguments.positional:
+                if isinstance(argument.value, Mapping) and not argument.value.is_open:
+                    reading.own_state_set |= {str(each) for each in argument.value.entries}
+                else:
+                    reading.is_own_state_open = True
+        elif key and name in ('get', 'setdefault', 'pop'):
+            constants = [each for each in alternatives(key.value) if isinstance(each, Constant)]
+            if name == 'pop' and value is None:
+                for each in constants:
+                    where = name_place(key, each)
+                    self._evaluator.run.use_own_state(str(each.value), where)
+            reading.own_state_set |= {str(each.value) for each in constants}
+            reading.is_own_state_open |= not constants
+        kept = value.value if value else UNKNOWN
+        if isinstance(kept, Instance | Message):
+            return kept
+        self.escape_all(arguments)
+        return UNKNOWN
+
+    def _read_parameters(self, owner: PartOfNode, name: str, arguments: Arguments) -> Value:
         run = self._evaluator.run
         asked = arguments.get(0, 'key')
         if name != 'get' or asked is None:
@@ -327,12 +419,16 @@ class Calls:
                     each.value,
                     place,
                     is_optional=True,
-                    has_default=default is not None,
+                    has_default=default is not None or owner.name == 'changes',
+                    is_change=owner.name == 'changes',
                 )
                 value = run.facts.value_of_parameter(each.value)
-                found.append(value)
-                if value == UNKNOWN and default is not None:
-                    found[-1] = UNKNOWN
+                if value != UNKNOWN or run.reading.reaches_ros or owner.name == 'changes':
+                    found.append(value)
+                elif default is None:
+                    found.append(constant(None, is_chosen=True))
+                else:
+                    found.append(CHOSEN)
             else:
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
@@ -354,8 +450,12 @@ class Calls:
                 owner.is_open |= arguments.is_open
                 return NONE
             case 'setdefault' if first and second:
-                self.store_item(owner, first.value, second.value, first.place)
-                return UNKNOWN
+                key = first.value
+                held = owner.entries.get(key.value) if isinstance(key, Constant) else None
+                if held is None:
+                    self.store_item(owner, first.value, second.value, first.place)
+                    return second.value
+                return join([held[0], second.value])
             case 'get' | 'pop' if first:
                 key = first.value
                 found = owner.entries.get(key.value) if isinstance(key, Constant) else None
@@ -415,6 +515,12 @@ class Calls:
                     each.is_open = True
                 case PartOfNode(name='parameters'):
                     self._evaluator.attributes.store_item(index, place)
+                case PartOfNode(name='own_state'):
+                    keys = [key for key in alternatives(index) if isinstance(key, Constant)]
+                    reading = self._evaluator.run.reading
+                    reading.own_state_set |= {str(key.value) for key in keys}
+                    reading.is_own_state_open |= not keys
+                    self._evaluator.escape(value)
                 case _:
                     self._evaluator.escape(value)
 
@@ -542,7 +648,42 @@ class Calls:
             return Sequence(list(given.items), list, given.is_open, given.is_lost)
         return Sequence([(self._evaluator.item_of(first.value), place)], list, is_open=True)
 
-    _call_builtins_tuple = _call_builtins_sorted = _call_builtins_list
+    _call_builtins_tuple = _call_builtins_list
+
+    def _call_builtins_sorted(self, arguments: Arguments, place: Place) -> Value:
+        self._call_key(arguments, place)
+        return self._call_builtins_list(Arguments(arguments.positional[:1]), place)
+
+    def _call_key(self, arguments: Arguments, place: Place) -> None:
+        """Follow the function `key` of `sorted`, `min` and `max`."""
+        key, first = dict(arguments.named).get('key'), arguments.get(0, '')
+        if key is not None and first is not None:
+            item = Argument(self._evaluator.item_of(first.value), first.place)
+            self.invoke(key.value, Arguments((item,)), place, waits=False)
+
+    def _call_builtins_map(self, arguments: Arguments, place: Place) -> Value:
+        function, *iterated = arguments.positional
+        items = tuple(
+            Argument(self._evaluator.item_of(each.value), each.place) for each in iterated
+        )
+        with self._evaluator.run.condition():
+            result = self.invoke(function.value, Arguments(items), place, waits=False)
+        return Generated(result, NONE)
+
+    def _call_builtins_filter(self, arguments: Arguments, place: Place) -> Value:
+        if len(arguments.positional) != 2:  # noqa: PLR2004
+            return UNKNOWN
+        self._call_builtins_map(arguments, place)
+        return Generated(self._evaluator.item_of(arguments.positional[1].value), NONE)
+
+    def _call_builtins_range(self, arguments: Arguments, place: Place) -> Value:
+        limits = [each.value for each in arguments.positional]
+        known = [each.value for each in limits if isinstance(each, Constant) and each.kind is int]
+        if len(known) == len(limits) > 0 and 0 not in known[2:]:
+            length = len(range(*known))
+            if length <= _LONGEST_RANGE:
+                return Sequence([(Scalar(int), place)] * length, range)
+        return Sequence([(Scalar(int), place)], range, is_open=True)
 
     def _call_builtins_enumerate(self, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, 'iterable')
@@ -573,8 +714,9 @@ class Calls:
 
     def _call_builtins_max(self, arguments: Arguments, place: Place) -> Value:
         if len(arguments.positional) < 2 or arguments.is_open:  # noqa: PLR2004
-            self._escape_functions(arguments)
-            return UNKNOWN
+            first = arguments.get(0, '')
+            self._call_key(arguments, place)
+            return self._evaluator.item_of(first.value) if first else UNKNOWN
         return join(
             self._call_builtins_abs(Arguments((each,)), place) for each in arguments.positional
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from composer.inference.attributes import Attributes
@@ -10,6 +11,7 @@ from composer.inference.calls import Calls
 from composer.inference.expressions import Expressions
 from composer.inference.message_types import item_of
 from composer.inference.payloads import Payloads
+from composer.inference.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.statements import Statements
 from composer.inference.values import (
@@ -41,13 +43,17 @@ from composer.inference.values import (
     Value,
     alternatives,
     constant,
+    is_chosen,
     join,
+    truth_of,
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.modules import FunctionKind, FunctionSource
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from composer.inference.run import Run
     from composer.python_source.modules import ModuleSource
 
@@ -70,6 +76,7 @@ class Evaluator:
     """Evaluates expressions and follows statements and functions, in one run.
 
     Attributes:
+        call_places: Where the calls under way are written.
         lasting_doubts: Of each function under way, the doubts that last until its end.
     """
 
@@ -81,6 +88,7 @@ class Evaluator:
         self.calls = Calls(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.call_places: list[Place] = []
         self._active: list[ast.AST] = []
         self._results: dict[tuple[object, ...], Value] = {}
         self._local_names: dict[int, LocalNames] = {}
@@ -154,6 +162,45 @@ class Evaluator:
             owner = self.evaluate(target.value, scope)
             return self.attributes.read(owner, target.attr, Place(scope.module, target))
         return UNKNOWN
+
+    def awaited(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what an operand may be, which should be no coroutine."""
+        value = self.evaluate(node, scope)
+        if isinstance(value, Awaitable):
+            text = 'this is a coroutine, which has not been awaited'
+            self.run.report(
+                'missing-await', Place(scope.module, node), text, 'put await before it'
+            )
+            return value.result
+        return value
+
+    def tested(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what a condition may be: a coroutine is always true."""
+        return self.awaited(node, scope)
+
+    def iterated(self, node: ast.expr, scope: Scope, is_async: int) -> Value:
+        """Return what a loop goes through."""
+        value = self.awaited(node, scope)
+        if isinstance(value, Generated) and value.is_async and not is_async:
+            text = 'this is an async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'async for'")
+        return value
+
+    @contextmanager
+    def branch(self, test: Value, *, is_taken: bool) -> Iterator[None]:
+        """Read a branch: one that is never taken has no problems, and may use names.
+
+        What the file decides on may be decided otherwise by the next file, or a parameter.
+        """
+        truth = truth_of(test)
+        is_dead = truth is not None and truth != is_taken
+        is_doubt = is_dead or (truth is None and is_chosen(test))
+        with ExitStack() as around:
+            around.enter_context(self.run.condition(is_doubt=is_doubt))
+            if is_dead and not is_chosen(test):
+                around.enter_context(self.run.silence())
+            yield
 
     def home_of(self, scope: Scope) -> Scope:
         """Return the scope of the function itself: comprehensions have their own."""
@@ -308,11 +355,30 @@ class Evaluator:
         if function.definition in self._active or len(self._active) >= _DEEPEST:
             self.calls.escape_all(arguments)
             return UNKNOWN
+        if not self.fits(function, arguments):
+            return UNKNOWN
         scope = self.enter(function, arguments, waits=waits)
         result = result_of(function, scope)
         if key is not None:
             self._results[key] = result
         return result
+
+    def fits(self, function: Function, arguments: Arguments) -> bool:
+        """Return whether a function can be called so; report it if not."""
+        if isinstance(function.definition, ast.Lambda) or arguments.is_open:
+            return True
+        given = arguments
+        if function.owner is not None:
+            me = Argument(function.owner, Place(function.module, function.definition))
+            given = Arguments((me, *arguments.positional), arguments.named)
+        signature = FunctionSource(function.definition).signature
+        misfit = explain_misfit(signature, given) if signature else None
+        if misfit is None or not self.call_places:
+            return misfit is None
+        name = function.definition.name
+        message = f"'{name}' is called with other arguments than it takes: {misfit}"
+        self.run.report('bad-call', self.call_places[-1], message)
+        return False
 
     def _key_of(
         self, function: Function, arguments: Arguments, *, waits: bool
@@ -450,10 +516,12 @@ class Evaluator:
                 )
                 if any(isinstance(each, ast.Name) and each.id == name for each in targets):
                     is_plain = not of.definition.bases and not self._is_dataclass(of)
-                    value = self.evaluate(statement.value, self._scope_of(of))
+                    with self.run.silence():
+                        value = self.evaluate(statement.value, self._scope_of(of))
                     return value if is_plain and self.is_stored_once(of, name) else UNKNOWN
         for base in of.definition.bases:
-            found = self.evaluate(base, self._scope_of(of))
+            with self.run.silence():
+                found = self.evaluate(base, self._scope_of(of))
             if isinstance(found, Class) and found is not of:
                 inherited = self.class_attribute(found, name, owner)
                 if inherited is not None:
@@ -509,5 +577,5 @@ def result_of(function: Function, scope: Scope) -> Value:
         return Awaitable(returned)
     if kind.is_generator:
         yielded = join([value for value, _ in scope.yielded]) if scope.yielded else UNKNOWN
-        return Generated(yielded, returned)
+        return Generated(yielded, returned, is_async=kind is FunctionKind.ASYNC_GENERATOR)
     return returned

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from composer.inference.message_types import item_of
@@ -17,6 +18,7 @@ from composer.inference.values import (
     Constant,
     Generated,
     Mapping,
+    Message,
     Place,
     Scalar,
     Sequence,
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
+# Expressions that make a value, rather than find one.
+_MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 
 
 class Expressions:
@@ -55,6 +59,8 @@ class Expressions:
             self._evaluate_all(ast.iter_child_nodes(node), scope)
             return UNKNOWN
         value: Value = method(node, scope)
+        if isinstance(value, Scalar) and value.origin is None and isinstance(node, _MAKING):
+            return Scalar(value.kind, value.is_chosen, Place(scope.module, node))
         return value
 
     def _evaluate_all(self, nodes: Iterable[ast.AST], scope: Scope) -> None:
@@ -81,7 +87,7 @@ class Expressions:
             if isinstance(part, ast.Constant):
                 value: Value = constant(part.value)
             elif isinstance(part, ast.FormattedValue):
-                value = self.evaluate(part.value, scope)
+                value = self._evaluator.awaited(part.value, scope)
                 if part.format_spec is not None:
                     self.evaluate(part.format_spec, scope)
                     value = Scalar(str, is_chosen(value))
@@ -102,7 +108,8 @@ class Expressions:
                 is_open = self._extend(items, each, scope) or is_open
             else:
                 items.append((self.evaluate(each, scope), Place(scope.module, each)))
-        return Sequence(items, _KINDS[type(node)], is_open)
+        origin = Place(scope.module, node)
+        return Sequence(items, _KINDS[type(node)], is_open, origin=origin)
 
     _tuple = _set = _list
 
@@ -137,9 +144,9 @@ class Expressions:
         chain = [node]
         while isinstance(chain[-1].left, ast.BinOp):
             chain.append(chain[-1].left)
-        value = self.evaluate(chain[-1].left, scope)
+        value = self._evaluator.awaited(chain[-1].left, scope)
         for each in reversed(chain):
-            right = self.evaluate(each.right, scope)
+            right = self._evaluator.awaited(each.right, scope)
             if isinstance(value, Mapping) and isinstance(right, Mapping):
                 value = self._merge(value, right)
             else:
@@ -153,10 +160,13 @@ class Expressions:
         return Mapping(entries, left.is_open or right.is_open, self._evaluator.run.conditions)
 
     def _unaryop(self, node: ast.UnaryOp, scope: Scope) -> Value:
-        return negate(node.op, self.evaluate(node.operand, scope))
+        value = negate(node.op, self._evaluator.awaited(node.operand, scope))
+        if isinstance(value, Constant) and value.origin is not None:
+            return constant(value.value, Place(scope.module, node), is_chosen=value.is_chosen)
+        return value
 
     def _compare(self, node: ast.Compare, scope: Scope) -> Value:
-        left = self.evaluate(node.left, scope)
+        left = self._evaluator.awaited(node.left, scope)
         chosen = False
         for sign, operand in zip(node.ops, node.comparators, strict=True):
             right = self.evaluate(operand, scope)
@@ -164,7 +174,8 @@ class Expressions:
                 self._evaluator.attributes.note_containment(
                     left, right, Place(scope.module, node.left)
                 )
-            said = compare(sign, left, right)
+            said = self._evaluator.attributes.contained(sign, left, right)
+            said = said or compare(sign, left, right)
             chosen |= is_chosen(said)
             if len(node.ops) == 1:
                 return said
@@ -176,22 +187,21 @@ class Expressions:
         goes_on = isinstance(node.op, ast.And)
         evaluator = self._evaluator
         found: list[Value] = []
-        entered = []
-        for index, each in enumerate(node.values):
-            value = evaluator.evaluate(each, scope)
-            is_last = index == len(node.values) - 1
-            truth = truth_of(value)
-            if truth is None or truth != goes_on or is_last:
-                found.append(value)
-            if truth is not None and truth != goes_on:
-                break
-            if not is_last:
-                evaluator.narrow(each, scope, is_true=goes_on)
-                doubt = evaluator.run.condition(is_doubt=truth is None and is_chosen(value))
-                doubt.__enter__()
-                entered.append(doubt)
-        for doubt in entered:
-            doubt.__exit__(None, None, None)
+        is_reached = True
+        before = scope.copy_names()
+        with ExitStack() as conditions:
+            for index, each in enumerate(node.values):
+                value = evaluator.tested(each, scope)
+                is_last = index == len(node.values) - 1
+                truth = truth_of(value)
+                if is_reached and (truth is None or truth != goes_on or is_last):
+                    found.append(value)
+                if not is_last:
+                    evaluator.narrow(each, scope, is_true=goes_on)
+                    is_reached = is_reached and truth in (None, goes_on)
+                    branch = evaluator.branch(value, is_taken=goes_on)
+                    conditions.enter_context(branch)
+        scope.names = before
         kept = [
             each
             for value in found[:-1]
@@ -202,18 +212,18 @@ class Expressions:
 
     def _ifexp(self, node: ast.IfExp, scope: Scope) -> Value:
         evaluator = self._evaluator
-        test = evaluator.evaluate(node.test, scope)
+        test = evaluator.tested(node.test, scope)
         truth = truth_of(test)
         found: list[Value] = []
         before = scope.copy_names()
         for branch, taken in ((node.body, True), (node.orelse, False)):
+            evaluator.narrow(node.test, scope, is_true=taken)
+            with evaluator.branch(test, is_taken=taken):
+                value = evaluator.evaluate(branch, scope)
             if truth is None or truth == taken:
-                evaluator.narrow(node.test, scope, is_true=taken)
-                with evaluator.run.condition(is_doubt=truth is None and is_chosen(test)):
-                    found.append(evaluator.evaluate(branch, scope))
-                scope.names = None if before is None else dict(before)
-        value = join(found)
-        return value if isinstance(value, Alternatives) or not is_chosen(test) else value
+                found.append(value)
+            scope.names = None if before is None else dict(before)
+        return join(found)
 
     # What is in something
 
@@ -270,9 +280,12 @@ class Expressions:
             value = self._evaluator.calls.call(node.value, scope, is_awaited=True)
         else:
             value = self.evaluate(node.value, scope)
-        return join(
-            each.result if isinstance(each, Awaitable) else UNKNOWN for each in alternatives(value)
-        )
+        several = alternatives(value)
+        if all(isinstance(each, Message | Constant | Scalar | Mapping) for each in several):
+            place = Place(scope.module, node.value)
+            text = 'what is awaited here is no coroutine'
+            self._evaluator.run.report('missing-await', place, text, 'leave out the await')
+        return join(each.result if isinstance(each, Awaitable) else UNKNOWN for each in several)
 
     def _yield(self, node: ast.Yield, scope: Scope) -> Value:
         value = self.evaluate(node.value, scope) if node.value else NONE
@@ -302,20 +315,26 @@ class Expressions:
 
     def _listcomp(self, node: ast.ListComp | ast.SetComp, scope: Scope) -> Value:
         kind = list if isinstance(node, ast.ListComp) else set
-        inner = self._loop_over(node.generators, scope)
+        inner, iterated = self._loop_over(node.generators, scope)
         with self._evaluator.run.condition():
             value = self.evaluate(node.elt, inner)
-        return Sequence([(value, Place(scope.module, node.elt))], kind, is_open=True)
+        place = Place(scope.module, node)
+        items = [(value, Place(scope.module, node.elt))]
+        is_plain = len(node.generators) == 1 and not node.generators[0].ifs and kind is list
+        if is_plain and isinstance(iterated, Sequence):
+            if not (iterated.is_open or iterated.is_lost):
+                return Sequence(items * len(iterated.items), kind, origin=place)
+        return Sequence(items, kind, is_open=True, origin=place)
 
     _setcomp = _listcomp
 
     def _generatorexp(self, node: ast.GeneratorExp, scope: Scope) -> Value:
-        inner = self._loop_over(node.generators, scope)
+        inner, _ = self._loop_over(node.generators, scope)
         with self._evaluator.run.condition():
             return Generated(self.evaluate(node.elt, inner), NONE)
 
     def _dictcomp(self, node: ast.DictComp, scope: Scope) -> Value:
-        inner = self._loop_over(node.generators, scope)
+        inner, _ = self._loop_over(node.generators, scope)
         made = Mapping({}, is_open=True, depth=self._evaluator.run.conditions)
         with self._evaluator.run.condition():
             keys = self.evaluate(node.key, inner)
@@ -325,15 +344,21 @@ class Expressions:
                 made.set(key.value, value, Place(scope.module, node.key), made.depth)
         return made
 
-    def _loop_over(self, generators: list[ast.comprehension], scope: Scope) -> Scope:
-        """Return the scope of a comprehension, in which its names stand for its items."""
+    def _loop_over(self, generators: list[ast.comprehension], scope: Scope) -> tuple[Scope, Value]:
+        """Return the scope of a comprehension, in which its names stand for its items.
+
+        Also returns what it iterates over, first of all.
+        """
         inner = Scope(scope.module, scope.function, outer=scope, waits=scope.waits)
+        first: list[Value] = []
         for generator in generators:
-            item = self._evaluator.item_of(self.evaluate(generator.iter, inner))
+            iterated = self._evaluator.iterated(generator.iter, inner, generator.is_async)
+            first.append(iterated)
             names = {each.id for each in ast.walk(generator.target) if isinstance(each, ast.Name)}
             inner.local |= names
+            item = self._evaluator.item_of(iterated)
             self._evaluator.statements.store(generator.target, item, inner)
             for test in generator.ifs:
-                self.evaluate(test, inner)
+                self._evaluator.tested(test, inner)
                 self._evaluator.narrow(test, inner, is_true=True)
-        return inner
+        return inner, first[0]

@@ -52,6 +52,22 @@ class MessageTypes:
             return getattr(description, part.lower(), None) if part else None
         return description if isinstance(description, MessageDescription) else None
 
+    def may_have_constant(self, type_name: str, name: str) -> bool:
+        """Return whether a message may have a constant of this name."""
+        if name.endswith('__DEFAULT'):
+            return True
+        description = self.describe(type_name)
+        if description is None or any(each.name == name for each in description.constants):
+            return True
+        names = self.catalogue.constant_names(split_part(type_name)[0])
+        return names is None or name in names
+
+    def constants(self, type_name: str) -> list[str]:
+        """Return the names of the constants that are known."""
+        description = self.describe(type_name)
+        own = [each.name for each in description.constants] if description else []
+        return [*own, *sorted(self.catalogue.constant_names(split_part(type_name)[0]) or ())]
+
     def are_alike(self, one: str, other: str) -> bool:
         """Return whether two types are the same for a behaviour.
 
@@ -82,19 +98,26 @@ def in_python(name: str) -> str:
     return f'{whole}.{part}' if part else whole
 
 
-def value_of(field_type: FieldType) -> Value:
-    """Return what a field holds when it is read."""
+def value_of(field_type: FieldType, *, is_made: bool = False) -> Value:
+    """Return what a field holds when it is read.
+
+    Args:
+        is_made: Whether the behaviour itself made the message: it may hold NumPy's values.
+    """
+    if field_type.nested and not field_type.array:
+        return Message(field_type.nested, is_made)
+    if is_made:
+        return UNKNOWN
     if field_type.array:
         return ArrayField(field_type)
-    if field_type.nested:
-        return Message(field_type.nested)
     return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
 
 
 def item_of(field_type: FieldType) -> Value:
     """Return what an item of an array is when it is read."""
-    # NumPy's numbers come out of arrays of numbers.
-    nested = field_type.nested
-    if nested:
-        return Message(nested)
-    return Scalar(str) if field_type.kind in ('string', 'wstring') else UNKNOWN
+    if field_type.nested:
+        return Message(field_type.nested)
+    # NumPy's numbers come out of arrays of fixed length.
+    if field_type.array == 'fixed' and field_type.kind not in ('string', 'wstring'):
+        return UNKNOWN
+    return Scalar(_PYTHON_TYPES.get(field_type.kind, int))

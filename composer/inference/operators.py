@@ -34,6 +34,7 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
 }
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -48,8 +49,11 @@ _NUMBERS = (bool, int, float)
 # Larger numbers and longer texts are not computed.
 _GREATEST = 2**64
 _LONGEST = 200
+_GREATEST_POWER = 64
 # What an operator may meet in pairs.
 _MOST_PAIRS = 16
+# How long the sequences are that are computed.
+_MOST_ITEMS = 256
 
 
 def combine(sign: ast.operator, left: Value, right: Value) -> Value:
@@ -64,16 +68,35 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     chosen = is_chosen(left) or is_chosen(right)
     if isinstance(left, Constant) and isinstance(right, Constant):
         compute = _ARITHMETIC.get(type(sign))
-        if compute and _is_small(left.value) and _is_small(right.value):
+        is_power = isinstance(sign, ast.Pow) and abs(hash(right.value)) > _GREATEST_POWER
+        if compute and not is_power and _is_small(left.value) and _is_small(right.value):
             try:
                 return constant(compute(left.value, right.value), is_chosen=chosen)
             except (ArithmeticError, TypeError, ValueError):
                 return CHOSEN if chosen else UNKNOWN
+    if isinstance(left, Sequence):
+        return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))
     result = _result(sign, *kinds)
     if result is not None:
         return Scalar(result, chosen)
     return CHOSEN if chosen else UNKNOWN
+
+
+def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value:
+    """Return what `[0.0] * 6` and `[1] + [2]` make."""
+    if left.is_lost:
+        return UNKNOWN
+    if isinstance(sign, ast.Add) and isinstance(right, Sequence) and not right.is_lost:
+        items = [*left.items, *right.items]
+        return Sequence(items, left.kind, left.is_open or right.is_open, origin=left.origin)
+    if isinstance(sign, ast.Mult) and isinstance(right, Constant) and right.kind is int:
+        if 0 <= right.value * len(left.items) <= _MOST_ITEMS:
+            items = left.items * right.value
+            return Sequence(items, left.kind, left.is_open, origin=left.origin)
+    if isinstance(sign, ast.Mult):
+        return Sequence(list(left.items), left.kind, is_open=True, origin=left.origin)
+    return UNKNOWN
 
 
 def _is_small(value: object) -> bool:
@@ -127,7 +150,13 @@ def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     """Return what a comparison says, as far as it is known."""
     known = _compare(sign, left, right)
     chosen = is_chosen(left) or is_chosen(right)
-    return Scalar(bool, chosen) if known is None else constant(known, is_chosen=chosen)
+    if known is not None:
+        return constant(known, is_chosen=chosen)
+    plain = all(isinstance(each, Constant | Scalar) for each in (left, right))
+    if plain or isinstance(sign, ast.Is | ast.IsNot | ast.In | ast.NotIn):
+        return Scalar(bool, chosen)
+    # NumPy compares item by item.
+    return CHOSEN if chosen else UNKNOWN
 
 
 def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:

@@ -34,7 +34,7 @@ from composer.interfaces.field_values import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from composer.inference.evaluator import Evaluator
     from composer.inference.message_types import MessageTypes
@@ -57,44 +57,82 @@ class Misfit:
 class Payloads:
     """Checks payloads.
 
+    Of several values that one name may stand for, each may be meant for another place: one is
+    reported if it fits none of those that it is given to.
+
     Args:
         evaluator: Knows the run.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator = evaluator
+        self._misfits: dict[int, tuple[object, list[Misfit], Place]] = {}
+        self._fitting: set[int] = set()
 
     def check(self, type_name: str | None, value: Value, place: Place) -> None:
         """Check what becomes a message: a message, a mapping or a bare value."""
         if type_name is None:
             return
         fit = _Fit(type_name, self._evaluator.run.types)
-        self._report(fit.message(type_name, each, place, ()) for each in alternatives(value))
+        self._settle(
+            fit.any_of(value, lambda each: fit.message(type_name, each, place, ())), fit, place
+        )
 
     def check_field(
         self, type_name: str, field: FieldDescription, value: Value, place: Place
     ) -> None:
         """Check what a field of a message is to hold."""
         fit = _Fit(type_name, self._evaluator.run.types)
-        self._report(
-            fit.field(field.type, each, place, (field.name,)) for each in alternatives(value)
+        path = (field.name,)
+        found = fit.any_of(value, lambda each: fit.field(field.type, each, place, path))
+        self._settle(found, fit, place)
+
+    def _settle(self, found: list[Misfit], fit: _Fit, place: Place) -> None:
+        if self._evaluator.run.is_silent:
+            return
+        for misfit in found:
+            self._report(misfit, place)
+        for value, misfits in fit.alternatives:
+            if misfits:
+                self._misfits.setdefault(id(value), (value, misfits, place))
+            else:
+                self._fitting.add(id(value))
+
+    def _report(self, misfit: Misfit, place: Place) -> None:
+        self._evaluator.run.report(
+            misfit.rule, misfit.place, misfit.message, misfit.help, used_at=place
         )
 
-    def _report(self, several: Iterator[Iterator[Misfit]]) -> None:
-        """Report what does not fit, if none of the alternatives does."""
-        found = [list(misfits) for misfits in several]
-        if not all(found):
-            return
-        for misfit in found[0]:
-            self._evaluator.run.report(misfit.rule, misfit.place, misfit.message, misfit.help)
+    def report_unfit(self) -> None:
+        """Report the values that fitted nowhere."""
+        for key, (_, misfits, place) in self._misfits.items():
+            if key not in self._fitting:
+                for misfit in misfits:
+                    self._report(misfit, place)
 
 
-@dataclass(frozen=True, slots=True)
 class _Fit:
-    """Compares values with the types of a message."""
+    """Compares values with the types of a message.
 
-    root: str
-    types: MessageTypes
+    Attributes:
+        alternatives: Dictionaries and lists that are one of several, and what is wrong in each.
+    """
+
+    def __init__(self, root: str, types: MessageTypes) -> None:
+        self.root = root
+        self.types = types
+        self.alternatives: list[tuple[Value, list[Misfit]]] = []
+
+    def any_of(self, value: Value, compare: Callable[[Value], Iterator[Misfit]]) -> list[Misfit]:
+        """Return what is wrong in a value; if it is one of several, in all of them."""
+        several = alternatives(value)
+        found = [list(compare(each)) for each in several]
+        if all(found):
+            return found[0]
+        for each, misfits in zip(several, found, strict=True):
+            if isinstance(each, Mapping | Sequence):
+                self.alternatives.append((each, misfits))
+        return []
 
     def message(
         self, type_name: str, value: Value, place: Place, path: tuple[str | int, ...]
@@ -139,12 +177,8 @@ class _Fit:
                 error = unknown_field(description.name, key, names)
                 yield self._misfit('unknown-field', str(error), place, path, error.help)
                 continue
-            several = [
-                list(self.field(field.type, each, place, (*path, field.name)))
-                for each in alternatives(held)
-            ]
-            if all(several):
-                yield from several[0]
+            within = (*path, field.name)
+            yield from self.any_of(held, self._field_reader(field.type, place, within))
 
     def _bare(
         self,
@@ -162,10 +196,16 @@ class _Fit:
             text = f'expected {in_python(description.name)}, got {_shown(value)}'
             yield self._misfit('field-type', text, place, path, error.help)
 
+    def _field_reader(
+        self, field_type: FieldType, place: Place, path: tuple[str | int, ...]
+    ) -> Callable[[Value], Iterator[Misfit]]:
+        return lambda value: self.field(field_type, value, place, path)
+
     def field(
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
         """Yield what keeps a value from being held by a field."""
+        place = getattr(value, 'origin', None) or place
         if field_type.array:
             yield from self._array(field_type, value, place, path)
         elif field_type.nested:
@@ -183,12 +223,8 @@ class _Fit:
                         lambda: check_length(field_type, len(value.items)), place, path
                     )
                 for index, (item, where) in enumerate(value.items):
-                    several = [
-                        list(self.field(field_type.item, each, where, (*path, index)))
-                        for each in alternatives(item)
-                    ]
-                    if all(several):
-                        yield from several[0]
+                    reader = self._field_reader(field_type.item, where, (*path, index))
+                    yield from self.any_of(item, reader)
             case Constant():
                 yield from self._tried(lambda: read_items(field_type, value.value), place, path)
             case Scalar() if value.kind is not bytes or field_type.kind not in OCTET_KINDS:
@@ -196,7 +232,11 @@ class _Fit:
             case ArrayField():
                 is_text = field_type.kind in _TEXTS, value.type.kind in _TEXTS
                 nested = field_type.nested, value.type.nested
-                if is_text[0] != is_text[1] or (nested[0] is None) != (nested[1] is None) or (nested[0] and nested[1] and not self.types.are_alike(nested[0], nested[1])):
+                if (
+                    is_text[0] != is_text[1]
+                    or (nested[0] is None) != (nested[1] is None)
+                    or (nested[0] and nested[1] and not self.types.are_alike(nested[0], nested[1]))
+                ):
                     yield self._wrong(field_type, value, place, path)
             case Message() | Mapping():
                 if isinstance(value, Message) or not value.is_lost:

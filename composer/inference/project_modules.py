@@ -55,6 +55,21 @@ class TopNames:
                     yield node.id
 
     @cached_property
+    def patched(self) -> frozenset[str]:
+        """Names of attributes that the module itself stores in something, and `setattr` does."""
+        found: set[str] = set()
+        for statement in self._body:
+            if isinstance(statement, _BINDING):
+                continue
+            for node in ast.walk(statement):
+                match node:
+                    case ast.Attribute(attr=name, ctx=ast.Store()):
+                        found.add(name)
+                    case ast.Call(func=ast.Name('setattr'), args=[_, ast.Constant(str(name)), _]):
+                        found.add(name)
+        return frozenset(found)
+
+    @cached_property
     def changed(self) -> frozenset[str]:
         """Names that functions store, and those whose values are changed somewhere."""
         found: set[str] = set()
@@ -91,11 +106,16 @@ class ProjectModules:
     def __init__(self, finder: ModuleFinder) -> None:
         self._finder = finder
         self._names: dict[int, str] = {}
+        self._read: dict[int, ModuleSource] = {}
         self._tops: dict[int, TopNames] = {}
         self._values: dict[tuple[int, str], Value] = {}
         self._under_way: set[tuple[int, str]] = set()
         # How often the code of a module stores an attribute of a name.
         self.attribute_stores: dict[tuple[int, str], int] = {}
+
+    def is_patched(self, name: str) -> bool:
+        """Return whether a module that was read stores an attribute of this name at its top."""
+        return any(name in self.top(module).patched for module in tuple(self._read.values()))
 
     def find(self, name: str) -> ModuleSource | None:
         """Return a module of the project, if it is one and can be read."""
@@ -103,6 +123,7 @@ class ProjectModules:
         if not isinstance(module, ModuleSource) or not is_of_project(module):
             return None
         self._names.setdefault(id(module), name)
+        self._read[id(module)] = module
         return module
 
     def top(self, module: ModuleSource) -> TopNames:

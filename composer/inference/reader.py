@@ -22,6 +22,7 @@ from composer.inference.values import (
     Instance,
     Mapping,
     Message,
+    PartOfNode,
     Partial,
     Place,
     Sequence,
@@ -105,6 +106,8 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
     callee, bound = function
     place = Place(module, callee.definition)
     given: Value = Message(wire.given) if wire.given else UNKNOWN
+    if binding.key.key == 'on_parameters':
+        given = PartOfNode('changes')
     positional = [NODE, given][: len(binding.parameters)]
     named = [(name, _of_file(value, place)) for name, value in behaviour.arguments.items()]
     arguments = Arguments(
@@ -112,8 +115,14 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
         (*bound.named, *((name, Argument(value, place)) for name, value in named)),
     )
     callee.is_read = True
+    if not evaluator.fits(callee, arguments):
+        # Another check reports it.
+        run.reading.open_all()
+        return
     scope = evaluator.enter(callee, arguments, waits=True)
     _check_payloads(evaluator, callee, scope, wire)
+    _check_answers(evaluator, scope, binding)
+    evaluator.payloads.report_unfit()
 
 
 def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Arguments] | None:
@@ -158,6 +167,26 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     if wire.needs_payload and wire.returned and scope.returned and nothing and not is_generator:
         _, place = scope.returned[-1]
         evaluator.payloads.check(wire.returned, NONE, place)
+
+
+def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None:
+    """Check what `accept` and `on_parameters` return: whether, or why not."""
+    kinds: dict[str, tuple[type, ...]] = {
+        'accept': (bool, str, type(None)),
+        'on_parameters': (str, type(None)),
+    }
+    wanted = kinds.get(binding.key.key)
+    for value, place in scope.returned if wanted else ():
+        several = alternatives(value)
+        kinds_of = [getattr(each, 'kind', None) for each in several]
+        if wanted and all(kind is not None and kind not in wanted for kind in kinds_of):
+            what = 'whether to accept, or why not' if bool in wanted else 'None, or why not'
+            evaluator.run.report(
+                'bad-answer',
+                place,
+                f'{binding.owner} returns a {kinds_of[0].__name__}',
+                f'return {what}',
+            )
 
 
 def _check(evaluator: Evaluator, type_name: str | None, value: Value, place: Place) -> None:

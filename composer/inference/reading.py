@@ -9,6 +9,7 @@ from composer.entity_kinds import USED_KINDS
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
+    from composer.inference.values import Constant
 
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
@@ -27,6 +28,7 @@ class NodeUse:
             parameters, the node's name, or arguments under `with:`.
         is_guarded: Whether the behaviour catches the error that it raises.
         waits: Whether the behaviour itself waits for the answer.
+        is_change: Whether it is looked for among the changes of `on_parameters`.
     """
 
     kind: str
@@ -37,6 +39,7 @@ class NodeUse:
     is_certain: bool = True
     is_guarded: bool = False
     waits: bool = False
+    is_change: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +49,19 @@ class Problem:
     Attributes:
         rule: The name of the rule that it breaks.
         place: Where it is written.
+        used_at: Where it is used, if that is elsewhere.
     """
 
     rule: str
     message: str
     place: Span
     help: str | None = None
+    used_at: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class StateUse:
-    """A name of `node.state` that is read.
+    """A name of `node.state` or `node.own_state` that is read.
 
     Attributes:
         is_guarded: Whether the behaviour does something about one that is not there.
@@ -68,12 +73,21 @@ class StateUse:
 
 
 @dataclass(frozen=True, slots=True)
-class ParameterSet:
-    """A parameter that is set by its name, of a node by its name."""
+class RemoteParameter:
+    """A parameter that `node.set_parameters` or `node.get_parameters` names.
+
+    Attributes:
+        node: The name of its node; `node_place` is where it is written.
+        value: What it is set to, if the code shows it, and where.
+    """
 
     node: str
+    node_place: Span
     name: str
     place: Span
+    value: Constant | None
+    value_place: Span
+    is_certain: bool
 
 
 @dataclass(slots=True)
@@ -89,8 +103,10 @@ class Reading:
         state_read: What it reads of `node.state`.
         state_set: The names that it sets there.
         is_state_open: Whether it may set others.
+        own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
+            are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
-        parameters_set: What it sets with `node.set_parameters`.
+        remote_parameters: Parameters of nodes that it sets or reads by their names.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -101,18 +117,23 @@ class Reading:
     state_read: list[StateUse] = field(default_factory=list)
     state_set: set[str] = field(default_factory=set)
     is_state_open: bool = False
+    own_state_read: list[StateUse] = field(default_factory=list)
+    own_state_set: set[str] = field(default_factory=set)
+    is_own_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
-    parameters_set: list[ParameterSet] = field(default_factory=list)
+    remote_parameters: list[RemoteParameter] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""
         self.open_kinds |= USED_NOUNS
         self.reads_others = self.reaches_ros = self.is_state_open = True
+        self.is_own_state_open = True
 
     def settle(self) -> None:
         """Forget what was noted twice."""
         self.uses = list(dict.fromkeys(self.uses))
         self.problems = list(dict.fromkeys(self.problems))
+        self.own_state_read = list(dict.fromkeys(self.own_state_read))
         self.state_read = list(dict.fromkeys(self.state_read))
 
 

@@ -86,17 +86,32 @@ class Run:
         finally:
             self.is_silent = before
 
-    def report(self, rule: str, place: Place, message: str, help_text: str | None = None) -> None:
+    def report(
+        self,
+        rule: str,
+        place: Place,
+        message: str,
+        help_text: str | None = None,
+        *,
+        used_at: Place | None = None,
+    ) -> None:
         """Note a problem, unless the behaviour is ready for it.
 
         Where only the file decides whether the place is reached, it has to look like a typo: then
         `help_text` begins with what may have been meant.
+
+        Args:
+            used_at: Where the value is used that `place` wrote.
         """
         if self.guards or self.is_silent:
             return
-        if self.doubts and not (help_text or '').startswith('did you mean'):
+        is_sure = rule == 'unknown-attribute' or (help_text or '').startswith('did you mean')
+        if self.doubts and not is_sure:
             return
-        self.reading.problems.append(Problem(rule, message, span_of(place), help_text))
+        span, used = span_of(place), span_of(used_at) if used_at else None
+        if used and (used.source, used.line) == (span.source, span.line):
+            used = None
+        self.reading.problems.append(Problem(rule, message, span, help_text, used))
 
     def use(
         self,
@@ -107,6 +122,7 @@ class Run:
         is_optional: bool = False,
         has_default: bool = False,
         waits: bool = False,
+        is_change: bool = False,
     ) -> None:
         """Note the use of an entity by its name."""
         self.reading.uses.append(
@@ -119,8 +135,14 @@ class Run:
                 is_certain=not self.doubts,
                 is_guarded=bool(self.guards),
                 waits=waits,
+                is_change=is_change,
             )
         )
+
+    def use_own_state(self, name: str, place: Place) -> None:
+        """Note that a key of `node.own_state` is read."""
+        use = StateUse(name, span_of(place, name), bool(self.guards or self.doubts))
+        self.reading.own_state_read.append(use)
 
     def use_state(self, name: str, place: Place, *, is_guarded: bool = False) -> None:
         """Note that a name of `node.state` is read."""

@@ -52,7 +52,8 @@ class Scope:
     def set(self, name: str, value: Value) -> None:
         """Store what a name stands for from now on."""
         if self.names is not None:
-            self.names[name] = UNKNOWN if name in self.unsure else value
+            value = UNKNOWN if name in self.unsure else value
+            self.names[name] = value
             before = self.stored.get(name)
             self.stored[name] = value if before is None else join([before, value])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from composer.inference.operators import combine
@@ -14,6 +15,8 @@ from composer.inference.values import (
     Awaitable,
     Class,
     Constant,
+    Generated,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -43,6 +46,7 @@ _CATCHING = {
     'ValueError',
 }
 _CATCHING_ALL = {'BaseException', 'Exception'}
+_WITHOUT_EFFECT = (ast.Name, ast.Dict, ast.Compare, ast.BinOp, ast.Tuple, ast.List)
 # Statements of a handler that say that nothing is to be done.
 _DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
 
@@ -110,6 +114,10 @@ class Statements:
     def _augassign(self, node: ast.AugAssign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
         before = self._evaluator.read_target(node.target, scope)
+        if isinstance(node.target, ast.Attribute):
+            owner = self._evaluator.evaluate(node.target.value, scope)
+            if owner == PartOfNode('state'):
+                return
         if isinstance(before, Sequence):
             self._evaluator.calls.extend(before, value, Place(scope.module, node.value))
             return
@@ -145,13 +153,26 @@ class Statements:
     # Jumps
 
     def _expr(self, node: ast.Expr, scope: Scope) -> None:
+        """A value that nothing takes may have been meant for something."""
         value = self._evaluator.evaluate(node.value, scope)
-        if isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
-            self._evaluator.run.report(
+        run = self._evaluator.run
+        if isinstance(node.value, _WITHOUT_EFFECT):
+            place = Place(scope.module, node.value)
+            run.report('no-effect', place, 'this has no effect', 'return it, or remove it')
+        elif isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
+            called = ast.unparse(node.value.func)
+            run.report(
                 'missing-await',
                 Place(scope.module, node.value.func),
-                f"'{ast.unparse(node.value.func)}(…)' is never awaited, so it never runs",
+                f"'{called}(…)' is never awaited, so it never runs",
                 'put await before it',
+            )
+        elif isinstance(value, Generated) and isinstance(node.value, ast.Call | ast.GeneratorExp):
+            run.report(
+                'no-effect',
+                Place(scope.module, node.value),
+                'nothing takes what this generates, so it never runs',
+                "write 'yield from' before it, or go through it in a loop",
             )
 
     def _return(self, node: ast.Return, scope: Scope) -> None:
@@ -176,7 +197,7 @@ class Statements:
     _continue = _break
 
     def _assert(self, node: ast.Assert, scope: Scope) -> None:
-        test = self._evaluator.evaluate(node.test, scope)
+        test = self._evaluator.tested(node.test, scope)
         if truth_of(test) is False:
             scope.names = None
             return
@@ -185,45 +206,38 @@ class Statements:
     # Branches
 
     def _if(self, node: ast.If, scope: Scope) -> None:
-        """Follow the branches that may be taken; a long chain of `elif` is not nested."""
+        """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        doubts = 0
-        while True:
-            test = self._evaluator.evaluate(node.test, scope)
-            truth = truth_of(test)
-            is_doubt = truth is None and is_chosen(test)
-            before = scope.copy_names()
-            if truth is not False:
+        is_doubtful = False
+        with ExitStack() as branches:
+            while True:
+                test = self._evaluator.tested(node.test, scope)
+                truth = truth_of(test)
+                is_doubtful |= truth is None and is_chosen(test)
+                before = scope.copy_names()
                 self._evaluator.narrow(node.test, scope, is_true=True)
-                self._follow_branch(node.body, scope, is_doubt=is_doubt, doubts=doubts)
+                with self._evaluator.branch(test, is_taken=True):
+                    self.follow_all(node.body, scope)
+                ends.append(None if truth is False else scope.names)
+                scope.names = before
+                self._evaluator.narrow(node.test, scope, is_true=False)
+                branches.enter_context(self._evaluator.branch(test, is_taken=False))
+                if truth is True:
+                    ends.append(None)
+                    self.follow_all(node.orelse, scope)
+                    break
+                if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+                    node = node.orelse[0]
+                    continue
+                self.follow_all(node.orelse, scope)
                 ends.append(scope.names)
-            scope.names = before
-            if truth is True:
-                scope.names = None
                 break
-            doubts += is_doubt
-            self._evaluator.narrow(node.test, scope, is_true=False)
-            if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-                node = node.orelse[0]
-                continue
-            self._follow_branch(node.orelse, scope, is_doubt=False, doubts=doubts)
-            break
-        ends.append(scope.names)
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if doubts and has_jumped:
+        if is_doubtful and has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubts += doubts
-            self._evaluator.lasting_doubts[-1] += doubts
-
-    def _follow_branch(
-        self, body: list[ast.stmt], scope: Scope, *, is_doubt: bool, doubts: int
-    ) -> None:
-        run = self._evaluator.run
-        run.doubts += doubts
-        with run.condition(is_doubt=is_doubt):
-            self.follow_all(body, scope)
-        run.doubts -= doubts
+            self._evaluator.run.doubts += 1
+            self._evaluator.lasting_doubts[-1] += 1
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         subject = self._evaluator.evaluate(node.subject, scope)
@@ -240,14 +254,15 @@ class Statements:
                 scope.set(node.subject.id, UNKNOWN)
             if case.guard is not None:
                 self._evaluator.evaluate(case.guard, scope)
-            self._follow_branch(case.body, scope, is_doubt=is_chosen(subject), doubts=0)
+            with self._evaluator.run.condition(is_doubt=is_chosen(subject)):
+                self.follow_all(case.body, scope)
             ends.append(scope.names)
         scope.names = join_names([before, *ends])
 
     # Loops
 
     def _for(self, node: ast.For | ast.AsyncFor, scope: Scope) -> None:
-        iterated = self._evaluator.evaluate(node.iter, scope)
+        iterated = self._evaluator.iterated(node.iter, scope, isinstance(node, ast.AsyncFor))
         item = self._evaluator.item_of(iterated)
 
         def begin() -> None:
@@ -261,7 +276,7 @@ class Statements:
         test: list[Value] = [UNKNOWN]
 
         def begin() -> None:
-            test[0] = self._evaluator.evaluate(node.test, scope)
+            test[0] = self._evaluator.tested(node.test, scope)
             if truth_of(test[0]) is False:
                 scope.names = None
             else:

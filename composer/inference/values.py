@@ -64,13 +64,19 @@ class Scalar:
 
     kind: type
     is_chosen: bool = False
+    origin: Place | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message, request, response, goal, result or feedback, by its type's full name."""
+    """A message, request, response, goal, result or feedback, by its type's full name.
+
+    Attributes:
+        is_made: Whether the behaviour made it, and may have put anything into its fields.
+    """
 
     type: str
+    is_made: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +103,8 @@ class PartOfNode:
     """`parameters`, `state`, `own_state` or `logger` of the node, and what comes out of it.
 
     Attributes:
-        name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns.
+        name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns,
+            `changes` what `on_parameters` is given.
         type: Of a goal, its action.
     """
 
@@ -133,6 +140,7 @@ class Generated:
 
     yielded: Value
     returned: Value
+    is_async: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -173,6 +181,7 @@ class Sequence:
     kind: type
     is_open: bool = False
     is_lost: bool = False
+    origin: Place | None = None
 
     def item(self) -> Value:
         """Return what any of its items may be."""

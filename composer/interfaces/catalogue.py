@@ -5,6 +5,7 @@ definition files describe them. Both are plain files: to read them takes no rclp
 """
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Final, Literal, TypeAlias, cast
@@ -16,6 +17,8 @@ from composer.interfaces.type_descriptions import TypeDescriptionError, parse_ty
 
 InterfaceKind: TypeAlias = Literal['msg', 'srv', 'action']
 
+# A line such as `uint8 OK = 0`.
+_CONSTANT: Final = re.compile(rb'^[ \t]*[\w/<=]+[ \t]+([A-Z][A-Z0-9_]*)[ \t]*=', re.MULTILINE)
 # 'package/kind/Name'
 _NAME_PARTS: Final = 3
 
@@ -33,6 +36,7 @@ class InterfaceCatalogue:
         self._added: dict[str, InterfaceDescription] = {}
         self._descriptions: dict[str, InterfaceDescription | None] = {}
         self._packages: dict[str, Path] | None = None
+        self._constants: dict[str, frozenset[str] | None] = {}
         self._entries: dict[tuple[str, InterfaceKind], frozenset[str]] = {}
 
     @property
@@ -78,6 +82,27 @@ class InterfaceCatalogue:
         if full_name not in self._descriptions:
             self._descriptions[full_name] = self._load(full_name)
         return self._descriptions[full_name]
+
+    def constant_names(self, full_name: str) -> frozenset[str] | None:
+        """Return the names of the constants in the definition file of an installed interface.
+
+        Returns:
+            None if there is no such file: type descriptions lack constants.
+        """
+        if full_name not in self._constants:
+            self._constants[full_name] = self._read_constants(full_name)
+        return self._constants[full_name]
+
+    def _read_constants(self, full_name: str) -> frozenset[str] | None:
+        package, kind, name = full_name.split('/')
+        prefix = None if full_name in self._added else self._prefix_of(package)
+        if prefix is None:
+            return None
+        try:
+            text = read_file(prefix / 'share' / package / kind / f'{name}.{kind}')
+        except UnreadableFileError:
+            return None
+        return frozenset(each.decode() for each in _CONSTANT.findall(text))
 
     def _load(self, full_name: str) -> InterfaceDescription | None:
         parts = full_name.split('/')

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.bindings import node_bindings
+from composer.names import join_names
+from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -13,9 +16,9 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.reading import Reading
+    from composer.inference.reading import Reading, RemoteParameter
     from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec
+    from composer.language.specs import NodeSpec, ParameterSpec
 
 Readings = list[tuple['Binding', 'Reading']]
 
@@ -37,7 +40,8 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
         for finding in (
             *_explain_problems(context, readings),
             *_check_state(context, node, readings),
-            *_check_parameters_set(context, node, readings),
+            *_check_own_state(context, readings),
+            *_check_remote_parameters(context, node, readings),
         ):
             if finding.span is not None:
                 found.setdefault((finding.span, finding.rule), finding)
@@ -52,7 +56,10 @@ def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Dia
                 each.rule,
                 each.message,
                 help=each.help,
-                related=[bound_at(context, binding)],
+                related=[
+                    *([Related('it is used here', each.used_at)] if each.used_at else []),
+                    bound_at(context, binding),
+                ],
             )
 
 
@@ -81,30 +88,107 @@ def _check_state(
             )
 
 
-def _check_parameters_set(
+def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
+    """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
+    for owner in dict.fromkeys(_owner_of(binding) for binding, _ in readings):
+        own = [(binding, reading) for binding, reading in readings if _owner_of(binding) == owner]
+        if any(reading.is_own_state_open for _, reading in own):
+            continue
+        known = set().union(*(reading.own_state_set for _, reading in own))
+        for binding, reading in own:
+            for use in reading.own_state_read:
+                if use.name in known or use.is_guarded:
+                    continue
+                yield diagnostic_at(
+                    use.place,
+                    'unknown-state',
+                    f"nothing sets '{use.name}' in the own_state of {binding.owner}",
+                    help=suggest(use.name, known, 'there are', 'set it first, or read it by get'),
+                    related=[bound_at(context, binding)],
+                )
+
+
+def _owner_of(binding: Binding) -> object:
+    return binding.entity.path if binding.entity is not None else binding.key.key
+
+
+def _check_remote_parameters(
     context: CheckContext, node: NodeSpec, readings: Readings
 ) -> Iterator[Diagnostic]:
-    """Check the parameters that are set by name, of nodes of this system."""
+    """Check parameters that are set or read by name, of nodes of this system."""
     for binding, reading in readings:
-        for each in reading.parameters_set:
+        for each in reading.remote_parameters:
             target = _node_of_name(context, node, each.node)
-            if target is None or each.name in target.parameters:
-                continue
-            if _may_have_others(context, target):
-                continue
-            yield diagnostic_at(
-                each.place,
-                'unknown-parameter',
-                f"node '{target.name}' declares no parameter '{each.name}'",
-                help=suggest(each.name, target.parameters, 'it declares'),
-                related=[bound_at(context, binding)],
-            )
+            if target is None:
+                yield from _explain_unknown_node(context, node, binding, each)
+            elif parameter := target.parameters.get(each.name):
+                yield from _explain_refusal(context, binding, each, parameter)
+            elif each.name not in OF_EVERY_NODE and not _may_have_others(context, target):
+                yield diagnostic_at(
+                    each.place,
+                    'unknown-parameter',
+                    f"node '{target.name}' declares no parameter '{each.name}'",
+                    help=suggest(each.name, target.parameters, 'it declares'),
+                    related=[bound_at(context, binding)],
+                )
+
+
+def _explain_unknown_node(
+    context: CheckContext, node: NodeSpec, binding: Binding, each: RemoteParameter
+) -> Iterator[Diagnostic]:
+    """Report a node that this system may have under another name; others may be elsewhere."""
+    names = {other.full_name for other in context.spec.nodes.values()}
+    meant = _full_name(node, each.node)
+    same = sorted(name for name in names if name.rpartition('/')[2] == meant.rpartition('/')[2])
+    nearest = same[0] if same else find_nearest(meant, names)
+    if nearest is not None and not _is_in_process(context, meant):
+        yield diagnostic_at(
+            each.node_place,
+            'unknown-node',
+            f"there is no node '{meant}' in this system",
+            help=f"did you mean '{nearest}'?",
+            related=[bound_at(context, binding)],
+        )
+
+
+def _is_in_process(context: CheckContext, full_name: str) -> bool:
+    """Return whether an external process may have a node of this name."""
+    return any(
+        process.node_name in (None, full_name.rpartition('/')[2])
+        and (process.node_name or process.name) == full_name.rpartition('/')[2]
+        for process in context.spec.processes.values()
+    )
+
+
+def _explain_refusal(
+    context: CheckContext, binding: Binding, each: RemoteParameter, parameter: ParameterSpec
+) -> Iterator[Diagnostic]:
+    """Report a value that the node refuses."""
+    reason = None
+    if each.value is not None and each.value.value is not None and parameter.type:
+        value = each.value.value
+        reason = find_type_problem(value, parameter.type) or find_refusal(parameter, value)
+    if parameter.read_only and each.value is not None:
+        reason = 'it is read-only'
+    if reason is not None:
+        yield diagnostic_at(
+            each.value_place,
+            'refused-parameter',
+            f"parameter '{each.name}' of node '{each.node}' refuses this: {reason}",
+            related=[
+                bound_at(context, binding),
+                context.related(parameter.path, 'it is declared here'),
+            ],
+        )
+
+
+def _full_name(node: NodeSpec, name: str) -> str:
+    return name if name.startswith('/') else join_names(node.namespace, name)
 
 
 def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec | None:
     """Return the node that a name means, as `node.set_parameters` takes it."""
-    within = node.full_name.rpartition('/')[0]
-    full_name = name if name.startswith('/') else f'{within}/{name}'
+    full_name = _full_name(node, name)
     nodes = context.spec.nodes.values()
     return next((each for each in nodes if each.full_name == full_name), None)
 

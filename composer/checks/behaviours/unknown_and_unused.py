@@ -86,7 +86,9 @@ def _check_names(
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
-                if not use.is_certain and not _is_typo(node, use, declared[binding.behaviour.name]):
+                if not use.is_certain and not _is_typo(
+                    node, use, declared[binding.behaviour.name]
+                ):
                     continue
                 finding = _explain_name(context, node, binding, use)
                 key = (use.place, finding.rule)
