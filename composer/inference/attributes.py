@@ -33,10 +33,10 @@ from composer.inference.values import (
     Value,
     alternatives,
     constant,
+    is_chosen,
     join,
 )
 from composer.interfaces.field_errors import unknown_field
-from composer.python_source.annotations import find_interface
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -88,7 +88,6 @@ _SHOWN_PARTS = {
     'changes': 'the changes',
 }
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
-_OF_MESSAGES = frozenset({'SLOT_TYPES', 'get_fields_and_field_types'})
 
 
 def _function() -> None:
@@ -139,9 +138,7 @@ class Attributes:
             case Message() | MessageClass():
                 return self._read_message(owner, name)
             case External():
-                full_name = f'{owner.name}.{name}'
-                interface = find_interface(full_name)
-                return MessageClass(interface) if interface else External(full_name)
+                return self._evaluator.external(f'{owner.name}.{name}', place)
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
@@ -160,7 +157,7 @@ class Attributes:
                 return 'unknown-attribute', message, f'write {owner.name}().{name}'
             case Constant() | Scalar() | Mapping() | Sequence():
                 return self._read_builtin(owner, name)
-        return UNKNOWN
+        return CHOSEN if is_chosen(owner) else UNKNOWN
 
     def _read_node(self, name: str) -> Value | tuple[str, str, str | None]:
         if name == 'name':
@@ -168,7 +165,7 @@ class Attributes:
         if name == 'ros':
             self._evaluator.run.reading.reaches_ros = True
             self._evaluator.run.reading.open_kinds.add('parameter')
-            return UNKNOWN
+            return CHOSEN
         if name in NODE_ATTRIBUTES:
             return PartOfNode(name)
         if name in NODE_METHODS:
@@ -187,7 +184,7 @@ class Attributes:
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
-                return UNKNOWN
+                return self._evaluator.kept.get(name, UNKNOWN)
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -215,7 +212,9 @@ class Attributes:
             return value_of(field.type, is_made=is_made) if isinstance(owner, Message) else UNKNOWN
         if isinstance(owner, MessageClass) and name in PARTS and '/msg/' not in owner.type:
             return MessageClass(f'{owner.type}_{name}')
-        if description is None or name in _OF_MESSAGES or name[0] == '_':
+        if name == 'get_fields_and_field_types':
+            return BoundMethod(owner, name)
+        if description is None or name == 'SLOT_TYPES' or name[0] == '_':
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN
@@ -280,7 +279,8 @@ class Attributes:
                 run.use_own_state(str(index.value), name_place(Argument(index, place), index))
             else:
                 run.reading.is_own_state_open = True
-            return UNKNOWN
+            key = str(index.value) if isinstance(index, Constant) else ''
+            return self._evaluator.kept.get(f'[{key}]', UNKNOWN)
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []
@@ -345,7 +345,7 @@ class Attributes:
         match owner:
             case PartOfNode(name='state'):
                 run.reading.state_set.add(name)
-                self._evaluator.escape(value)
+                self._evaluator.keep(name, value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)
             case PartOfNode(name='own_state'):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import abc
 from typing import TYPE_CHECKING
 
 from composer.inference.known_functions import KNOWN_RESULTS
@@ -15,6 +16,7 @@ from composer.inference.values import (
     NODE,
     NONE,
     UNKNOWN,
+    Alternatives,
     Argument,
     Arguments,
     Awaitable,
@@ -33,10 +35,12 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
     is_chosen,
+    is_none,
     join,
 )
 from composer.interfaces.field_errors import unknown_field
@@ -87,6 +91,12 @@ class Calls:
         place = Place(scope.module, node)
         if function == External('builtins.super') or function == External('builtins.locals'):
             return UNKNOWN
+        method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
+        if isinstance(function, Unknown) and method in _SECTIONS:
+            # It may be the node, in another guise.
+            name = arguments.get(0, 'name')
+            if name is None or not isinstance(name.value, Constant):
+                self._evaluator.run.reading.open_kinds.add(_SECTIONS[method][1])
         self._evaluator.call_places.append(place)
         try:
             return join(
@@ -177,11 +187,11 @@ class Calls:
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
         self.escape_all(arguments)
-        return UNKNOWN
+        return CHOSEN if is_chosen(function) or _are_chosen(arguments) else UNKNOWN
 
     def _refuse(self, function: Value, place: Place) -> None:
         """Report a call of what cannot be called; `None` may be something else later."""
-        if function == NONE or getattr(function, 'is_lost', False):
+        if is_none(function) or getattr(function, 'is_lost', False):
             return
         called = place.node.func if isinstance(place.node, ast.Call) else place.node
         text = 'this cannot be called'
@@ -237,6 +247,9 @@ class Calls:
             return UNKNOWN
         waits_here = waits and (method != 'call_async' or is_awaited)
         results: list[Value] = []
+        if payload is not None and isinstance(name.value, Alternatives):
+            # Name and payload may have been chosen together.
+            payload = Argument(join(alternatives(payload.value)), payload.place)
         for each in alternatives(name.value):
             if not isinstance(each, Constant) or not isinstance(each.value, str):
                 self._evaluator.run.reading.open_kinds.add(kind)
@@ -253,19 +266,18 @@ class Calls:
         self, method: str, type_name: str | None, payload: Argument | None, arguments: Arguments
     ) -> Value:
         payloads = self._evaluator.payloads
-        sent: str
-        result: Value
-        sent, result = {
+        replies: dict[str, tuple[str, Value]] = {
             'publish': ('', NONE),
             'call': ('_Request', Message(f'{type_name}_Response')),
             'call_async': ('_Request', Message(f'{type_name}_Response')),
             'send_goal': ('_Goal', PartOfNode('goal', type_name or '')),
-        }[method]
+        }
+        sent, result = replies[method]
         if type_name is None:
             return UNKNOWN if method != 'send_goal' else PartOfNode('goal')
         if payload is not None:
-            is_none = payload.value == NONE and method != 'publish'
-            if not is_none:
+            is_left_out = is_none(payload.value) and method != 'publish'
+            if not is_left_out:
                 payloads.check(f'{type_name}{sent}', payload.value, payload.place)
         return result
 
@@ -292,7 +304,7 @@ class Calls:
         return NONE
 
     def _note_remote(
-        self, arguments: Arguments, several: list[tuple[Value, Place, Value]]
+        self, arguments: Arguments, several: abc.Sequence[tuple[Value, Place, Value]]
     ) -> None:
         """Note parameters of another node, if the code names both."""
         node_name = arguments.get(0, 'node_name')
@@ -300,7 +312,9 @@ class Calls:
             if not isinstance(target, Constant) or not isinstance(target.value, str):
                 continue
             at = span_of(name_place(node_name, target), target.value) if node_name else None
-            for key, place, value in several:
+            for key, place, value in (
+                (key, place, one) for key, place, held in several for one in alternatives(held)
+            ):
                 if isinstance(key, Constant) and isinstance(key.value, str) and at:
                     where = getattr(value, 'origin', None) or place
                     self._evaluator.run.reading.remote_parameters.append(
@@ -374,9 +388,20 @@ class Calls:
                 if name in ('split', 'rsplit', 'splitlines'):
                     return Sequence([(Scalar(str), place)], list, is_open=True, origin=place)
                 return Scalar(bytes) if name == 'encode' else UNKNOWN
+        if name == 'get_fields_and_field_types' and isinstance(owner, Message | MessageClass):
+            return self._fields_of(owner, place)
         if first is not None:
             self.escape_all(arguments)
-        return UNKNOWN
+        return CHOSEN if is_chosen(owner) or _are_chosen(arguments) else UNKNOWN
+
+    def _fields_of(self, owner: Message | MessageClass, place: Place) -> Value:
+        description = self._evaluator.run.types.describe(owner.type)
+        if description is None:
+            return UNKNOWN
+        entries: dict[object, tuple[Value, Place]] = {
+            field.name: (Scalar(str), place) for field in description.fields
+        }
+        return Mapping(entries)
 
     def _call_own_state(self, name: str, arguments: Arguments) -> Value:
         """Note which keys are set; what is kept there is known only right after that."""
@@ -398,8 +423,17 @@ class Calls:
             reading.own_state_set |= {str(each.value) for each in constants}
             reading.is_own_state_open |= not constants
         kept = value.value if value else UNKNOWN
+        found = alternatives(key.value) if key else ()
+        keys = [str(each.value) for each in found if isinstance(each, Constant)]
+        if isinstance(kept, Instance):
+            for name_of_key in keys:
+                self._evaluator.keep(f'[{name_of_key}]', kept)
         if isinstance(kept, Instance | Message):
             return kept
+        if name in ('get', 'setdefault') and len(keys) == 1:
+            held = self._evaluator.kept.get(f'[{keys[0]}]')
+            if held is not None:
+                return held
         self.escape_all(arguments)
         return UNKNOWN
 
@@ -520,7 +554,8 @@ class Calls:
                     reading = self._evaluator.run.reading
                     reading.own_state_set |= {str(key.value) for key in keys}
                     reading.is_own_state_open |= not keys
-                    self._evaluator.escape(value)
+                    for key in keys:
+                        self._evaluator.keep(f'[{key.value}]', value)
                 case _:
                     self._evaluator.escape(value)
 
@@ -561,9 +596,12 @@ class Calls:
         if name in KNOWN_RESULTS:
             if not name.startswith('builtins.is'):
                 self._escape_functions(arguments)
-            return KNOWN_RESULTS[name]
+            result = KNOWN_RESULTS[name]
+            if isinstance(result, Scalar) and _are_chosen(arguments):
+                return Scalar(result.kind, is_chosen=True)
+            return result
         self.escape_all(arguments)
-        return UNKNOWN
+        return CHOSEN if _are_chosen(arguments) else UNKNOWN
 
     def _escape_functions(self, arguments: Arguments) -> None:
         """Follow functions that are called back; nothing else is kept or changed."""
@@ -757,6 +795,12 @@ class Calls:
             return UNKNOWN
         rest = Arguments(arguments.positional[1:], arguments.named, arguments.is_open)
         return Partial(arguments.positional[0].value, rest)
+
+
+def _are_chosen(arguments: Arguments) -> bool:
+    """Return whether the file decides on one of the arguments."""
+    values = [argument.value for argument in arguments.all()]
+    return any(is_chosen(each.yielded if isinstance(each, Generated) else each) for each in values)
 
 
 def _is_simple(key: object) -> bool:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import ast
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+import composer
 from composer.inference.attributes import Attributes
 from composer.inference.calls import Calls
 from composer.inference.expressions import Expressions
-from composer.inference.message_types import item_of
+from composer.inference.message_types import item_of, split_part
 from composer.inference.payloads import Payloads
 from composer.inference.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.statements import Statements
 from composer.inference.values import (
+    CHOSEN,
     NODE,
     NONE,
     UNKNOWN,
@@ -44,21 +46,24 @@ from composer.inference.values import (
     alternatives,
     constant,
     is_chosen,
+    is_none,
     join,
     truth_of,
 )
+from composer.interfaces.catalogue import InterfaceKind
 from composer.python_source.annotations import find_interface
-from composer.python_source.modules import FunctionKind, FunctionSource
+from composer.python_source.modules import FunctionKind, FunctionSource, read_signature
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from composer.inference.run import Run
     from composer.python_source.modules import ModuleSource
 
 # How deep helpers of helpers are followed.
 _DEEPEST = 12
+FOLDERS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 _TRANSPARENT = {
     'contextlib.contextmanager',
     'functools.cache',
@@ -76,6 +81,7 @@ class Evaluator:
     """Evaluates expressions and follows statements and functions, in one run.
 
     Attributes:
+        kept: Objects of classes of the project that are kept in the state, by their names there.
         call_places: Where the calls under way are written.
         lasting_doubts: Of each function under way, the doubts that last until its end.
     """
@@ -89,6 +95,7 @@ class Evaluator:
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
         self.call_places: list[Place] = []
+        self.kept: dict[str, Value] = {}
         self._active: list[ast.AST] = []
         self._results: dict[tuple[object, ...], Value] = {}
         self._local_names: dict[int, LocalNames] = {}
@@ -121,18 +128,21 @@ class Evaluator:
 
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
+        self.run.reading.modules.setdefault(id(module), module)
 
-        def evaluate(statement: ast.stmt, is_conditional: bool) -> Value:  # noqa: FBT001
-            if isinstance(statement, ast.Import | ast.ImportFrom):
-                return self.imported(module, statement, name)
+        def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
-            with self.run.silence(), self.run.guard(is_guard=is_conditional):
-                self.statements.follow_all([statement], scope)
+            with self.run.afresh(is_guard=is_conditional):
+                if isinstance(statement, ast.Import | ast.ImportFrom):
+                    return self.imported(module, statement, name)
+                self.statements.follow_all([cast('ast.stmt', statement)], scope)
             return (scope.names or {}).get(name, UNKNOWN)
 
         return self.run.modules.value(module, name, evaluate)
 
-    def imported(self, module: ModuleSource, statement: ast.AST, name: str) -> Value:
+    def imported(
+        self, module: ModuleSource, statement: ast.Import | ast.ImportFrom, name: str
+    ) -> Value:
         """Return what an import stores under a name."""
         full_name = self.run.modules.imported(module, statement, name)
         if not full_name:
@@ -143,9 +153,69 @@ class Evaluator:
                 return ProjectModule(home)
             if self.run.modules.has_name(home, inner):
                 return self.top_value(home, inner)
+        place = Place(module, next(each for each in statement.names if _stored(each) == name))
+        if home is not None:
+            if not self.is_module_in(home, inner):
+                known = self.run.modules.top(home).statements
+                self._report_import(
+                    place, f"there is no '{inner}' in {home.source.name}", known, inner
+                )
             return UNKNOWN
+        return self.external(full_name, place)
+
+    def external(self, full_name: str, place: Place) -> Value:
+        """Return what a full name stands for that is not of the project."""
         interface = find_interface(full_name)
-        return MessageClass(interface) if interface else External(full_name)
+        if interface is None:
+            package, _, name = full_name.partition('.')
+            if package == 'composer' and name and name not in composer.__all__:
+                if '.' not in name and name.islower() is False:
+                    self._report_import(place, f"composer has no '{name}'", composer.__all__, name)
+                return UNKNOWN
+            catalogue = self.run.types.catalogue
+            folder = name.partition('.')[0]
+            if name and folder not in FOLDERS and package in catalogue.packages():
+                if folder.isidentifier() and not folder.startswith('_'):
+                    folders = [each for each in FOLDERS if catalogue.names(each, package)]
+                    self._report_import(place, f"{package} has no '{folder}'", folders, folder)
+            return External(full_name)
+        whole, _ = split_part(interface)
+        package, kind, name = whole.split('/')
+        catalogue = self.run.types.catalogue
+        if package in catalogue.packages() and not catalogue.has(whole):
+            names = catalogue.names(cast('InterfaceKind', kind), package)
+            known = [each.rpartition('/')[2] for each in names]
+            several = [
+                *(f'{other}/{kind}/{name}' for other in catalogue.packages()),
+                *(f'{package}/{other}/{name}' for other in FOLDERS),
+            ]
+            elsewhere = [each for each in several if catalogue.has(each)]
+            if elsewhere:
+                known = []
+            self._report_import(
+                place, f"{package}.{kind} has no '{name}'", known, name, elsewhere[:1]
+            )
+        return MessageClass(interface)
+
+    def _report_import(
+        self,
+        place: Place,
+        message: str,
+        known: Iterable[str],
+        name: str,
+        elsewhere: Iterable[str] = (),
+    ) -> None:
+        found = [each.replace('/', '.') for each in elsewhere]
+        help_text = f"did you mean '{found[0]}'?" if found else suggest(name, known)
+        self.run.report('bad-import', place, message, help_text)
+
+    def check_imports(self, module: ModuleSource) -> None:
+        """Check the names that a module imports, those of helpers included."""
+        for statement in module.body:
+            if isinstance(statement, ast.Import | ast.ImportFrom):
+                for alias in statement.names:
+                    if alias.name != '*':
+                        self.imported(module, statement, _stored(alias))
 
     def is_module_in(self, package: ModuleSource, name: str) -> bool:
         """Return whether a package has a module of this name."""
@@ -161,6 +231,10 @@ class Evaluator:
         if isinstance(target, ast.Attribute):
             owner = self.evaluate(target.value, scope)
             return self.attributes.read(owner, target.attr, Place(scope.module, target))
+        if isinstance(target, ast.Subscript):
+            owner = self.evaluate(target.value, scope)
+            index = self.evaluate(target.slice, scope)
+            self.attributes.read_item(owner, index, Place(scope.module, target.slice))
         return UNKNOWN
 
     def awaited(self, node: ast.expr, scope: Scope) -> Value:
@@ -229,20 +303,24 @@ class Evaluator:
                     self._drop_none(name, scope, has_value=is_none != is_true)
             case ast.Call(func=ast.Name(id=function), args=[ast.Name() as name, *_]):
                 if function in ('isinstance', 'hasattr', 'callable', 'issubclass'):
-                    self._forget(name, scope)
+                    with self.run.silence():
+                        is_known = truth_of(self.evaluate(test, scope)) is not None
+                    if not is_known:
+                        self._forget(name, scope, is_true=is_true)
             case ast.Compare(left=ast.Call(func=ast.Name(id='type'), args=[ast.Name() as name])):
-                self._forget(name, scope)
+                self._forget(name, scope, is_true=True)
 
     def _drop_none(self, name: ast.Name, scope: Scope, *, has_value: bool) -> None:
         value = scope.names.get(name.id) if scope.names is not None else None
         if isinstance(value, Alternatives) and has_value:
-            kept = [each for each in value.values if each != NONE]
+            kept = [each for each in value.values if not is_none(each)]
             scope.set(name.id, join(kept) if kept else UNKNOWN)
 
-    def _forget(self, name: ast.Name, scope: Scope) -> None:
-        """Forget what a name stands for if the test of its type is not decided by that."""
+    def _forget(self, name: ast.Name, scope: Scope, *, is_true: bool) -> None:
+        """Forget what a name stands for, as the test of its type is not decided by that."""
         value = scope.names.get(name.id) if scope.names is not None else None
-        if value is not None and not isinstance(value, NodeValue | Message):
+        is_sure = isinstance(value, NodeValue) or (isinstance(value, Message) and not is_true)
+        if value is not None and not is_sure:
             scope.set(name.id, UNKNOWN)
 
     # What is in something
@@ -265,7 +343,7 @@ class Evaluator:
                 return Scalar(str)
             case PartOfNode(name='parameters'):
                 self.run.reading.open_kinds.add('parameter')
-        return UNKNOWN
+        return CHOSEN if is_chosen(value) else UNKNOWN
 
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""
@@ -273,6 +351,13 @@ class Evaluator:
             each.yielded if isinstance(each, Generated) else UNKNOWN
             for each in alternatives(value)
         )
+
+    def keep(self, name: str, value: Value) -> None:
+        """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
+        if isinstance(value, Instance):
+            self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
+        else:
+            self.escape(value)
 
     def escape(self, value: Value) -> None:
         """Note that something unknown has a value: it may change it, or call it."""
@@ -282,6 +367,8 @@ class Evaluator:
                     self.escape(each)
             case NodeValue():
                 self.run.reading.open_all()
+            case Constant(value=str(text)):
+                self.run.reading.mentioned.add(text)
             case PartOfNode(name='parameters'):
                 self.run.reading.open_kinds.add('parameter')
             case PartOfNode(name='state'):
@@ -365,18 +452,19 @@ class Evaluator:
 
     def fits(self, function: Function, arguments: Arguments) -> bool:
         """Return whether a function can be called so; report it if not."""
-        if isinstance(function.definition, ast.Lambda) or arguments.is_open:
+        if arguments.is_open:
             return True
         given = arguments
         if function.owner is not None:
             me = Argument(function.owner, Place(function.module, function.definition))
             given = Arguments((me, *arguments.positional), arguments.named)
-        signature = FunctionSource(function.definition).signature
+        signature = read_signature(function.definition.args)
         misfit = explain_misfit(signature, given) if signature else None
         if misfit is None or not self.call_places:
             return misfit is None
-        name = function.definition.name
-        message = f"'{name}' is called with other arguments than it takes: {misfit}"
+        definition = function.definition
+        name = 'the lambda' if isinstance(definition, ast.Lambda) else f"'{definition.name}'"
+        message = f'{name} is called with other arguments than it takes: {misfit}'
         self.run.report('bad-call', self.call_places[-1], message)
         return False
 
@@ -404,6 +492,7 @@ class Evaluator:
         )
         self._bind(function, arguments, scope)
         self._active.append(definition)
+        self.run.modules.followed.add(id(definition))
         self.lasting_doubts.append(0)
         try:
             if isinstance(definition, ast.Lambda):
@@ -486,8 +575,12 @@ class Evaluator:
             fields = [
                 each.target.id
                 for each in of.definition.body
-                if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name)
+                if isinstance(each, ast.AnnAssign)
+                and isinstance(each.target, ast.Name)
+                and 'ClassVar' not in ast.unparse(each.annotation)
             ]
+            # Fields of bases come first.
+            fields = [] if of.definition.bases else fields
             for name, argument in zip(fields, arguments.positional, strict=False):
                 made.set(name, argument.value)
             for name, argument in arguments.named:
@@ -560,6 +653,11 @@ class Evaluator:
                 for node in ast.walk(statement)
             )
         return self.run.modules.attribute_stores[key] <= 1
+
+
+def _stored(alias: ast.alias) -> str:
+    """Return the name that an import stores."""
+    return alias.asname or alias.name.partition('.')[0]
 
 
 def kind_of(function: Function) -> FunctionKind:

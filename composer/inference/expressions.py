@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from composer.inference.message_types import item_of
 from composer.inference.operators import combine, compare, negate
-from composer.inference.scopes import Scope
+from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
     NONE,
     UNKNOWN,
@@ -58,7 +58,7 @@ class Expressions:
         if method is None:
             self._evaluate_all(ast.iter_child_nodes(node), scope)
             return UNKNOWN
-        value: Value = method(node, scope)
+        value = cast('Value', method(node, scope))
         if isinstance(value, Scalar) and value.origin is None and isinstance(node, _MAKING):
             return Scalar(value.kind, value.is_chosen, Place(scope.module, node))
         return value
@@ -188,10 +188,11 @@ class Expressions:
         evaluator = self._evaluator
         found: list[Value] = []
         is_reached = True
-        before = scope.copy_names()
+        before: Names | None = None
         with ExitStack() as conditions:
             for index, each in enumerate(node.values):
                 value = evaluator.tested(each, scope)
+                before = before or scope.copy_names()
                 is_last = index == len(node.values) - 1
                 truth = truth_of(value)
                 if is_reached and (truth is None or truth != goes_on or is_last):
@@ -201,7 +202,7 @@ class Expressions:
                     is_reached = is_reached and truth in (None, goes_on)
                     branch = evaluator.branch(value, is_taken=goes_on)
                     conditions.enter_context(branch)
-        scope.names = before
+        scope.names = join_names([before, scope.names])
         kept = [
             each
             for value in found[:-1]
@@ -222,8 +223,13 @@ class Expressions:
                 value = evaluator.evaluate(branch, scope)
             if truth is None or truth == taken:
                 found.append(value)
+            elif is_chosen(test):
+                evaluator.escape(value)
             scope.names = None if before is None else dict(before)
-        return join(found)
+        value = join(found)
+        if isinstance(value, Alternatives):
+            return Alternatives(value.values, is_direct=True)
+        return value
 
     # What is in something
 
@@ -254,14 +260,10 @@ class Expressions:
                     return held[0] if held else UNKNOWN
                 return join([v for v, _ in owner.entries.values()] or [UNKNOWN])
             case Sequence() if not owner.is_lost and not is_slice:
-                at = index.value if isinstance(index, Constant) and index.kind is int else None
-                if (
-                    at is not None
-                    and not owner.is_open
-                    and -len(owner.items) <= at < len(owner.items)
-                ):
-                    return owner.items[at][0]
-                return owner.item()
+                at: int | None = None
+                if isinstance(index, Constant) and index.kind is int:
+                    at = index.value
+                return owner.item_at(at)
             case Constant(value=str()) | Scalar():
                 if owner.kind is str:
                     return Scalar(str, is_chosen(owner))

@@ -184,7 +184,10 @@ def _are_one(left: Value, right: Value) -> bool | None:
     if isinstance(left, Constant) and isinstance(right, Constant):
         singletons = (None, True, False)
         known = left.value in singletons and right.value in singletons
-        return left == right if known or left.kind is not right.kind else None
+        same = left.kind is right.kind and left.value == right.value
+        return same if known or left.kind is not right.kind else None
+    if left == right and isinstance(left, NodeValue):
+        return True
     for one, other in ((left, right), (right, left)):
         if isinstance(one, Constant) and one.value is None:
             certain = (Message, MessageClass, NodeValue, Mapping, Sequence)
@@ -192,6 +195,10 @@ def _are_one(left: Value, right: Value) -> bool | None:
     if isinstance(left, MessageClass) and isinstance(right, MessageClass):
         return left == right
     return None
+
+
+def _are_equal(left: Value, right: Value) -> bool:
+    return isinstance(left, Constant) and isinstance(right, Constant) and left.value == right.value
 
 
 def _is_in(item: Value, container: Value) -> bool | None:
@@ -204,5 +211,5 @@ def _is_in(item: Value, container: Value) -> bool | None:
     if isinstance(container, Sequence) and not (container.is_lost or container.is_open):
         values = [value for value, _ in container.items]
         if all(isinstance(value, Constant) for value in values):
-            return item in values
+            return any(_are_equal(item, value) for value in values)
     return None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from composer.inference.message_types import in_python
 from composer.inference.values import (
+    Alternatives,
     ArrayField,
     Constant,
     Mapping,
@@ -18,6 +19,7 @@ from composer.inference.values import (
     Sequence,
     Value,
     alternatives,
+    is_none,
 )
 from composer.interfaces.field_errors import (
     FieldError,
@@ -46,12 +48,17 @@ _TEXTS = ('string', 'wstring')
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """A value that does not fit, and where it is written."""
+    """A value that does not fit, and where it is written.
+
+    Attributes:
+        used_at: Where it is put into a payload, if it is written elsewhere.
+    """
 
     rule: str
     message: str
     place: Place
     help: str | None = None
+    used_at: Place | None = None
 
 
 class Payloads:
@@ -100,8 +107,15 @@ class Payloads:
 
     def _report(self, misfit: Misfit, place: Place) -> None:
         self._evaluator.run.report(
-            misfit.rule, misfit.place, misfit.message, misfit.help, used_at=place
+            misfit.rule, misfit.place, misfit.message, misfit.help, used_at=misfit.used_at or place
         )
+
+    def fits(self, type_name: str | None, value: Value, place: Place) -> bool:
+        """Return whether a value may become a message of a type."""
+        if type_name is None:
+            return True
+        fit = _Fit(type_name, self._evaluator.run.types)
+        return not fit.any_of(value, lambda each: fit.message(type_name, each, place, ()))
 
     def report_unfit(self) -> None:
         """Report the values that fitted nowhere."""
@@ -127,6 +141,8 @@ class _Fit:
         """Return what is wrong in a value; if it is one of several, in all of them."""
         several = alternatives(value)
         found = [list(compare(each)) for each in several]
+        if isinstance(value, Alternatives) and value.is_direct:
+            return [misfit for misfits in found for misfit in misfits]
         if all(found):
             return found[0]
         for each, misfits in zip(several, found, strict=True):
@@ -191,7 +207,7 @@ class _Fit:
         fields = description.fields
         if len(fields) == 1:
             yield from self.field(fields[0].type, value, place, (*path, fields[0].name))
-        elif fields or value != Constant(type(None), None):
+        elif fields or not is_none(value):
             error = no_message(description.name, None, [field.name for field in fields])
             text = f'expected {in_python(description.name)}, got {_shown(value)}'
             yield self._misfit('field-type', text, place, path, error.help)
@@ -205,7 +221,16 @@ class _Fit:
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
         """Yield what keeps a value from being held by a field."""
-        place = getattr(value, 'origin', None) or place
+        origin = getattr(value, 'origin', None)
+        if origin is not None:
+            for misfit in self._compare(field_type, value, origin, path):
+                yield misfit if misfit.used_at else replace(misfit, used_at=place)
+        else:
+            yield from self._compare(field_type, value, place, path)
+
+    def _compare(
+        self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
+    ) -> Iterator[Misfit]:
         if field_type.array:
             yield from self._array(field_type, value, place, path)
         elif field_type.nested:

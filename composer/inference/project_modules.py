@@ -110,6 +110,8 @@ class ProjectModules:
         self._tops: dict[int, TopNames] = {}
         self._values: dict[tuple[int, str], Value] = {}
         self._under_way: set[tuple[int, str]] = set()
+        # The functions that were read, by their syntax trees.
+        self.followed: set[int] = set()
         # How often the code of a module stores an attribute of a name.
         self.attribute_stores: dict[tuple[int, str], int] = {}
 
@@ -192,7 +194,7 @@ class ProjectModules:
         The module is `None` for what is not of the project.
         """
         top_level, _, _ = dotted.partition('.')
-        if top_level in sys.stdlib_module_names or top_level == 'rclpy':
+        if top_level in sys.stdlib_module_names or top_level in ('rclpy', 'composer'):
             return None, ''
         if (module := self.find(dotted)) is not None:
             return module, ''

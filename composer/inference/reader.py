@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections import abc
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from composer.inference.values import (
     UNKNOWN,
     Argument,
     Arguments,
+    Constant,
     Function,
     Instance,
     Mapping,
@@ -25,12 +27,15 @@ from composer.inference.values import (
     PartOfNode,
     Partial,
     Place,
+    Scalar,
     Sequence,
     Value,
     alternatives,
     constant,
+    is_none,
     join,
 )
+from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.wires import Wire, wire_of
 from composer.python_source.modules import FunctionKind, ModuleSource
 
@@ -62,6 +67,7 @@ class BehaviourReader:
         self._types = MessageTypes(catalogue)
         self._has_real_type = has_real_type
         self._read: dict[object, list[tuple[Log, Reading]]] = {}
+        self._mentions: dict[int, Mentions] = {}
 
     def read(self, node: NodeSpec, binding: Binding) -> Reading:
         """Return what a behaviour does with its node."""
@@ -75,6 +81,16 @@ class BehaviourReader:
         reading = self._read_anew(binding, facts, wire)
         known.append((facts.log, reading))
         return reading
+
+    def mentions(self, reading: Reading) -> Mentions:
+        """Return what the modules of a behaviour may use beside what was read of it."""
+        found = Mentions(set(reading.mentioned))
+        for key, module in reading.modules.items():
+            if key not in self._mentions:
+                self._mentions[key] = find_mentions(module, self._modules.followed)
+            found.names |= self._mentions[key].names
+            found.open_kinds |= self._mentions[key].open_kinds
+        return found
 
     def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:
         module = self._finder.find(binding.behaviour.module)
@@ -116,9 +132,12 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
     )
     callee.is_read = True
     if not evaluator.fits(callee, arguments):
-        # Another check reports it.
+        if isinstance(callee.definition, ast.Lambda):
+            shown = ast.unparse(callee.definition)
+            run.report('bad-signature', place, f'{shown} is called as {binding.call}')
         run.reading.open_all()
         return
+    evaluator.check_imports(module)
     scope = evaluator.enter(callee, arguments, waits=True)
     _check_payloads(evaluator, callee, scope, wire)
     _check_answers(evaluator, scope, binding)
@@ -156,14 +175,17 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     kind = kind_of(callee)
     is_generator = kind.is_generator
     returned = wire.ended if is_generator else wire.returned
-    if kind is FunctionKind.ASYNC_GENERATOR:
+    if kind is FunctionKind.ASYNC_GENERATOR and wire.ended:
         # The last one that it yields is the result.
+        for value, place in scope.yielded:
+            if not evaluator.payloads.fits(wire.ended, value, place):
+                _check(evaluator, wire.yielded, value, place)
         return
     for value, place in scope.yielded if is_generator else ():
         _check(evaluator, wire.yielded, value, place)
     for value, place in scope.returned:
         _check(evaluator, returned, value, place)
-    nothing = all(value == NONE for value, _ in scope.returned)
+    nothing = all(is_none(value) for value, _ in scope.returned)
     if wire.needs_payload and wire.returned and scope.returned and nothing and not is_generator:
         _, place = scope.returned[-1]
         evaluator.payloads.check(wire.returned, NONE, place)
@@ -178,20 +200,20 @@ def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None
     wanted = kinds.get(binding.key.key)
     for value, place in scope.returned if wanted else ():
         several = alternatives(value)
-        kinds_of = [getattr(each, 'kind', None) for each in several]
-        if wanted and all(kind is not None and kind not in wanted for kind in kinds_of):
+        found = [each.kind for each in several if isinstance(each, Constant | Scalar | Sequence)]
+        if wanted and len(found) == len(several) and not set(found) & set(wanted):
             what = 'whether to accept, or why not' if bool in wanted else 'None, or why not'
             evaluator.run.report(
                 'bad-answer',
                 place,
-                f'{binding.owner} returns a {kinds_of[0].__name__}',
+                f'{binding.owner} returns a {found[0].__name__}',
                 f'return {what}',
             )
 
 
 def _check(evaluator: Evaluator, type_name: str | None, value: Value, place: Place) -> None:
     """Check a payload; none is published for `None`."""
-    several = [each for each in alternatives(value) if each != NONE]
+    several = [each for each in alternatives(value) if not is_none(each)]
     if several:
         evaluator.payloads.check(type_name, join(several), place)
 

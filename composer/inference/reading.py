@@ -10,6 +10,7 @@ from composer.entity_kinds import USED_KINDS
 if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.inference.values import Constant
+    from composer.python_source.modules import ModuleSource
 
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
@@ -103,6 +104,8 @@ class Reading:
         state_read: What it reads of `node.state`.
         state_set: The names that it sets there.
         is_state_open: Whether it may set others.
+        mentioned: Texts that something unknown is given, and may use as names.
+        modules: The modules that it needs.
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
             are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
@@ -117,6 +120,8 @@ class Reading:
     state_read: list[StateUse] = field(default_factory=list)
     state_set: set[str] = field(default_factory=set)
     is_state_open: bool = False
+    mentioned: set[str] = field(default_factory=set)
+    modules: dict[int, ModuleSource] = field(default_factory=dict)
     own_state_read: list[StateUse] = field(default_factory=list)
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False

@@ -32,6 +32,7 @@ class Run:
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
         guards: The number of statements around it that catch what a wrong name raises.
+        broad_guards: The number of statements around it that catch everything.
         conditions: The number of conditions around it.
         is_silent: Whether the place is read once more later.
     """
@@ -43,6 +44,7 @@ class Run:
         self.reading = Reading()
         self.doubts = 0
         self.guards = 0
+        self.broad_guards = 0
         self.conditions = 0
         self.is_silent = False
         self._steps = 0
@@ -69,13 +71,25 @@ class Run:
             self.doubts -= is_doubt
 
     @contextmanager
-    def guard(self, *, is_guard: bool) -> Iterator[None]:
+    def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
         """Note what is read meanwhile as guarded, if it is."""
         self.guards += is_guard
+        self.broad_guards += is_broad
         try:
             yield
         finally:
             self.guards -= is_guard
+            self.broad_guards -= is_broad
+
+    @contextmanager
+    def afresh(self, *, is_guard: bool) -> Iterator[None]:
+        """Read the top of a module meanwhile, on no condition of the place that needs it."""
+        before = self.doubts, self.guards, self.conditions, self.is_silent
+        self.doubts, self.guards, self.conditions, self.is_silent = 0, int(is_guard), 0, False
+        try:
+            yield
+        finally:
+            self.doubts, self.guards, self.conditions, self.is_silent = before
 
     @contextmanager
     def silence(self) -> Iterator[None]:
@@ -132,7 +146,7 @@ class Run:
                 span_of(place, name),
                 is_optional=is_optional,
                 has_default=has_default,
-                is_certain=not self.doubts,
+                is_certain=not (self.doubts or self.broad_guards),
                 is_guarded=bool(self.guards),
                 waits=waits,
                 is_change=is_change,
@@ -163,7 +177,8 @@ def span_of(place: Place, name: str = '') -> Span:
         name: What to mark in it: the text, or the last name of a chain of attributes.
     """
     node, module = place.node, place.module
-    line: int = getattr(node, 'end_lineno', None) or getattr(node, 'lineno', 1)
+    first_line: int = getattr(node, 'lineno', 1)
+    line: int = getattr(node, 'end_lineno', first_line)
     source = module.source
     text = source.line(line)
     start = getattr(node, 'col_offset', 0) if getattr(node, 'lineno', line) == line else 0

@@ -128,6 +128,7 @@ class Statements:
             if isinstance(target, ast.Name):
                 scope.set(target.id, UNKNOWN)
             elif isinstance(target, ast.Subscript):
+                self._evaluator.read_target(target, scope)
                 self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
             elif isinstance(target, ast.Attribute):
                 self._evaluator.evaluate(target.value, scope)
@@ -156,7 +157,9 @@ class Statements:
         """A value that nothing takes may have been meant for something."""
         value = self._evaluator.evaluate(node.value, scope)
         run = self._evaluator.run
-        if isinstance(node.value, _WITHOUT_EFFECT):
+        is_plain = not isinstance(node.value, ast.BinOp | ast.Compare)
+        is_plain = is_plain or isinstance(value, Constant | Scalar)
+        if isinstance(node.value, _WITHOUT_EFFECT) and is_plain:
             place = Place(scope.module, node.value)
             run.report('no-effect', place, 'this has no effect', 'return it, or remove it')
         elif isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
@@ -245,6 +248,11 @@ class Statements:
         before = scope.copy_names()
         for case in node.cases:
             scope.names = None if before is None else dict(before)
+            for pattern in ast.walk(case.pattern):
+                if isinstance(pattern, ast.MatchValue):
+                    self._evaluator.evaluate(pattern.value, scope)
+                elif isinstance(pattern, ast.MatchClass):
+                    self._evaluator.evaluate(pattern.cls, scope)
             for name in _captured(case.pattern):
                 scope.set(name, UNKNOWN)
             if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
@@ -318,7 +326,8 @@ class Statements:
     def _try(self, node: ast.Try, scope: Scope) -> None:
         run = self._evaluator.run
         before = scope.copy_names()
-        with run.guard(is_guard=any(map(_is_guard, node.handlers))):
+        is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
+        with run.guard(is_guard=is_guard, is_broad=is_broad):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
@@ -383,6 +392,13 @@ def _is_guard(handler: ast.ExceptHandler) -> bool:
     names = {'BaseException'} if handler.type is None else _names_in(handler.type)
     does_nothing = all(isinstance(each, _DOING_NOTHING) for each in handler.body)
     return bool(names & _CATCHING) or (does_nothing and bool(names & _CATCHING_ALL))
+
+
+def _is_broad(handler: ast.ExceptHandler) -> bool:
+    """Return whether a handler catches everything, and goes on."""
+    names = {'BaseException'} if handler.type is None else _names_in(handler.type)
+    raises = any(isinstance(node, ast.Raise) for each in handler.body for node in ast.walk(each))
+    return bool(names & _CATCHING_ALL) and not raises
 
 
 def _suppresses(expression: ast.expr) -> bool:

@@ -183,6 +183,13 @@ class Sequence:
     is_lost: bool = False
     origin: Place | None = None
 
+    def item_at(self, index: int | None) -> Value:
+        """Return what the item at an index may be; `None` for one that is not known."""
+        count = len(self.items)
+        if index is not None and not self.is_open and -count <= index < count:
+            return self.items[index][0]
+        return self.item()
+
     def item(self) -> Value:
         """Return what any of its items may be."""
         if self.is_lost or (self.is_open and not self.items):
@@ -250,9 +257,14 @@ class ProjectModule:
 
 @dataclass(frozen=True, slots=True)
 class Alternatives:
-    """One of several values."""
+    """One of several values.
+
+    Attributes:
+        is_direct: Whether one expression chooses between them, as in `a if b else c`.
+    """
 
     values: tuple[Value, ...]
+    is_direct: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,6 +352,11 @@ def join(values: Iterable[Value]) -> Value:
     if any(isinstance(value, Unknown) for value in found):
         return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
     return Alternatives(tuple(found))
+
+
+def is_none(value: Value) -> bool:
+    """Return whether a value is `None`, whoever decided on it."""
+    return isinstance(value, Constant) and value.value is None
 
 
 def is_chosen(value: Value) -> bool:

@@ -64,9 +64,16 @@ class FunctionSource:
         return _kind_of(self.definition) if self.definition else None
 
     @cached_property
+    def first_yield(self) -> int | None:
+        """The line of its first `yield`, if it has one."""
+        nodes = _own_nodes(self.definition) if self.definition else []
+        lines = [node.lineno for node in nodes if isinstance(node, ast.Yield | ast.YieldFrom)]
+        return min(lines, default=None)
+
+    @cached_property
     def signature(self) -> inspect.Signature | None:
         """Its parameters, if they are known."""
-        return _read_signature(self.definition.args) if self.definition else None
+        return read_signature(self.definition.args) if self.definition else None
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,9 @@ class ModuleSource:
     def place_of(self, line: int) -> Span:
         """Return the span of a line."""
         text = self.source.line(line)
-        return Span(self.source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1))
+        return Span(
+            self.source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1)
+        )
 
 
 def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSource:
@@ -215,9 +224,29 @@ class _ModuleReader:
         elif isinstance(statement, ast.Assign | ast.AnnAssign):
             self._read_assignment(statement)
         else:
+            self._read_stores(statement)
             blocks = (getattr(statement, name, ()) for name in BLOCKS)
             return [each for block in blocks for each in block]
         return []
+
+    def _read_stores(self, statement: ast.AST) -> None:
+        """Read the names that a statement stores beside those of the statements in it."""
+        pending = [statement]
+        while pending:
+            node = pending.pop()
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                self._bind(node.id, FunctionSource())
+            # Names may be stored in `globals()` or `sys.modules[__name__]`.
+            is_open = isinstance(node, ast.Name) and node.id in ('globals', 'vars', 'exec')
+            is_module = isinstance(node, ast.Attribute) and node.attr == 'modules'
+            self.is_open |= is_open or is_module
+            if not isinstance(node, _OWN_SCOPE):
+                inner = ast.iter_child_nodes(node)
+                pending += [
+                    each
+                    for each in inner
+                    if not isinstance(each, ast.stmt | ast.ExceptHandler | ast.match_case)
+                ]
 
     def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
         for alias in statement.names:
@@ -234,6 +263,11 @@ class _ModuleReader:
     def _read_assignment(self, statement: ast.Assign | ast.AnnAssign) -> None:
         targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
         value = statement.value
+        if value is not None:
+            self._read_stores(value)
+        for target in targets:
+            if not isinstance(target, ast.Name):
+                self._read_stores(target)
         for target in targets:
             for node in ast.walk(target):
                 if not isinstance(node, ast.Name):
@@ -292,7 +326,8 @@ def _own_nodes(function: FunctionNode) -> list[ast.AST]:
     return found
 
 
-def _read_signature(arguments: ast.arguments) -> inspect.Signature:
+def read_signature(arguments: ast.arguments) -> inspect.Signature:
+    """Return how a function with these parameters is called."""
     positional = [
         *((argument, inspect.Parameter.POSITIONAL_ONLY) for argument in arguments.posonlyargs),
         *((argument, inspect.Parameter.POSITIONAL_OR_KEYWORD) for argument in arguments.args),

@@ -11,11 +11,11 @@ from composer.python_source.module_finder import MissingModule
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic
-    from composer.python_source.modules import FunctionKind, ModuleSource
+    from composer.diagnostics import Diagnostic, Span
+    from composer.python_source.modules import FunctionKind, FunctionSource, ModuleSource
 
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
@@ -39,8 +39,13 @@ def check_behaviour_call(
     binding: Binding,
     kind: FunctionKind | None,
     signature: inspect.Signature | None,
+    related: Sequence[Related] = (),
 ) -> Iterator[Diagnostic]:
-    """Check that a function fits its place; a kind or signature of `None` is unknown."""
+    """Check that a function fits its place; a kind or signature of `None` is unknown.
+
+    Args:
+        related: Where it is defined, if that is known.
+    """
     behaviour = binding.behaviour
     if kind is not None and kind.is_generator and not binding.may_yield:
         yield context.at_value(
@@ -49,9 +54,11 @@ def check_behaviour_call(
             f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
             part=behaviour.function,
             help='timers and actions take generators; return the value instead',
+            related=related,
         )
     if signature is not None:
-        yield from _check_signature(context, binding, signature)
+        for finding in _check_signature(context, binding, signature):
+            yield finding.with_related(related)
 
 
 def _explain_broken_module(
@@ -91,9 +98,19 @@ def _check_source(
     if isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
     elif function := module.functions.get(behaviour.function):
-        yield from check_behaviour_call(context, binding, function.kind, function.signature)
+        place = [Related('it is defined here', at) for at in _places_of(module, function)]
+        yield from check_behaviour_call(context, binding, function.kind, function.signature, place)
     elif not module.is_open:
         yield _explain_missing_function(context, binding, module)
+
+
+def _places_of(module: ModuleSource, function: FunctionSource) -> Iterator[Span]:
+    """Yield where a function is defined, and where it yields first."""
+    if function.definition is None:
+        return
+    yield module.place_of(function.definition.lineno)
+    if (line := function.first_yield) is not None:
+        yield module.place_of(line)
 
 
 def _explain_missing_module(

@@ -82,13 +82,12 @@ def _check_names(
         is_open = any(reading.reaches_ros for _, reading in uses[name])
         for binding, reading in uses[name]:
             for use in reading.uses:
-                if use.is_guarded or use.has_default or (is_open and use.kind == 'parameter'):
+                if use.is_guarded or (is_open and use.kind == 'parameter'):
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
-                if not use.is_certain and not _is_typo(
-                    node, use, declared[binding.behaviour.name]
-                ):
+                is_needed = use.is_certain and not (use.has_default or use.is_change)
+                if not is_needed and not _is_typo(node, use, declared[binding.behaviour.name]):
                     continue
                 finding = _explain_name(context, node, binding, use)
                 key = (use.place, finding.rule)
@@ -165,10 +164,14 @@ def _check_unused(
         names = {(use.kind, use.name) for each in uses for use in each.uses}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
         names |= set(_meant(node, names))
+        mentions = [context.behaviours.mentions(each) for each in uses]
+        mentioned = set().union(*(each.names for each in mentions))
+        open_kinds |= set().union(*(each.open_kinds for each in mentions))
         for kind in USED_KINDS:
             for name, entity in getattr(node, kind.section).items():
                 span = context.system.positions.key(entity.path)
                 is_used = kind.noun in open_kinds or (kind.noun, name) in names
+                is_used = is_used or name in mentioned
                 if is_used or _is_of_ros(kind.noun, name):
                     used.add(span)
                 elif span not in unused:

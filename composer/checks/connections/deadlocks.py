@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.cycles import find_knots, find_way
+from composer.diagnostics import Related
 from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from composer.checks.connections.topology import Endpoint
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic, Related
+    from composer.diagnostics import Diagnostic, Span
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
@@ -40,6 +41,7 @@ class _Wait:
         group: The group that it keeps meanwhile, `None` for none.
         client: The end that it calls through.
         server: The end that would answer.
+        place: Where the behaviour waits.
         answering: The behaviour that would, by its path.
         answering_group: The group that it needs, `None` for none.
     """
@@ -50,6 +52,7 @@ class _Wait:
     service: str
     client: Endpoint
     server: Endpoint
+    place: Span
 
     @property
     def path(self) -> DataPath:
@@ -87,17 +90,17 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
         for binding in node_bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
-            names = {
-                use.name
-                for use in context.behaviours.read(node, binding).uses
+            waits = {
+                use.name: use.place
+                for use in reversed(context.behaviours.read(node, binding).uses)
                 if use.kind == 'service client' and use.waits and use.is_certain
             }
-            for name in sorted(names):
+            for name, place in sorted(waits.items(), key=lambda wait: wait[0]):
                 if (node.name, name) in servers:
                     channel, client = servers[node.name, name]
                     group = _group_in(node, binding)
                     server = channel.providers[0]
-                    yield _Wait(node, binding, group, channel.name, client, server)
+                    yield _Wait(node, binding, group, channel.name, client, server, place)
 
 
 def _group_in(node: NodeSpec, binding: Binding) -> Group | None:
@@ -216,6 +219,7 @@ def _places(context: CheckContext, chain: list[_Wait]) -> list[Related]:
         place
         for wait in chain
         for place in (
+            Related(f"'{wait.binding.behaviour.function}' waits here", wait.place),
             context.related(wait.server.path, f"'{wait.service}' is served here"),
             context.related(wait.client.path, f"node '{wait.node.name}' calls it by this name"),
         )

@@ -51,9 +51,9 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
 
 def kind_of(function: Callable[..., Any]) -> FunctionKind:
     """Return how a function runs; of an object with `__call__`, how that does."""
-    target: Any = inspect.unwrap(function)
+    target: Any = function
     while isinstance(target, partial):
-        target = inspect.unwrap(target.func)
+        target = target.func
     if not inspect.isroutine(target) and not inspect.isclass(target):
         target = type(target).__call__
     if inspect.isasyncgenfunction(target):
@@ -66,7 +66,8 @@ def kind_of(function: Callable[..., Any]) -> FunctionKind:
 def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
     """Return a function's signature; `None` for functions of C that have none."""
     try:
-        return inspect.signature(function)
+        # What is called is the wrapper, which may take and return something else.
+        return inspect.signature(function, follow_wrapped=False)
     except (TypeError, ValueError):
         return None
 
