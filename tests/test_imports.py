@@ -27,7 +27,16 @@ ROOMS = (
         'diagnostics',
     ),
     *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
-    *('python_source', 'inference', 'checks', 'reports', 'drawing', 'executor', 'processes', 'runtime'),
+    *(
+        'python_source',
+        'inference',
+        'checks',
+        'reports',
+        'drawing',
+        'executor',
+        'processes',
+        'runtime',
+    ),
     *('cli', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

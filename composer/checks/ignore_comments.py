@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from composer.rules import Need
     from composer.yaml_text.comments import IgnoreComment
 
-_YAML = ('.yaml', '.yml')
+_READ = ('.yaml', '.yml', '.py')
 
 
 def apply_ignore_comments(
@@ -46,20 +46,22 @@ def leave_out_silenced(findings: list[Diagnostic], source: SourceFile) -> list[D
 def _read_comments(findings: list[Diagnostic], source: SourceFile) -> list[IgnoreComment]:
     spans = [finding.span for finding in findings if finding.span]
     sources = {source: None} | {
-        span.source: None for span in spans if span.source.name.endswith(_YAML)
+        span.source: None for span in spans if span.source.name.endswith(_READ)
     }
     return [comment for each in sources for comment in read_ignore_comments(each)]
 
 
 def _is_silenced(finding: Diagnostic, comments: list[IgnoreComment]) -> bool:
-    return (
-        any(
-            named.text == finding.rule and _is_beside(finding, named)
-            for comment in comments
-            for named in comment.rules
-        )
-        and load_rule(finding.rule).ignorable
-    )
+    return any(
+        named.text == finding.rule and _is_beside(finding, named)
+        for comment in comments
+        for named in comment.rules
+    ) and (load_rule(finding.rule).ignorable or _is_in_python(finding))
+
+
+def _is_in_python(finding: Diagnostic) -> bool:
+    """Return whether a finding is about code, with which a system can start."""
+    return finding.file.endswith('.py')
 
 
 def _is_beside(finding: Diagnostic, comment: Span) -> bool:
@@ -84,7 +86,7 @@ def _check(
             help_text = suggest(named.text, list_rule_names(), otherwise=advice)
             message = f"there is no rule '{named.text}'"
             yield _warn(named, 'unknown-rule', message, help_text or advice)
-        elif here and not load_rule(named.text).ignorable:
+        elif here and not (load_rule(named.text).ignorable or _is_in_python(here[0])):
             message = f"'{named.text}' cannot be silenced: nothing can run until it is fixed"
             yield _warn(named, 'unused-ignore', message, 'fix the error and remove the comment')
         elif not here and unchecked is not None and load_rule(named.text).needs not in unchecked:

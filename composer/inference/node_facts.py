@@ -20,8 +20,9 @@ _PYTHON_TYPES: dict[str, type] = {'bool': bool, 'integer': int, 'double': float,
 
 @dataclass(slots=True)
 class NodeFacts:
-    """Answers of one node, all of which are noted: for another node that gives the same ones, the
-    reading of a behaviour is the same.
+    """Answers of one node, all of which are noted.
+
+    For another node that gives the same ones, the reading of a behaviour is the same.
 
     Args:
         has_real_type: Whether the type of an entity is the one that is meant.

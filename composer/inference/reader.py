@@ -6,12 +6,15 @@ import ast
 from collections import abc
 from typing import TYPE_CHECKING
 
-from composer.inference.evaluator import Evaluator, kind_of
+from composer.inference.evaluation.evaluator import Evaluator
+from composer.inference.evaluation.functions import kind_of
 from composer.inference.message_types import MessageTypes
 from composer.inference.node_facts import Log, NodeFacts
 from composer.inference.project_modules import ProjectModules, is_of_project
 from composer.inference.reading import Reading, unknown_reading
 from composer.inference.run import Run, TooLongError
+from composer.inference.scopes import own_nodes
+from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
     CHOSEN,
     NODE,
@@ -24,8 +27,8 @@ from composer.inference.values import (
     Instance,
     Mapping,
     Message,
-    PartOfNode,
     Partial,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -35,7 +38,6 @@ from composer.inference.values import (
     is_none,
     join,
 )
-from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.wires import Wire, wire_of
 from composer.python_source.modules import FunctionKind, ModuleSource
 
@@ -47,6 +49,10 @@ if TYPE_CHECKING:
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
     from composer.python_source.module_finder import ModuleFinder
+
+
+# What ends a loop; that a call may raise is no way to end one.
+_WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
 
 
 class BehaviourReader:
@@ -131,16 +137,17 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
         (*bound.named, *((name, Argument(value, place)) for name, value in named)),
     )
     callee.is_read = True
-    if not evaluator.fits(callee, arguments):
+    if not evaluator.functions.fits(callee, arguments):
         if isinstance(callee.definition, ast.Lambda):
             shown = ast.unparse(callee.definition)
             run.report('bad-signature', place, f'{shown} is called as {binding.call}')
         run.reading.open_all()
         return
-    evaluator.check_imports(module)
-    scope = evaluator.enter(callee, arguments, waits=True)
+    evaluator.imports.check_imports(module)
+    scope = evaluator.functions.enter(callee, arguments, waits=True)
     _check_payloads(evaluator, callee, scope, wire)
     _check_answers(evaluator, scope, binding)
+    _check_end(evaluator, callee, binding)
     evaluator.payloads.report_unfit()
 
 
@@ -155,7 +162,7 @@ def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Argument
                 return None
             return inner[0], value.arguments
         case Instance():
-            method = evaluator.class_attribute(value.of, '__call__', value)
+            method = evaluator.classes.class_attribute(value.of, '__call__', value)
             return (method, Arguments()) if isinstance(method, Function) else None
     return None
 
@@ -189,6 +196,25 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     if wire.needs_payload and wire.returned and scope.returned and nothing and not is_generator:
         _, place = scope.returned[-1]
         evaluator.payloads.check(wire.returned, NONE, place)
+
+
+def _check_end(evaluator: Evaluator, callee: Function, binding: Binding) -> None:
+    """Check that a behaviour ends: until then nothing else of its group runs."""
+    kind, definition = kind_of(callee), callee.definition
+    # Goals have threads of their own.
+    is_of_action = binding.kind is not None and binding.kind.channel == 'action'
+    if kind is not FunctionKind.PLAIN or is_of_action or isinstance(definition, ast.Lambda):
+        return
+    for loop in own_nodes(definition):
+        if isinstance(loop, ast.While) and _is_endless(loop):
+            place = Place(callee.module, loop.test)
+            text = 'this loop never ends, and nothing else of its callback group runs again'
+            evaluator.run.report('endless-loop', place, text, 'let a timer call the behaviour')
+
+
+def _is_endless(loop: ast.While) -> bool:
+    is_always_true = isinstance(loop.test, ast.Constant) and bool(loop.test.value)
+    return is_always_true and not any(isinstance(node, _WAYS_OUT) for node in own_nodes(loop))
 
 
 def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None:

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
 
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
+# The methods of the node that send something, and the noun of what they use by its name.
+SENDING_METHODS = {
+    'publish': 'publisher',
+    'call': 'service client',
+    'call_async': 'service client',
+    'send_goal': 'action client',
+}
 
 
 @dataclass(frozen=True, slots=True)

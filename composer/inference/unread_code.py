@@ -1,4 +1,4 @@
-"""What code may use that no reading followed: methods that are called by unknown ways, and the like.
+"""What code may use that no reading followed, such as methods that are called by unknown ways.
 
 Nothing is reported in it; what it may use is not called unused.
 """
@@ -9,7 +9,7 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.inference.reading import USED_NOUNS
+from composer.inference.reading import SENDING_METHODS, USED_NOUNS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -17,12 +17,6 @@ if TYPE_CHECKING:
     from composer.python_source.modules import ModuleSource
 
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-_KINDS = {
-    'publish': 'publisher',
-    'call': 'service client',
-    'call_async': 'service client',
-    'send_goal': 'action client',
-}
 
 
 @dataclass(slots=True)
@@ -59,9 +53,11 @@ def find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
                 plain.add(id(parameters))
             case ast.Attribute(attr='parameters') if id(node) not in plain:
                 found.open_kinds.add('parameter')
-            case ast.Call(func=ast.Attribute(attr=method), args=[name, *_]) if method in _KINDS:
+            case ast.Call(func=ast.Attribute(attr=method), args=[name, *_]) if (
+                method in SENDING_METHODS
+            ):
                 if not isinstance(name, ast.Constant):
-                    found.open_kinds.add(_KINDS[method])
+                    found.open_kinds.add(SENDING_METHODS[method])
             case ast.Call(func=ast.Name('exec' | 'eval')):
                 found.open_kinds |= USED_NOUNS
     return found

@@ -183,6 +183,11 @@ class Sequence:
     is_lost: bool = False
     origin: Place | None = None
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of its items are known."""
+        return not (self.is_open or self.is_lost)
+
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""
         count = len(self.items)
@@ -381,3 +386,9 @@ def _truth_of(value: Value) -> bool | None:
         case Mapping() | Sequence() if not value.is_open and not value.is_lost:
             return bool(value.entries if isinstance(value, Mapping) else value.items)
     return None
+
+
+def are_chosen(arguments: Arguments) -> bool:
+    """Return whether the file decides on one of the arguments."""
+    values = [argument.value for argument in arguments.all()]
+    return any(is_chosen(each.yielded if isinstance(each, Generated) else each) for each in values)

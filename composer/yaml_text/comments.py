@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tokenize
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 _MARK = 'composer:'
 _COMMENT = re.compile(r'(?:^|(?<=\s))#\s*composer:\s*ignore\b\s*(?:\[(?P<rules>[^\]]*)\])?')
+# From Python 3.12 on, an f-string is several tokens.
+_TEXTS = (tokenize.STRING, getattr(tokenize, 'FSTRING_MIDDLE', tokenize.STRING))
 _RULE = re.compile(r'[^\s,]+')
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 # Line and column, both counted from 0.
@@ -36,16 +39,18 @@ class IgnoreComment:
 
 
 def read_ignore_comments(source: SourceFile) -> list[IgnoreComment]:
-    """Return the comments of a file that silence rules; in a scalar, one is only text.
+    """Return the comments of a YAML file or Python module that silence rules.
 
-    If the text is not YAML, those before the error are returned.
+    In a scalar or a string, one is only text. If the text is not YAML, those before the error are
+    returned.
     """
     if not any(_MARK in line for line in source.lines):
         return []
     found = list(_find_candidates(source))
     if not found:
         return []
-    texts, end = _find_scalars(source)
+    is_python = source.name.endswith('.py')
+    texts, end = _find_texts(source) if is_python else _find_scalars(source)
     return [
         comment
         for comment in found
@@ -64,6 +69,20 @@ def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
             )
             span = Span(source, number, match.start() + 1, match.end() - match.start())
             yield IgnoreComment(span, rules)
+
+
+def _find_texts(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:
+    """Return where the texts of a Python module begin and end, and where it stops being one."""
+    found = []
+    lines = iter([f'{line}\n' for line in source.lines])
+    try:
+        for token in tokenize.generate_tokens(lambda: next(lines, '')):
+            if token.type in _TEXTS:
+                (line, column), (last_line, last_column) = token.start, token.end
+                found.append(((line - 1, column), (last_line - 1, last_column)))
+    except (tokenize.TokenError, SyntaxError):
+        return found, (0, 0)
+    return found, (len(source.lines), 0)
 
 
 def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:

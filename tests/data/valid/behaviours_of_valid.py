@@ -14,7 +14,7 @@ def plain(node):
 
 
 def generator(node):
-    yield 1
+    yield 'one'
 
 
 async def coroutine(node):
@@ -22,7 +22,7 @@ async def coroutine(node):
 
 
 async def async_generator(node):
-    yield 1
+    yield 'one'
 
 
 def with_arguments(node, /, speed, *, heading=0.0, **others):
@@ -35,6 +35,10 @@ def anything(*args, **kwargs):
 
 def hear(node, message, repeat=1):
     return message
+
+
+def show(node, message):
+    return str(message.data)
 
 
 async def hear_later(node, message):

@@ -42,7 +42,7 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from composer.inference.evaluator import Evaluator
+    from composer.inference.evaluation.evaluator import Evaluator
 
 # What `composer.Node` has; a test holds these names against the classes.
 NODE_METHODS = frozenset(
@@ -138,13 +138,13 @@ class Attributes:
             case Message() | MessageClass():
                 return self._read_message(owner, name)
             case External():
-                return self._evaluator.external(f'{owner.name}.{name}', place)
+                return self._evaluator.imports.external(f'{owner.name}.{name}', place)
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
                 return self._read_instance(owner, name)
             case Class():
-                return self._evaluator.class_attribute(owner, name, None) or UNKNOWN
+                return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
             case Awaitable():
@@ -230,7 +230,7 @@ class Attributes:
     def _read_module(self, owner: ProjectModule, name: str) -> Value | tuple[str, str, str | None]:
         if self._evaluator.run.modules.has_name(owner.module, name):
             return self._evaluator.top_value(owner.module, name)
-        if self._evaluator.is_module_in(owner.module, name):
+        if self._evaluator.imports.is_module_in(owner.module, name):
             return UNKNOWN
         path = owner.module.path
         known = self._evaluator.run.modules.top(owner.module).statements
@@ -238,13 +238,13 @@ class Attributes:
         return 'undefined-name', message, suggest(name, known)
 
     def _read_instance(self, owner: Instance, name: str) -> Value:
-        found = self._evaluator.class_attribute(owner.of, name, owner)
+        found = self._evaluator.classes.class_attribute(owner.of, name, owner)
         stored = owner.attributes.get(name)
         if stored is None:
             return found or UNKNOWN
         # What other behaviours store in it is not known here.
         is_lasting = isinstance(stored, NodeValue | PartOfNode | BoundMethod | Function | Instance)
-        if is_lasting or self._evaluator.is_stored_once(owner.of, name):
+        if is_lasting or self._evaluator.classes.is_stored_once(owner.of, name):
             return stored
         return UNKNOWN
 

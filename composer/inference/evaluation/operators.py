@@ -90,10 +90,9 @@ def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value
     if isinstance(sign, ast.Add) and isinstance(right, Sequence) and not right.is_lost:
         items = [*left.items, *right.items]
         return Sequence(items, left.kind, left.is_open or right.is_open, origin=left.origin)
-    if isinstance(sign, ast.Mult) and isinstance(right, Constant) and right.kind is int:
-        if 0 <= right.value * len(left.items) <= _MOST_ITEMS:
-            items = left.items * right.value
-            return Sequence(items, left.kind, left.is_open, origin=left.origin)
+    times = right.value if isinstance(right, Constant) and right.kind is int else -1
+    if isinstance(sign, ast.Mult) and 0 <= times * len(left.items) <= _MOST_ITEMS:
+        return Sequence(left.items * times, left.kind, left.is_open, origin=left.origin)
     if isinstance(sign, ast.Mult):
         return Sequence(list(left.items), left.kind, is_open=True, origin=left.origin)
     return UNKNOWN

@@ -6,8 +6,8 @@ import ast
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.evaluation.operators import combine, compare, negate
 from composer.inference.message_types import item_of
-from composer.inference.operators import combine, compare, negate
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
     NONE,
@@ -33,7 +33,7 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from composer.inference.evaluator import Evaluator
+    from composer.inference.evaluation.evaluator import Evaluator
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
@@ -127,7 +127,7 @@ class Expressions:
         for key, value in zip(node.keys, node.values, strict=True):
             held = self.evaluate(value, scope)
             if key is None:
-                self._evaluator.calls.update_mapping(made, held, Place(scope.module, value))
+                self._evaluator.containers.update_mapping(made, held, Place(scope.module, value))
                 continue
             name = self.evaluate(key, scope)
             if isinstance(name, Constant):
@@ -275,7 +275,7 @@ class Expressions:
         return self._evaluator.calls.call(node, scope)
 
     def _lambda(self, node: ast.Lambda, scope: Scope) -> Value:
-        return self._evaluator.define(node, scope)
+        return self._evaluator.functions.define(node, scope)
 
     def _await(self, node: ast.Await, scope: Scope) -> Value:
         if isinstance(node.value, ast.Call):
@@ -323,9 +323,8 @@ class Expressions:
         place = Place(scope.module, node)
         items = [(value, Place(scope.module, node.elt))]
         is_plain = len(node.generators) == 1 and not node.generators[0].ifs and kind is list
-        if is_plain and isinstance(iterated, Sequence):
-            if not (iterated.is_open or iterated.is_lost):
-                return Sequence(items * len(iterated.items), kind, origin=place)
+        if is_plain and isinstance(iterated, Sequence) and iterated.is_whole:
+            return Sequence(items * len(iterated.items), kind, origin=place)
         return Sequence(items, kind, is_open=True, origin=place)
 
     _setcomp = _listcomp

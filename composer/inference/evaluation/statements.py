@@ -6,7 +6,7 @@ import ast
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from composer.inference.operators import combine
+from composer.inference.evaluation.operators import combine
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
     NONE,
@@ -16,6 +16,7 @@ from composer.inference.values import (
     Class,
     Constant,
     Generated,
+    Mapping,
     PartOfNode,
     Place,
     Scalar,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from collections.abc import Sequence as SequenceOf
 
-    from composer.inference.evaluator import Evaluator
+    from composer.inference.evaluation.evaluator import Evaluator
 
 # What a wrong name raises, and what catches it.
 _CATCHING = {
@@ -92,15 +93,17 @@ class Statements:
 
     def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
         starred = any(isinstance(each, ast.Starred) for each in targets)
-        if isinstance(value, Sequence) and not (value.is_open or value.is_lost or starred):
-            if len(value.items) == len(targets):
-                return [item for item, _ in value.items]
+        is_even = isinstance(value, Sequence) and len(value.items) == len(targets)
+        if isinstance(value, Sequence) and is_even and value.is_whole and not starred:
+            return [item for item, _ in value.items]
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
         owner = self._evaluator.evaluate(target.value, scope)
         index = self._evaluator.evaluate(target.slice, scope)
-        self._evaluator.calls.store_item(owner, index, value, Place(scope.module, target.slice))
+        self._evaluator.containers.store_item(
+            owner, index, value, Place(scope.module, target.slice)
+        )
 
     def _assign(self, node: ast.Assign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
@@ -118,8 +121,17 @@ class Statements:
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
                 return
+        if isinstance(node.target, ast.Subscript):
+            owner = self._evaluator.evaluate(node.target.value, scope)
+            if owner == PartOfNode('own_state'):
+                return
+        is_union = isinstance(node.op, ast.BitOr)
+        if isinstance(before, Mapping) and isinstance(value, Mapping) and is_union:
+            place = Place(scope.module, node.value)
+            self._evaluator.containers.update_mapping(before, value, place)
+            return
         if isinstance(before, Sequence):
-            self._evaluator.calls.extend(before, value, Place(scope.module, node.value))
+            self._evaluator.containers.extend(before, value, Place(scope.module, node.value))
             return
         self.store(node.target, combine(node.op, before, value), scope)
 
@@ -136,7 +148,7 @@ class Statements:
     # Definitions
 
     def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
-        scope.set(node.name, self._evaluator.define_decorated(node, scope))
+        scope.set(node.name, self._evaluator.functions.define_decorated(node, scope))
 
     _asyncfunctiondef = _functiondef
 
@@ -147,7 +159,7 @@ class Statements:
     def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
         for alias in node.names:
             name = alias.asname or alias.name.partition('.')[0]
-            scope.set(name, self._evaluator.imported(scope.module, node, name))
+            scope.set(name, self._evaluator.imports.imported(scope.module, node, name))
 
     _importfrom = _import
 
@@ -336,6 +348,8 @@ class Statements:
         caught = join_names([before, after])
         for handler in node.handlers:
             scope.names = None if caught is None else dict(caught)
+            if handler.type is not None:
+                self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
             with run.condition():

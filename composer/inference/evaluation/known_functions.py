@@ -15,7 +15,8 @@ _BY_TYPE: dict[type, str] = {
     'math.sqrt math.tan math.tanh random.gauss random.random random.uniform time.monotonic '
     'time.perf_counter time.process_time time.time',
     str: 'builtins.ascii builtins.bin builtins.chr builtins.format builtins.hex builtins.input '
-    'builtins.oct builtins.repr builtins.str json.dumps os.getcwd platform.node socket.gethostname',
+    'builtins.oct builtins.repr builtins.str json.dumps os.getcwd platform.node '
+    'socket.gethostname',
     bytes: 'builtins.bytes os.urandom pickle.dumps struct.pack',
 }
 _BY_TYPE[float] = _BY_TYPE[float].replace(' math.modf', '')

@@ -38,7 +38,7 @@ from composer.interfaces.field_values import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from composer.inference.evaluator import Evaluator
+    from composer.inference.evaluation.evaluator import Evaluator
     from composer.inference.message_types import MessageTypes
     from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
 

@@ -1,0 +1,1 @@
+"""Evaluate the expressions of behaviours, and follow their statements and calls."""

@@ -1,0 +1,231 @@
+"""Calls: of whatever is called, with its arguments."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.evaluation.signatures import explain_misfit, signature_of
+from composer.inference.message_types import in_python
+from composer.inference.reading import SENDING_METHODS
+from composer.inference.values import (
+    CHOSEN,
+    NODE,
+    UNKNOWN,
+    Argument,
+    Arguments,
+    BoundMethod,
+    Class,
+    Constant,
+    External,
+    Function,
+    Generated,
+    Instance,
+    Mapping,
+    Message,
+    MessageClass,
+    Partial,
+    PartOfNode,
+    Place,
+    Scalar,
+    Sequence,
+    Unknown,
+    Value,
+    alternatives,
+    are_chosen,
+    is_chosen,
+    is_none,
+    join,
+)
+from composer.interfaces.field_errors import unknown_field
+
+if TYPE_CHECKING:
+    from composer.inference.evaluation.evaluator import Evaluator
+    from composer.inference.scopes import Scope
+
+
+class Calls:
+    """Evaluates calls.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def call(self, node: ast.Call, scope: Scope, *, is_awaited: bool = False) -> Value:
+        """Return what a call may return."""
+        function = self._evaluator.evaluate(node.func, scope)
+        arguments = self._arguments(node, scope)
+        place = Place(scope.module, node)
+        if function == External('builtins.super') or function == External('builtins.locals'):
+            return UNKNOWN
+        method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
+        if isinstance(function, Unknown) and method in SENDING_METHODS:
+            # It may be the node, in another guise.
+            name = arguments.get(0, 'name')
+            if name is None or not isinstance(name.value, Constant):
+                self._evaluator.run.reading.open_kinds.add(SENDING_METHODS[method])
+        self._evaluator.call_places.append(place)
+        try:
+            return join(
+                self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
+                for each in alternatives(function)
+            )
+        finally:
+            self._evaluator.call_places.pop()
+
+    def _arguments(self, node: ast.Call, scope: Scope) -> Arguments:
+        positional: list[Argument] = []
+        named: list[tuple[str, Argument]] = []
+        is_open = False
+        for each in node.args:
+            place = Place(scope.module, each)
+            if isinstance(each, ast.Starred):
+                value = self._evaluator.evaluate(each.value, scope)
+                if isinstance(value, Sequence) and not value.is_lost and not value.is_open:
+                    positional += [Argument(*item) for item in value.items]
+                else:
+                    is_open = True
+                    self._evaluator.escape(value)
+            else:
+                positional.append(Argument(self._evaluator.evaluate(each, scope), place))
+        for keyword in node.keywords:
+            value = self._evaluator.evaluate(keyword.value, scope)
+            if keyword.arg is not None:
+                place = Place(scope.module, keyword)
+                named.append((keyword.arg, Argument(value, place)))
+            elif isinstance(value, Mapping) and not value.is_lost:
+                is_open = is_open or value.is_open
+                named += [
+                    (key, Argument(*held))
+                    for key, held in value.entries.items()
+                    if isinstance(key, str)
+                ]
+            else:
+                is_open = True
+                self._evaluator.escape(value)
+        return Arguments(tuple(positional), tuple(named), is_open)
+
+    def invoke(
+        self,
+        function: Value,
+        arguments: Arguments,
+        place: Place,
+        *,
+        waits: bool = True,
+        is_awaited: bool = False,
+    ) -> Value:
+        """Return what a call of a value may return.
+
+        Args:
+            waits: Whether who calls the behaviour waits for the call.
+            is_awaited: Whether its result is awaited at once.
+        """
+        match function:
+            case BoundMethod(owner=owner, name=name) if owner == NODE:
+                self._fits('node', name, arguments, place)
+                return self._evaluator.node_calls.call(
+                    name, arguments, waits=waits, is_awaited=is_awaited
+                )
+            case BoundMethod():
+                if isinstance(function.owner, PartOfNode):
+                    self._fits(function.owner.name, function.name, arguments, place)
+                return self._evaluator.containers.call_method(function, arguments, place)
+            case MessageClass():
+                return self._construct(function, arguments)
+            case Function():
+                is_late = self._evaluator.functions.is_coroutine(function) and not is_awaited
+                return self._evaluator.functions.follow(
+                    function, arguments, waits=waits and not is_late
+                )
+            case Partial():
+                merged = Arguments(
+                    (*function.arguments.positional, *arguments.positional),
+                    (*function.arguments.named, *arguments.named),
+                    function.arguments.is_open or arguments.is_open,
+                )
+                return self.invoke(
+                    function.function, merged, place, waits=waits, is_awaited=is_awaited
+                )
+            case Class():
+                return self._evaluator.classes.instantiate(function, arguments)
+            case Instance():
+                method = self._evaluator.classes.class_attribute(function.of, '__call__', function)
+                if isinstance(method, Function):
+                    return self._evaluator.functions.follow(method, arguments, waits=waits)
+            case External():
+                return self._evaluator.library.call(function.name, arguments, place)
+            case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
+                self._refuse(function, place)
+        self.escape_all(arguments)
+        return CHOSEN if is_chosen(function) or are_chosen(arguments) else UNKNOWN
+
+    def _refuse(self, function: Value, place: Place) -> None:
+        """Report a call of what cannot be called; `None` may be something else later."""
+        if is_none(function) or getattr(function, 'is_lost', False):
+            return
+        called = place.node.func if isinstance(place.node, ast.Call) else place.node
+        text = 'this cannot be called'
+        self._evaluator.run.report('bad-call', Place(place.module, called), text)
+
+    def _fits(self, owner: str, name: str, arguments: Arguments, place: Place) -> bool:
+        """Return whether a method can be called so; report it if not."""
+        signature = signature_of(owner, name)
+        misfit = explain_misfit(signature, arguments) if signature else None
+        if misfit is None:
+            return True
+        shown = str(signature)
+        self._evaluator.run.report(
+            'bad-call', place, f'{name}{shown} is called with other arguments: {misfit}'
+        )
+        return False
+
+    def invoke_later(self, partial: Partial) -> None:
+        """Note that something unknown may call a function with these arguments and others."""
+        given = partial.arguments
+        arguments = Arguments(given.positional, given.named, is_open=True)
+        function = partial.function
+        if (isinstance(function, Function) and given.positional) or (
+            function == BoundMethod(NODE, 'publish') and given.positional
+        ):
+            with self._evaluator.run.condition():
+                self.invoke(function, arguments, given.positional[0].place, waits=False)
+        else:
+            self._evaluator.escape(function)
+            self.escape_all(given)
+
+    def escape_all(self, arguments: Arguments) -> None:
+        """Note that something unknown has the arguments."""
+        for argument in arguments.all():
+            self._evaluator.escape(argument.value)
+
+    def _construct(self, function: MessageClass, arguments: Arguments) -> Value:
+        """Check the fields that a message is made with."""
+        evaluator = self._evaluator
+        description = evaluator.run.types.describe(function.type)
+        made = Message(function.type, is_made=True)
+        if description is None:
+            self.escape_all(arguments)
+            return made
+        shown = in_python(function.type)
+        if arguments.positional:
+            evaluator.run.report(
+                'bad-call',
+                arguments.positional[0].place,
+                f'{shown} takes its fields by name only',
+                'write the name of the field before the value: name=value',
+            )
+        for name, argument in arguments.named:
+            field = description.field(name)
+            if field is not None:
+                evaluator.payloads.check_field(
+                    function.type, field, argument.value, argument.place
+                )
+            elif name != 'check_fields':
+                names = [each.name for each in description.fields]
+                error = unknown_field(function.type, name, names)
+                message = str(error).replace(function.type, shown)
+                evaluator.run.report('unknown-field', argument.place, message, error.help)
+        return made

@@ -1,0 +1,291 @@
+"""The parts that evaluate a behaviour, and what they share: names, functions and classes."""
+
+from __future__ import annotations
+
+import ast
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, cast
+
+from composer.inference.evaluation.attributes import Attributes
+from composer.inference.evaluation.calls import Calls
+from composer.inference.evaluation.classes import Classes
+from composer.inference.evaluation.containers import Containers
+from composer.inference.evaluation.expressions import Expressions
+from composer.inference.evaluation.functions import Functions
+from composer.inference.evaluation.imports import Imports
+from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.node_calls import NodeCalls
+from composer.inference.evaluation.payloads import Payloads
+from composer.inference.evaluation.statements import Statements
+from composer.inference.message_types import item_of
+from composer.inference.reading import SENDING_METHODS
+from composer.inference.scopes import Scope
+from composer.inference.values import (
+    CHOSEN,
+    NODE,
+    UNKNOWN,
+    Alternatives,
+    ArrayField,
+    Awaitable,
+    BoundMethod,
+    Constant,
+    Function,
+    Generated,
+    Instance,
+    Mapping,
+    Message,
+    NodeValue,
+    Partial,
+    PartOfNode,
+    Place,
+    Scalar,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    is_chosen,
+    is_none,
+    join,
+    truth_of,
+)
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.inference.run import Run
+    from composer.python_source.modules import ModuleSource
+
+
+class Evaluator:
+    """Evaluates expressions and follows statements and functions, in one run.
+
+    Attributes:
+        kept: Objects of classes of the project that are kept in the state, by their names there.
+        call_places: Where the calls under way are written.
+        lasting_doubts: Of each function under way, the doubts that last until its end.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self.lasting_doubts: list[int] = [0]
+        self.expressions = Expressions(self)
+        self.statements = Statements(self)
+        self.calls = Calls(self)
+        self.node_calls = NodeCalls(self)
+        self.containers = Containers(self)
+        self.library = LibraryCalls(self)
+        self.functions = Functions(self)
+        self.classes = Classes(self)
+        self.imports = Imports(self)
+        self.attributes = Attributes(self)
+        self.payloads = Payloads(self)
+        self.call_places: list[Place] = []
+        self.kept: dict[str, Value] = {}
+
+    def evaluate(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what an expression may be."""
+        return self.expressions.evaluate(node, scope)
+
+    def look_up(self, node: ast.Name, scope: Scope) -> Value:
+        """Return what a name stands for."""
+        name = node.id
+        current: Scope | None = scope
+        while current is not None:
+            if name in current.local:
+                value = current.latest(name) if current is not scope else None
+                if current.names is not None and name in current.names:
+                    value = current.names[name]
+                return UNKNOWN if value is None else value
+            current = current.outer
+        modules = self.run.modules
+        if not modules.has_name(scope.module, name):
+            place = Place(scope.module, node)
+            known = [*modules.top(scope.module).statements, *scope.all_names()]
+            message = f"'{name}' is not defined"
+            self.run.report('undefined-name', place, message, suggest(name, known))
+            return UNKNOWN
+        return self.top_value(scope.module, name)
+
+    def top_value(self, module: ModuleSource, name: str) -> Value:
+        """Return what a name at the top of a module stands for."""
+        self.run.reading.modules.setdefault(id(module), module)
+
+        def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
+            scope = Scope(module)
+            with self.run.afresh(is_guard=is_conditional):
+                if isinstance(statement, ast.Import | ast.ImportFrom):
+                    return self.imports.imported(module, statement, name)
+                self.statements.follow_all([cast('ast.stmt', statement)], scope)
+            return (scope.names or {}).get(name, UNKNOWN)
+
+        return self.run.modules.value(module, name, evaluate)
+
+    def read_target(self, target: ast.expr, scope: Scope) -> Value:
+        """Return what the target of `+=` holds."""
+        if isinstance(target, ast.Name):
+            return self.look_up(target, scope)
+        if isinstance(target, ast.Attribute):
+            owner = self.evaluate(target.value, scope)
+            return self.attributes.read(owner, target.attr, Place(scope.module, target))
+        if isinstance(target, ast.Subscript):
+            owner = self.evaluate(target.value, scope)
+            index = self.evaluate(target.slice, scope)
+            self.attributes.read_item(owner, index, Place(scope.module, target.slice))
+        return UNKNOWN
+
+    def awaited(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what an operand may be, which should be no coroutine."""
+        value = self.evaluate(node, scope)
+        if isinstance(value, Awaitable):
+            text = 'this is a coroutine, which has not been awaited'
+            self.run.report(
+                'missing-await', Place(scope.module, node), text, 'put await before it'
+            )
+            return value.result
+        return value
+
+    def tested(self, node: ast.expr, scope: Scope) -> Value:
+        """Return what a condition may be: a coroutine is always true."""
+        return self.awaited(node, scope)
+
+    def iterated(self, node: ast.expr, scope: Scope, is_async: int) -> Value:
+        """Return what a loop goes through."""
+        value = self.awaited(node, scope)
+        if isinstance(value, Generated) and value.is_async and not is_async:
+            text = 'this is an async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'async for'")
+        return value
+
+    @contextmanager
+    def branch(self, test: Value, *, is_taken: bool) -> Iterator[None]:
+        """Read a branch: one that is never taken has no problems, and may use names.
+
+        What the file decides on may be decided otherwise by the next file, or a parameter.
+        """
+        truth = truth_of(test)
+        is_dead = truth is not None and truth != is_taken
+        is_doubt = is_dead or (truth is None and is_chosen(test))
+        with ExitStack() as around:
+            around.enter_context(self.run.condition(is_doubt=is_doubt))
+            if is_dead and not is_chosen(test):
+                around.enter_context(self.run.silence())
+            yield
+
+    def home_of(self, scope: Scope) -> Scope:
+        """Return the scope of the function itself: comprehensions have their own."""
+        while scope.function is not None and scope.outer is not None:
+            if scope.outer.function is not scope.function:
+                break
+            scope = scope.outer
+        return scope
+
+    def narrow(self, test: ast.expr, scope: Scope, *, is_true: bool) -> None:
+        """Use what is known after a test."""
+        match test:
+            case ast.UnaryOp(op=ast.Not()):
+                self.narrow(test.operand, scope, is_true=not is_true)
+            case ast.BoolOp():
+                if isinstance(test.op, ast.And) == is_true:
+                    for each in test.values:
+                        self.narrow(each, scope, is_true=is_true)
+            case ast.Name():
+                self._drop_none(test, scope, has_value=is_true)
+            case ast.Compare(
+                left=ast.Name() as name, ops=[sign], comparators=[ast.Constant(None)]
+            ):
+                if isinstance(sign, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
+                    is_none = isinstance(sign, ast.Is | ast.Eq)
+                    self._drop_none(name, scope, has_value=is_none != is_true)
+            case ast.Call(func=ast.Name(id=function), args=[ast.Name() as name, *_]):
+                if function in ('isinstance', 'hasattr', 'callable', 'issubclass'):
+                    with self.run.silence():
+                        is_known = truth_of(self.evaluate(test, scope)) is not None
+                    if not is_known:
+                        self._forget(name, scope, is_true=is_true)
+            case ast.Compare(left=ast.Call(func=ast.Name(id='type'), args=[ast.Name() as name])):
+                self._forget(name, scope, is_true=True)
+
+    def _drop_none(self, name: ast.Name, scope: Scope, *, has_value: bool) -> None:
+        value = scope.names.get(name.id) if scope.names is not None else None
+        if isinstance(value, Alternatives) and has_value:
+            kept = [each for each in value.values if not is_none(each)]
+            scope.set(name.id, join(kept) if kept else UNKNOWN)
+
+    def _forget(self, name: ast.Name, scope: Scope, *, is_true: bool) -> None:
+        """Forget what a name stands for, as the test of its type is not decided by that."""
+        value = scope.names.get(name.id) if scope.names is not None else None
+        is_sure = isinstance(value, NodeValue) or (isinstance(value, Message) and not is_true)
+        if value is not None and not is_sure:
+            scope.set(name.id, UNKNOWN)
+
+    def item_of(self, value: Value) -> Value:
+        """Return what an item of something iterated is."""
+        return join(self._item_of(each) for each in alternatives(value))
+
+    def _item_of(self, value: Value) -> Value:
+        match value:
+            case ArrayField():
+                return item_of(value.type)
+            case Sequence():
+                return value.item()
+            case Generated():
+                return value.yielded
+            case Mapping() if not (value.is_open or value.is_lost) and value.entries:
+                return join(constant(key) for key in value.entries)
+            case Constant() | Scalar() if value.kind is str:
+                return Scalar(str)
+            case PartOfNode(name='parameters'):
+                self.run.reading.open_kinds.add('parameter')
+        return CHOSEN if is_chosen(value) else UNKNOWN
+
+    def entered(self, value: Value) -> Value:
+        """Return what `with value as name` stores."""
+        return join(
+            each.yielded if isinstance(each, Generated) else UNKNOWN
+            for each in alternatives(value)
+        )
+
+    def keep(self, name: str, value: Value) -> None:
+        """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
+        if isinstance(value, Instance):
+            self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
+        else:
+            self.escape(value)
+
+    def escape(self, value: Value) -> None:
+        """Note that something unknown has a value: it may change it, or call it."""
+        match value:
+            case Alternatives():
+                for each in value.values:
+                    self.escape(each)
+            case NodeValue():
+                self.run.reading.open_all()
+            case Constant(value=str(text)):
+                self.run.reading.mentioned.add(text)
+            case PartOfNode(name='parameters'):
+                self.run.reading.open_kinds.add('parameter')
+            case PartOfNode(name='state'):
+                self.run.reading.is_state_open = True
+            case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
+                self._escape_method(value)
+            case Mapping() | Sequence() if not value.is_lost:
+                value.is_lost = True
+                held = value.entries.values() if isinstance(value, Mapping) else value.items
+                for each, _ in list(held):
+                    self.escape(each)
+            case Function() if not value.is_read and value.definition not in self.functions.active:
+                self.functions.follow_later(value)
+            case Partial():
+                self.calls.invoke_later(value)
+            case Instance():
+                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
+                    self.run.reading.open_all()
+
+    def _escape_method(self, method: BoundMethod) -> None:
+        kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)
+        if kind is not None:
+            self.run.reading.open_kinds.add(kind)
+        elif method.name == 'get_parameters':
+            self.run.reading.reads_others = True

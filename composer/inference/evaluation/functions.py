@@ -1,0 +1,241 @@
+"""Functions of the project: how they are made and called."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.evaluation.signatures import explain_misfit
+from composer.inference.scopes import LocalNames, Scope, find_local_names
+from composer.inference.values import (
+    NONE,
+    UNKNOWN,
+    Alternatives,
+    Argument,
+    Arguments,
+    Awaitable,
+    External,
+    Function,
+    Generated,
+    Instance,
+    Mapping,
+    Place,
+    Sequence,
+    Value,
+    join,
+)
+from composer.python_source.modules import FunctionKind, FunctionSource, read_signature
+
+if TYPE_CHECKING:
+    from composer.inference.evaluation.evaluator import Evaluator
+
+# How deep helpers of helpers are followed.
+_DEEPEST = 12
+_TRANSPARENT = {
+    'contextlib.contextmanager',
+    'functools.cache',
+    'functools.lru_cache',
+    'functools.wraps',
+    'builtins.staticmethod',
+    'typing.no_type_check',
+    'typing.final',
+    'typing_extensions.override',
+    'typing.override',
+}
+
+
+class Functions:
+    """Follows calls of functions.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+
+    Attributes:
+        active: The functions under way.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+        self.active: list[ast.AST] = []
+        self._results: dict[tuple[object, ...], Value] = {}
+        self._local_names: dict[int, LocalNames] = {}
+
+    def define(
+        self, node: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda, scope: Scope
+    ) -> Function:
+        """Return the function that a definition makes."""
+        is_top = scope.function is None and scope.outer is None
+        function = Function(scope.module, node, None if is_top else scope)
+        for default in (*node.args.defaults, *node.args.kw_defaults):
+            if default is not None:
+                self._evaluator.evaluate(default, scope)
+        if not is_top:
+            self._evaluator.home_of(scope).inner.append(function)
+        return function
+
+    def define_decorated(
+        self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope
+    ) -> Value:
+        """Return what a definition makes, with its decorators."""
+        value: Value = self.define(node, scope)
+        for decorator in reversed(node.decorator_list):
+            by = self._evaluator.evaluate(decorator, scope)
+            if isinstance(by, External) and by.name in _TRANSPARENT:
+                continue
+            place = Place(scope.module, decorator)
+            value = self._evaluator.calls.invoke(by, Arguments((Argument(value, place),)), place)
+        return value
+
+    def is_coroutine(self, function: Function) -> bool:
+        """Return whether a call returns a coroutine, which runs when it is awaited."""
+        return kind_of(function) is FunctionKind.COROUTINE
+
+    def follow(self, function: Function, arguments: Arguments, *, waits: bool) -> Value:
+        """Return what a call of a function may return, and read what it does."""
+        function.is_read = True
+        key = self._key_of(function, arguments, waits=waits)
+        if key is not None and key in self._results:
+            return self._results[key]
+        if function.definition in self.active or len(self.active) >= _DEEPEST:
+            self._evaluator.calls.escape_all(arguments)
+            return UNKNOWN
+        if not self.fits(function, arguments):
+            return UNKNOWN
+        scope = self.enter(function, arguments, waits=waits)
+        result = result_of(function, scope)
+        if key is not None:
+            self._results[key] = result
+        return result
+
+    def fits(self, function: Function, arguments: Arguments) -> bool:
+        """Return whether a function can be called so; report it if not."""
+        if arguments.is_open:
+            return True
+        given = arguments
+        if function.owner is not None:
+            me = Argument(function.owner, Place(function.module, function.definition))
+            given = Arguments((me, *arguments.positional), arguments.named)
+        signature = read_signature(function.definition.args)
+        misfit = explain_misfit(signature, given) if signature else None
+        if misfit is None or not self._evaluator.call_places:
+            return misfit is None
+        definition = function.definition
+        name = 'the lambda' if isinstance(definition, ast.Lambda) else f"'{definition.name}'"
+        message = f'{name} is called with other arguments than it takes: {misfit}'
+        self._evaluator.run.report('bad-call', self._evaluator.call_places[-1], message)
+        return False
+
+    def _key_of(
+        self, function: Function, arguments: Arguments, *, waits: bool
+    ) -> tuple[object, ...] | None:
+        """Return what a call has to have in common with another one to give the same."""
+        values = [argument.value for argument in arguments.all()]
+        if any(isinstance(each, Mapping | Sequence | Instance | Alternatives) for each in values):
+            return None
+        names = tuple(name for name, _ in arguments.named)
+        run = self._evaluator.run
+        at = (bool(run.doubts), bool(run.guards), run.is_silent, waits, arguments.is_open)
+        owner = function.owner if not isinstance(function.owner, Instance) else id(function.owner)
+        return (id(function.definition), id(function.outer), owner, names, at, *values)
+
+    def enter(self, function: Function, arguments: Arguments, *, waits: bool) -> Scope:
+        """Follow the body of a function; return its scope at its end."""
+        definition = function.definition
+        if id(definition) not in self._local_names:
+            self._local_names[id(definition)] = find_local_names(definition)
+        names = self._local_names[id(definition)]
+        scope = Scope(
+            function.module, function, function.outer, names.local, names.unsure, waits=waits
+        )
+        self._bind(function, arguments, scope)
+        self.active.append(definition)
+        self._evaluator.run.modules.followed.add(id(definition))
+        self._evaluator.lasting_doubts.append(0)
+        try:
+            if isinstance(definition, ast.Lambda):
+                value = self._evaluator.evaluate(definition.body, scope)
+                scope.returned.append((value, Place(function.module, definition.body)))
+                scope.names = None
+            else:
+                self._evaluator.statements.follow_all(definition.body, scope)
+                if scope.names is not None:
+                    scope.returned.append((NONE, Place(function.module, definition)))
+            for inner in scope.inner:
+                if not inner.is_read:
+                    # Nobody seems to call it.
+                    self._evaluator.run.doubts += 1
+                    self.follow_later(inner)
+                    self._evaluator.run.doubts -= 1
+        finally:
+            self._evaluator.run.doubts -= self._evaluator.lasting_doubts.pop()
+            self.active.pop()
+        return scope
+
+    def follow_later(self, function: Function) -> None:
+        """Read a function that something else may call, with anything."""
+        with self._evaluator.run.condition():
+            self.follow(function, Arguments(is_open=True), waits=False)
+
+    def _bind(self, function: Function, arguments: Arguments, scope: Scope) -> None:
+        """Store the arguments of a call in the parameters."""
+        parameters = function.definition.args
+        positional = [*parameters.posonlyargs, *parameters.args]
+        given = list(arguments.positional)
+        if function.owner is not None:
+            given.insert(0, Argument(function.owner, Place(function.module, function.definition)))
+        named = dict(arguments.named)
+        for parameter, argument in zip(positional, given, strict=False):
+            scope.set(parameter.arg, argument.value)
+        rest = given[len(positional) :]
+        defaults = dict(
+            zip(
+                [each.arg for each in reversed(positional)],
+                reversed(parameters.defaults),
+                strict=False,
+            )
+        )
+        defaults |= {
+            each.arg: default
+            for each, default in zip(parameters.kwonlyargs, parameters.kw_defaults, strict=True)
+            if default is not None
+        }
+        for parameter in (*positional[len(given) :], *parameters.kwonlyargs):
+            name = parameter.arg
+            if name in named:
+                scope.set(name, named.pop(name).value)
+            elif name in defaults and not arguments.is_open:
+                outer = function.outer or Scope(function.module)
+                with self._evaluator.run.silence():
+                    scope.set(name, self._evaluator.evaluate(defaults[name], outer))
+            else:
+                scope.set(name, UNKNOWN)
+        if parameters.vararg:
+            items = [(argument.value, argument.place) for argument in rest]
+            scope.set(parameters.vararg.arg, Sequence(items, tuple, arguments.is_open))
+        if parameters.kwarg:
+            entries: dict[object, tuple[Value, Place]] = {
+                name: (argument.value, argument.place) for name, argument in named.items()
+            }
+            scope.set(
+                parameters.kwarg.arg,
+                Mapping(entries, arguments.is_open, self._evaluator.run.conditions),
+            )
+
+
+def kind_of(function: Function) -> FunctionKind:
+    """Return what a call of a function returns."""
+    if isinstance(function.definition, ast.Lambda):
+        return FunctionKind.PLAIN
+    return FunctionSource(function.definition).kind or FunctionKind.PLAIN
+
+
+def result_of(function: Function, scope: Scope) -> Value:
+    """Return what a call gave, from its scope at its end."""
+    returned = join([value for value, _ in scope.returned]) if scope.returned else NONE
+    kind = kind_of(function)
+    if kind is FunctionKind.COROUTINE:
+        return Awaitable(returned)
+    if kind.is_generator:
+        yielded = join([value for value, _ in scope.yielded]) if scope.yielded else UNKNOWN
+        return Generated(yielded, returned, is_async=kind is FunctionKind.ASYNC_GENERATOR)
+    return returned

@@ -1,0 +1,129 @@
+"""Imports: what they store, and whether it exists."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING, cast
+
+import composer
+from composer.inference.message_types import split_part
+from composer.inference.values import (
+    UNKNOWN,
+    External,
+    MessageClass,
+    Place,
+    ProjectModule,
+    Value,
+)
+from composer.python_source.annotations import find_interface
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from composer.inference.evaluation.evaluator import Evaluator
+    from composer.interfaces.catalogue import InterfaceKind
+    from composer.python_source.modules import ModuleSource
+
+_FOLDERS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+
+
+class Imports:
+    """Evaluates imports.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def imported(
+        self, module: ModuleSource, statement: ast.Import | ast.ImportFrom, name: str
+    ) -> Value:
+        """Return what an import stores under a name."""
+        full_name = self._evaluator.run.modules.imported(module, statement, name)
+        if not full_name:
+            return UNKNOWN
+        home, inner = self._evaluator.run.modules.split(full_name)
+        if home is not None:
+            if not inner:
+                return ProjectModule(home)
+            if self._evaluator.run.modules.has_name(home, inner):
+                return self._evaluator.top_value(home, inner)
+        place = Place(module, next(each for each in statement.names if _stored(each) == name))
+        if home is not None:
+            if not self.is_module_in(home, inner):
+                known = self._evaluator.run.modules.top(home).statements
+                self._report_import(
+                    place, f"there is no '{inner}' in {home.source.name}", known, inner
+                )
+            return UNKNOWN
+        return self.external(full_name, place)
+
+    def external(self, full_name: str, place: Place) -> Value:
+        """Return what a full name stands for that is not of the project."""
+        interface = find_interface(full_name)
+        if interface is None:
+            package, _, name = full_name.partition('.')
+            if package == 'composer' and name and name not in composer.__all__:
+                if '.' not in name and name.islower() is False:
+                    self._report_import(place, f"composer has no '{name}'", composer.__all__, name)
+                return UNKNOWN
+            catalogue = self._evaluator.run.types.catalogue
+            folder = name.partition('.')[0]
+            is_public = folder.isidentifier() and not folder.startswith('_')
+            if is_public and folder not in _FOLDERS and package in catalogue.packages():
+                folders = [each for each in _FOLDERS if catalogue.names(each, package)]
+                self._report_import(place, f"{package} has no '{folder}'", folders, folder)
+            return External(full_name)
+        whole, _ = split_part(interface)
+        package, kind, name = whole.split('/')
+        catalogue = self._evaluator.run.types.catalogue
+        if package in catalogue.packages() and not catalogue.has(whole):
+            names = catalogue.names(cast('InterfaceKind', kind), package)
+            known = [each.rpartition('/')[2] for each in names]
+            several = [
+                *(f'{other}/{kind}/{name}' for other in catalogue.packages()),
+                *(f'{package}/{other}/{name}' for other in _FOLDERS),
+            ]
+            elsewhere = [each for each in several if catalogue.has(each)]
+            if elsewhere:
+                known = []
+            self._report_import(
+                place, f"{package}.{kind} has no '{name}'", known, name, elsewhere[:1]
+            )
+            return UNKNOWN
+        return MessageClass(interface)
+
+    def _report_import(
+        self,
+        place: Place,
+        message: str,
+        known: Iterable[str],
+        name: str,
+        elsewhere: Iterable[str] = (),
+    ) -> None:
+        found = [each.replace('/', '.') for each in elsewhere]
+        help_text = f"did you mean '{found[0]}'?" if found else suggest(name, known)
+        self._evaluator.run.report('bad-import', place, message, help_text)
+
+    def check_imports(self, module: ModuleSource) -> None:
+        """Check the names that a module imports, those of helpers included."""
+        for statement in module.body:
+            if isinstance(statement, ast.Import | ast.ImportFrom):
+                for alias in statement.names:
+                    if alias.name != '*':
+                        self.imported(module, statement, _stored(alias))
+
+    def is_module_in(self, package: ModuleSource, name: str) -> bool:
+        """Return whether a package has a module of this name."""
+        path = package.path
+        if path is None or path.name != '__init__.py':
+            return False
+        return (path.parent / f'{name}.py').exists() or (path.parent / name).is_dir()
+
+
+def _stored(alias: ast.alias) -> str:
+    """Return the name that an import stores."""
+    return alias.asname or alias.name.partition('.')[0]

@@ -1,0 +1,211 @@
+"""Calls of the node: what is sent, and which names are used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.entity_kinds import KIND_OF_NOUN
+from composer.inference.reading import SENDING_METHODS, RemoteParameter
+from composer.inference.run import name_place, span_of
+from composer.inference.values import (
+    CHOSEN,
+    NONE,
+    UNKNOWN,
+    Alternatives,
+    Argument,
+    Arguments,
+    Awaitable,
+    Constant,
+    Instance,
+    Mapping,
+    Message,
+    PartOfNode,
+    Place,
+    Sequence,
+    Value,
+    alternatives,
+    constant,
+    is_none,
+    join,
+)
+
+if TYPE_CHECKING:
+    from collections import abc
+
+    from composer.inference.evaluation.evaluator import Evaluator
+
+
+class NodeCalls:
+    """Evaluates calls of the node.
+
+    Args:
+        evaluator: Evaluates what is in them, and knows the run.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+
+    def call(self, method: str, arguments: Arguments, *, waits: bool, is_awaited: bool) -> Value:
+        """Return what a method of the node may return."""
+        if method == 'now':
+            return PartOfNode('time')
+        if method in ('set_parameters', 'get_parameters'):
+            return self._call_parameters(method, arguments)
+        if method not in SENDING_METHODS:
+            return UNKNOWN
+        kind = SENDING_METHODS[method]
+        section = KIND_OF_NOUN[kind].section
+        name = arguments.get(0, 'name')
+        payload = arguments.get(1, 'payload')
+        if name is None:
+            self._evaluator.run.reading.open_kinds.add(kind)
+            return UNKNOWN
+        waits_here = waits and (method != 'call_async' or is_awaited)
+        results: list[Value] = []
+        if payload is not None and isinstance(name.value, Alternatives):
+            # Name and payload may have been chosen together.
+            payload = Argument(join(alternatives(payload.value)), payload.place)
+        for each in alternatives(name.value):
+            if not isinstance(each, Constant) or not isinstance(each.value, str):
+                self._evaluator.run.reading.open_kinds.add(kind)
+                results.append(UNKNOWN)
+                continue
+            waited = waits_here and method in ('call', 'call_async')
+            self._evaluator.run.use(kind, each.value, name_place(name, each), waits=waited)
+            type_name = self._evaluator.run.facts.type_of(section, each.value)
+            results.append(self._send(method, type_name, payload, arguments))
+        result = join(results)
+        return Awaitable(result) if method == 'call_async' else result
+
+    def _send(
+        self, method: str, type_name: str | None, payload: Argument | None, arguments: Arguments
+    ) -> Value:
+        payloads = self._evaluator.payloads
+        replies: dict[str, tuple[str, Value]] = {
+            'publish': ('', NONE),
+            'call': ('_Request', Message(f'{type_name}_Response')),
+            'call_async': ('_Request', Message(f'{type_name}_Response')),
+            'send_goal': ('_Goal', PartOfNode('goal', type_name or '')),
+        }
+        sent, result = replies[method]
+        if type_name is None:
+            return UNKNOWN if method != 'send_goal' else PartOfNode('goal')
+        if payload is not None:
+            is_left_out = is_none(payload.value) and method != 'publish'
+            if not is_left_out:
+                payloads.check(f'{type_name}{sent}', payload.value, payload.place)
+        return result
+
+    def _call_parameters(self, method: str, arguments: Arguments) -> Value:
+        run = self._evaluator.run
+        if method == 'get_parameters':
+            run.reading.reads_others = True
+            names = arguments.get(1, 'names')
+            if names is not None and isinstance(names.value, Sequence):
+                keys = [(name, place, UNKNOWN) for name, place in names.value.items]
+                self._note_remote(arguments, keys)
+            return UNKNOWN
+        node_name, values = arguments.get(0, 'node_name'), arguments.get(1, 'values')
+        if node_name is None or values is None:
+            return NONE
+        if isinstance(values.value, Mapping):
+            self._note_remote(
+                arguments,
+                [
+                    (constant(key), place, value)
+                    for key, (value, place) in values.value.entries.items()
+                ],
+            )
+        return NONE
+
+    def _note_remote(
+        self, arguments: Arguments, several: abc.Sequence[tuple[Value, Place, Value]]
+    ) -> None:
+        """Note parameters of another node, if the code names both."""
+        node_name = arguments.get(0, 'node_name')
+        for target in alternatives(node_name.value) if node_name else ():
+            if not isinstance(target, Constant) or not isinstance(target.value, str):
+                continue
+            at = span_of(name_place(node_name, target), target.value) if node_name else None
+            for key, place, value in (
+                (key, place, one) for key, place, held in several for one in alternatives(held)
+            ):
+                if isinstance(key, Constant) and isinstance(key.value, str) and at:
+                    where = getattr(value, 'origin', None) or place
+                    self._evaluator.run.reading.remote_parameters.append(
+                        RemoteParameter(
+                            target.value,
+                            at,
+                            key.value,
+                            span_of(place, key.value),
+                            value if isinstance(value, Constant) else None,
+                            span_of(where),
+                            is_certain=not self._evaluator.run.doubts,
+                        )
+                    )
+
+    def call_own_state(self, name: str, arguments: Arguments) -> Value:
+        """Note which keys are set; what is kept there is known only right after that."""
+        reading = self._evaluator.run.reading
+        key, value = arguments.get(0, ''), arguments.get(1, '')
+        if name == 'update':
+            reading.own_state_set |= {each for each, _ in arguments.named}
+            for argument in arguments.positional:
+                if isinstance(argument.value, Mapping) and not argument.value.is_open:
+                    reading.own_state_set |= {str(each) for each in argument.value.entries}
+                else:
+                    reading.is_own_state_open = True
+        elif key and name in ('get', 'setdefault', 'pop'):
+            constants = [each for each in alternatives(key.value) if isinstance(each, Constant)]
+            if name == 'pop' and value is None:
+                for each in constants:
+                    where = name_place(key, each)
+                    self._evaluator.run.use_own_state(str(each.value), where)
+            reading.own_state_set |= {str(each.value) for each in constants}
+            reading.is_own_state_open |= not constants
+        kept = value.value if value else UNKNOWN
+        found = alternatives(key.value) if key else ()
+        keys = [str(each.value) for each in found if isinstance(each, Constant)]
+        if isinstance(kept, Instance):
+            for name_of_key in keys:
+                self._evaluator.keep(f'[{name_of_key}]', kept)
+        if isinstance(kept, Instance | Message):
+            return kept
+        if name in ('get', 'setdefault') and len(keys) == 1:
+            held = self._evaluator.kept.get(f'[{keys[0]}]')
+            if held is not None:
+                return held
+        self._evaluator.calls.escape_all(arguments)
+        return UNKNOWN
+
+    def read_parameters(self, owner: PartOfNode, name: str, arguments: Arguments) -> Value:
+        """Return what a method of `node.parameters` may return, or of what has changed of it."""
+        run = self._evaluator.run
+        asked = arguments.get(0, 'key')
+        if name != 'get' or asked is None:
+            run.reading.open_kinds.add('parameter')
+            return UNKNOWN
+        default = arguments.get(1, 'default')
+        found: list[Value] = []
+        for each in alternatives(asked.value):
+            if isinstance(each, Constant) and isinstance(each.value, str):
+                place = name_place(asked, each)
+                run.use(
+                    'parameter',
+                    each.value,
+                    place,
+                    is_optional=True,
+                    has_default=default is not None or owner.name == 'changes',
+                    is_change=owner.name == 'changes',
+                )
+                value = run.facts.value_of_parameter(each.value)
+                if value != UNKNOWN or run.reading.reaches_ros or owner.name == 'changes':
+                    found.append(value)
+                elif default is None:
+                    found.append(constant(None, is_chosen=True))
+                else:
+                    found.append(CHOSEN)
+            else:
+                run.reading.open_kinds.add('parameter')
+                found.append(UNKNOWN)
+        return join(found)

@@ -1,0 +1,2 @@
+def decide(node, changes):
+    return changes['limit'] < 2.0

@@ -1,0 +1,2 @@
+def decide(node, changes):
+    return None if changes['limit'] < 2.0 else 'too fast'

@@ -1,0 +1,2 @@
+def drive(node):
+    node.publish('speed', data=1.0)

@@ -1,0 +1,3 @@
+def drive(node):
+    while True:
+        node.publish('speed', 1.0)

@@ -1,0 +1,6 @@
+async def measure(node):
+    node.publish('speed', 1.0)
+
+
+async def drive(node):
+    await measure(node)

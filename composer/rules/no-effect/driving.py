@@ -1,0 +1,2 @@
+def drive(node):
+    {'data': 1.0}

@@ -1,0 +1,2 @@
+def drive(node):
+    node.publish('speed', 1.0)

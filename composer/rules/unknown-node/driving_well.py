@@ -1,0 +1,2 @@
+def drive(node):
+    node.set_parameters('motor', {'limit': 0.5})
