@@ -106,6 +106,20 @@ def count_edits(word: str, other: str) -> int:
     return row[-1]
 
 
+def is_typo(word: str, meant: str) -> bool:
+    """Return whether a word looks like another one that is misspelt, not like its sibling.
+
+    `offset_y` beside `offset_x`, `out2` beside `out` and `min` beside `max` are siblings: what
+    differs is a digit, a last letter that is another one, or more than one letter in six.
+    """
+    word, meant = word.lower(), meant.lower()
+    if any(letter.isdigit() for letter in set(word) ^ set(meant)):
+        return False
+    edits = count_edits(word, meant)
+    is_sibling = len(word) == len(meant) and word[:-1] == meant[:-1]
+    return 0 < edits <= max(1, len(meant) // 6) and not is_sibling
+
+
 @lru_cache(maxsize=64)
 def _lower(choices: frozenset[str]) -> dict[str, str]:
     return {choice.lower(): choice for choice in sorted(choices, reverse=True)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
-from composer.inference.reader import BehaviourReader
+from composer.inference.behaviour_reader import BehaviourReader
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.inference.values import CHOSEN, UNKNOWN, Scalar, Value, constant
+from composer.inference.values import (
+    BY_FILE,
+    BY_PARAMETER,
+    CHOSEN,
+    UNKNOWN,
+    Scalar,
+    Value,
+    constant,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +62,7 @@ class NodeFacts:
 
     def _answer(self, topic: str, name: str) -> object:
         if topic == 'name':
-            return constant(self.node.name, is_chosen=True)
+            return constant(self.node.name, is_chosen=BY_FILE)
         if topic == 'parameter':
             return self._answer_parameter(name)
         entity: Any = getattr(self.node, topic).get(name)
@@ -65,6 +73,6 @@ class NodeFacts:
         if parameter is None:
             return UNKNOWN
         if isinstance(parameter.value, bool | int | float | str):
-            return constant(parameter.value, is_chosen=True)
+            return constant(parameter.value, is_chosen=BY_PARAMETER)
         kind = _PYTHON_TYPES.get(parameter.type or '')
-        return Scalar(kind, is_chosen=True) if kind else CHOSEN
+        return Scalar(kind, is_chosen=BY_PARAMETER) if kind else CHOSEN

@@ -35,11 +35,11 @@ class Unknown:
     """Anything.
 
     Attributes:
-        is_chosen: Whether the file decides on it: by an argument under `with:`, a parameter, or
-            the name of the node.
+        is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
+            name of the node, `BY_PARAMETER` for what may change while the system runs.
     """
 
-    is_chosen: bool = False
+    is_chosen: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Constant:
 
     kind: type
     value: Any
-    is_chosen: bool = False
+    is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
 
 
@@ -63,7 +63,7 @@ class Scalar:
     """A number, text or the like of a type of Python, as in `float`."""
 
     kind: type
-    is_chosen: bool = False
+    is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
 
 
@@ -329,13 +329,16 @@ Value: TypeAlias = (
     | Alternatives
 )
 
+BY_FILE = 1
+BY_PARAMETER = 2
+
 UNKNOWN = Unknown()
-CHOSEN = Unknown(is_chosen=True)
+CHOSEN = Unknown(BY_PARAMETER)
 NODE = NodeValue()
 NONE = Constant(type(None), None)
 
 
-def constant(value: object, origin: Place | None = None, *, is_chosen: bool = False) -> Constant:
+def constant(value: object, origin: Place | None = None, *, is_chosen: int = 0) -> Constant:
     """Return the value of a constant."""
     return Constant(type(value), value, is_chosen, origin)
 
@@ -364,9 +367,9 @@ def is_none(value: Value) -> bool:
     return isinstance(value, Constant) and value.value is None
 
 
-def is_chosen(value: Value) -> bool:
-    """Return whether the file decides on a value."""
-    return any(getattr(each, 'is_chosen', False) for each in alternatives(value))
+def is_chosen(value: Value) -> int:
+    """Return whether the file decides on a value, and how."""
+    return max(getattr(each, 'is_chosen', 0) for each in alternatives(value))
 
 
 def truth_of(value: Value) -> bool | None:

@@ -9,7 +9,7 @@ from composer.diagnostics import Related, diagnostic_at
 from composer.language.bindings import node_bindings
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
-from composer.spelling import find_nearest, suggest
+from composer.spelling import find_nearest, is_typo, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -141,6 +141,8 @@ def _explain_unknown_node(
     meant = _full_name(node, each.node)
     same = sorted(name for name in names if name.rpartition('/')[2] == meant.rpartition('/')[2])
     nearest = same[0] if same else find_nearest(meant, names)
+    if nearest and not same and not is_typo(meant, nearest):
+        return
     if nearest is not None and not _is_in_process(context, meant):
         yield diagnostic_at(
             each.node_place,

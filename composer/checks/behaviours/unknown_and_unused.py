@@ -16,7 +16,7 @@ from composer.entity_kinds import (
 )
 from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
-from composer.spelling import find_nearest, suggest
+from composer.spelling import find_nearest, is_typo, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -111,8 +111,10 @@ def _declared_by_behaviour(
 def _is_typo(node: NodeSpec, use: NodeUse, declared: set[tuple[str, str]]) -> bool:
     """Return whether a name that is used on a condition of the file is wrong in any case."""
     section = KIND_OF_NOUN[use.kind].section
-    is_near = find_nearest(use.name, getattr(node, section)) is not None
-    return is_near and (use.kind, use.name) not in declared
+    near = find_nearest(use.name, getattr(node, section))
+    if near is None or (use.kind, use.name) in declared:
+        return False
+    return is_typo(use.name, near)
 
 
 def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> bool:

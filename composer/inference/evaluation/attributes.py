@@ -5,9 +5,11 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.current_run import name_place
+from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
-from composer.inference.run import name_place
 from composer.inference.values import (
+    BY_PARAMETER,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -42,7 +44,6 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from composer.inference.evaluation.evaluator import Evaluator
 
 # What `composer.Node` has; a test holds these names against the classes.
 NODE_METHODS = frozenset(
@@ -97,15 +98,8 @@ def _function() -> None:
 _COROUTINE = frozenset({'close', 'send', 'throw'})
 
 
-class Attributes:
-    """Reads and stores attributes.
-
-    Args:
-        evaluator: Knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Attributes(Part):
+    """Reads and stores attributes."""
 
     # Reading
 
@@ -327,7 +321,7 @@ class Attributes:
         if not isinstance(item, Constant) or self._evaluator.run.reading.reaches_ros:
             return CHOSEN
         value = self._evaluator.run.facts.value_of_parameter(str(item.value))
-        return constant((value != UNKNOWN) == isinstance(sign, ast.In), is_chosen=True)
+        return constant((value != UNKNOWN) == isinstance(sign, ast.In), is_chosen=BY_PARAMETER)
 
     # Storing
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from composer.inference.evaluation.part import Part
 from composer.inference.values import (
     CHOSEN,
     NONE,
@@ -28,9 +27,6 @@ from composer.inference.values import (
     join,
 )
 
-if TYPE_CHECKING:
-    from composer.inference.evaluation.evaluator import Evaluator
-
 _TEXT_METHODS = frozenset(
     {
         'capitalize',
@@ -47,15 +43,8 @@ _TEXT_METHODS = frozenset(
 )
 
 
-class Containers:
-    """Evaluates methods of dictionaries, lists, texts and parts of the node.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Containers(Part):
+    """Evaluates methods of dictionaries, lists, texts and parts of the node."""
 
     def call_method(self, method: BoundMethod, arguments: Arguments, place: Place) -> Value:
         """Return what a method may return."""

@@ -7,20 +7,21 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
 from composer.inference.evaluation.attributes import Attributes
-from composer.inference.evaluation.calls import Calls
-from composer.inference.evaluation.classes import Classes
+from composer.inference.evaluation.calling import Calls
 from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
-from composer.inference.evaluation.functions import Functions
+from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
 from composer.inference.evaluation.library_calls import LibraryCalls
 from composer.inference.evaluation.node_calls import NodeCalls
-from composer.inference.evaluation.payloads import Payloads
-from composer.inference.evaluation.statements import Statements
+from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.project_classes import Classes
+from composer.inference.evaluation.statement_flow import Statements
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.values import (
+    BY_PARAMETER,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -53,7 +54,7 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.inference.run import Run
+    from composer.inference.current_run import Run
     from composer.python_source.modules import ModuleSource
 
 
@@ -166,11 +167,11 @@ class Evaluator:
         """
         truth = truth_of(test)
         is_dead = truth is not None and truth != is_taken
-        is_doubt = is_dead or (truth is None and is_chosen(test))
+        is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
             around.enter_context(self.run.condition(is_doubt=is_doubt))
-            if is_dead and not is_chosen(test):
-                around.enter_context(self.run.silence())
+            if is_dead and is_chosen(test) != BY_PARAMETER:
+                around.enter_context(self.run.dead_branch())
             yield
 
     def home_of(self, scope: Scope) -> Scope:

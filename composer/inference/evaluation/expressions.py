@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, cast
 
 from composer.inference.evaluation.operators import combine, compare, negate
+from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
@@ -33,7 +34,6 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from composer.inference.evaluation.evaluator import Evaluator
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
@@ -41,15 +41,8 @@ _UNREAD = (ast.Slice,)
 _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 
 
-class Expressions:
-    """Evaluates expressions.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Expressions(Part):
+    """Evaluates expressions."""
 
     def evaluate(self, node: ast.expr, scope: Scope) -> Value:
         """Return what an expression may be."""
@@ -82,7 +75,7 @@ class Expressions:
 
     def _joinedstr(self, node: ast.JoinedStr, scope: Scope) -> Value:
         text: str | None = ''
-        chosen = False
+        chosen = 0
         for part in node.values:
             if isinstance(part, ast.Constant):
                 value: Value = constant(part.value)
@@ -93,7 +86,7 @@ class Expressions:
                     value = Scalar(str, is_chosen(value))
             else:
                 value = UNKNOWN
-            chosen |= is_chosen(value)
+            chosen = max(chosen, is_chosen(value))
             simple = isinstance(value, Constant) and isinstance(value.value, str | int | bool)
             text = f'{text}{value.value}' if text is not None and simple else None  # type: ignore[union-attr]
         if text is None:
@@ -167,7 +160,7 @@ class Expressions:
 
     def _compare(self, node: ast.Compare, scope: Scope) -> Value:
         left = self._evaluator.awaited(node.left, scope)
-        chosen = False
+        chosen = 0
         for sign, operand in zip(node.ops, node.comparators, strict=True):
             right = self.evaluate(operand, scope)
             if isinstance(sign, ast.In | ast.NotIn):
@@ -176,7 +169,7 @@ class Expressions:
                 )
             said = self._evaluator.attributes.contained(sign, left, right)
             said = said or compare(sign, left, right)
-            chosen |= is_chosen(said)
+            chosen = max(chosen, is_chosen(said))
             if len(node.ops) == 1:
                 return said
             left = right

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, cast
 
-import composer
+from composer.inference.evaluation.part import Part
 from composer.inference.message_types import split_part
 from composer.inference.values import (
     UNKNOWN,
@@ -21,22 +21,14 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from composer.inference.evaluation.evaluator import Evaluator
     from composer.interfaces.catalogue import InterfaceKind
     from composer.python_source.modules import ModuleSource
 
 _FOLDERS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 
 
-class Imports:
-    """Evaluates imports.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Imports(Part):
+    """Evaluates imports."""
 
     def imported(
         self, module: ModuleSource, statement: ast.Import | ast.ImportFrom, name: str
@@ -66,9 +58,11 @@ class Imports:
         interface = find_interface(full_name)
         if interface is None:
             package, _, name = full_name.partition('.')
-            if package == 'composer' and name and name not in composer.__all__:
-                if '.' not in name and name.islower() is False:
-                    self._report_import(place, f"composer has no '{name}'", composer.__all__, name)
+            if package == 'composer':
+                public = self._evaluator.run.modules.public_names('composer')
+                is_name = '.' not in name and not name.islower()
+                if is_name and public and name not in public:
+                    self._report_import(place, f"composer has no '{name}'", public, name)
                 return UNKNOWN
             catalogue = self._evaluator.run.types.catalogue
             folder = name.partition('.')[0]

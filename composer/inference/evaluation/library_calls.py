@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+import ast
+from typing import cast
 
+from composer.inference.current_run import name_place
 from composer.inference.evaluation.known_functions import KNOWN_RESULTS
-from composer.inference.run import name_place
+from composer.inference.evaluation.part import Part
 from composer.inference.values import (
+    BY_PARAMETER,
     CHOSEN,
     NONE,
     UNKNOWN,
@@ -32,22 +35,12 @@ from composer.inference.values import (
     join,
 )
 
-if TYPE_CHECKING:
-    from composer.inference.evaluation.evaluator import Evaluator
-
 # How long a `range` is that is followed item by item.
 _LONGEST_RANGE = 256
 
 
-class LibraryCalls:
-    """Evaluates calls of Python's own functions.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class LibraryCalls(Part):
+    """Evaluates calls of Python's own functions."""
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Return what a call of a function may return, by its full name: `builtins.len`."""
@@ -59,7 +52,7 @@ class LibraryCalls:
                 self._escape_functions(arguments)
             result = KNOWN_RESULTS[name]
             if isinstance(result, Scalar) and are_chosen(arguments):
-                return Scalar(result.kind, is_chosen=True)
+                return Scalar(result.kind, is_chosen=BY_PARAMETER)
             return result
         self._evaluator.calls.escape_all(arguments)
         return CHOSEN if are_chosen(arguments) else UNKNOWN
@@ -105,6 +98,10 @@ class LibraryCalls:
             return Scalar(bool)
         if owner.value == PartOfNode('state'):
             self._evaluator.run.reading.state_tested.add(str(name.value.value))
+        if owner.value == PartOfNode('parameters'):
+            contained = self._evaluator.attributes.contained(ast.In(), name.value, owner.value)
+            self._evaluator.attributes.note_containment(name.value, owner.value, name.place)
+            return contained or UNKNOWN
         if isinstance(owner.value, Message):
             description = self._evaluator.run.types.describe(owner.value.type)
             if description is not None and not str(name.value.value).startswith('_'):

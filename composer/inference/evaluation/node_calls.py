@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
+from composer.inference.current_run import name_place, span_of
+from composer.inference.evaluation.part import Part
 from composer.inference.reading import SENDING_METHODS, RemoteParameter
-from composer.inference.run import name_place, span_of
 from composer.inference.values import (
+    BY_PARAMETER,
     CHOSEN,
     NONE,
     UNKNOWN,
@@ -32,18 +34,9 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from collections import abc
 
-    from composer.inference.evaluation.evaluator import Evaluator
 
-
-class NodeCalls:
-    """Evaluates calls of the node.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class NodeCalls(Part):
+    """Evaluates calls of the node."""
 
     def call(self, method: str, arguments: Arguments, *, waits: bool, is_awaited: bool) -> Value:
         """Return what a method of the node may return."""
@@ -202,7 +195,7 @@ class NodeCalls:
                 if value != UNKNOWN or run.reading.reaches_ros or owner.name == 'changes':
                     found.append(value)
                 elif default is None:
-                    found.append(constant(None, is_chosen=True))
+                    found.append(constant(None, is_chosen=BY_PARAMETER))
                 else:
                     found.append(CHOSEN)
             else:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
 
+from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Scope
 from composer.inference.values import (
     UNKNOWN,
@@ -15,19 +15,9 @@ from composer.inference.values import (
     Value,
 )
 
-if TYPE_CHECKING:
-    from composer.inference.evaluation.evaluator import Evaluator
 
-
-class Classes:
-    """Evaluates classes.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Classes(Part):
+    """Evaluates classes."""
 
     def instantiate(self, of: Class, arguments: Arguments) -> Value:
         """Return an object of a class."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit, signature_of
 from composer.inference.message_types import in_python
 from composer.inference.reading import SENDING_METHODS
@@ -40,19 +41,11 @@ from composer.inference.values import (
 from composer.interfaces.field_errors import unknown_field
 
 if TYPE_CHECKING:
-    from composer.inference.evaluation.evaluator import Evaluator
     from composer.inference.scopes import Scope
 
 
-class Calls:
-    """Evaluates calls.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Calls(Part):
+    """Evaluates calls."""
 
     def call(self, node: ast.Call, scope: Scope, *, is_awaited: bool = False) -> Value:
         """Return what a call may return."""

@@ -34,6 +34,7 @@ class Run:
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
         conditions: The number of conditions around it.
+        dead_branches: The number of branches around it that the file never takes.
         is_silent: Whether the place is read once more later.
     """
 
@@ -46,6 +47,7 @@ class Run:
         self.guards = 0
         self.broad_guards = 0
         self.conditions = 0
+        self.dead_branches = 0
         self.is_silent = False
         self._steps = 0
 
@@ -90,6 +92,14 @@ class Run:
             yield
         finally:
             self.doubts, self.guards, self.conditions, self.is_silent = before
+
+    @contextmanager
+    def dead_branch(self) -> Iterator[None]:
+        """Report nothing meanwhile, and take what is used as nothing that is needed."""
+        self.dead_branches += 1
+        with self.silence():
+            yield
+        self.dead_branches -= 1
 
     @contextmanager
     def silence(self) -> Iterator[None]:
@@ -147,7 +157,7 @@ class Run:
                 is_optional=is_optional,
                 has_default=has_default,
                 is_certain=not (self.doubts or self.broad_guards),
-                is_guarded=bool(self.guards),
+                is_guarded=bool(self.guards or self.dead_branches),
                 waits=waits,
                 is_change=is_change,
             )
@@ -160,7 +170,7 @@ class Run:
 
     def use_state(self, name: str, place: Place, *, is_guarded: bool = False) -> None:
         """Note that a name of `node.state` is read."""
-        guarded = is_guarded or bool(self.guards or self.doubts)
+        guarded = is_guarded or bool(self.guards or self.doubts or self.dead_branches)
         self.reading.state_read.append(StateUse(name, span_of(place, name), guarded))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from composer.inference.evaluation.part import Part
 from composer.inference.message_types import in_python
 from composer.inference.values import (
     Alternatives,
@@ -38,7 +39,6 @@ from composer.interfaces.field_values import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from composer.inference.evaluation.evaluator import Evaluator
     from composer.inference.message_types import MessageTypes
     from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
 
@@ -47,7 +47,7 @@ _TEXTS = ('string', 'wstring')
 
 
 @dataclass(frozen=True, slots=True)
-class Misfit:
+class Misfit(Part):
     """A value that does not fit, and where it is written.
 
     Attributes:
@@ -61,18 +61,15 @@ class Misfit:
     used_at: Place | None = None
 
 
-class Payloads:
+class Payloads(Part):
     """Checks payloads.
 
     Of several values that one name may stand for, each may be meant for another place: one is
     reported if it fits none of those that it is given to.
-
-    Args:
-        evaluator: Knows the run.
     """
 
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+    def __init__(self, evaluator: Any) -> None:
+        super().__init__(evaluator)
         self._misfits: dict[int, tuple[object, list[Misfit], Place]] = {}
         self._fitting: set[int] = set()
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
+from typing import Any
 
+from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.values import (
@@ -26,9 +27,6 @@ from composer.inference.values import (
 )
 from composer.python_source.modules import FunctionKind, FunctionSource, read_signature
 
-if TYPE_CHECKING:
-    from composer.inference.evaluation.evaluator import Evaluator
-
 # How deep helpers of helpers are followed.
 _DEEPEST = 12
 _TRANSPARENT = {
@@ -44,7 +42,7 @@ _TRANSPARENT = {
 }
 
 
-class Functions:
+class Functions(Part):
     """Follows calls of functions.
 
     Args:
@@ -54,8 +52,8 @@ class Functions:
         active: The functions under way.
     """
 
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+    def __init__(self, evaluator: Any) -> None:
+        super().__init__(evaluator)
         self.active: list[ast.AST] = []
         self._results: dict[tuple[object, ...], Value] = {}
         self._local_names: dict[int, LocalNames] = {}

@@ -6,16 +6,17 @@ import ast
 from collections import abc
 from typing import TYPE_CHECKING
 
+from composer.inference.current_run import Run, TooLongError
 from composer.inference.evaluation.evaluator import Evaluator
-from composer.inference.evaluation.functions import kind_of
+from composer.inference.evaluation.function_calls import kind_of
 from composer.inference.message_types import MessageTypes
 from composer.inference.node_facts import Log, NodeFacts
 from composer.inference.project_modules import ProjectModules, is_of_project
 from composer.inference.reading import Reading, unknown_reading
-from composer.inference.run import Run, TooLongError
 from composer.inference.scopes import own_nodes
 from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
+    BY_FILE,
     CHOSEN,
     NODE,
     NONE,
@@ -174,7 +175,7 @@ def _of_file(value: object, place: Place) -> Value:
     if isinstance(value, abc.Mapping):
         return Mapping({key: (_of_file(each, place), place) for key, each in value.items()})
     if value is None or isinstance(value, bool | int | float | str):
-        return constant(value, is_chosen=True)
+        return constant(value, is_chosen=BY_FILE)
     return CHOSEN
 
 

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.operators import combine
+from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
     NONE,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from collections.abc import Sequence as SequenceOf
 
-    from composer.inference.evaluation.evaluator import Evaluator
 
 # What a wrong name raises, and what catches it.
 _CATCHING = {
@@ -52,15 +52,8 @@ _WITHOUT_EFFECT = (ast.Name, ast.Dict, ast.Compare, ast.BinOp, ast.Tuple, ast.Li
 _DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
 
 
-class Statements:
-    """Follows statements.
-
-    Args:
-        evaluator: Evaluates what is in them, and knows the run.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
+class Statements(Part):
+    """Follows statements."""
 
     def follow_all(self, statements: Iterable[ast.stmt], scope: Scope) -> None:
         """Follow statements, as far as they are reached."""
