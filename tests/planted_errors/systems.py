@@ -186,9 +186,11 @@ class Generator:
         bound = self._behaviour(['node'])
         module, _, name = bound['behaviour'].partition(':')
         body = [f'node.parameters.{each}' for each in node['parameters']]
-        body += [f'node.publish({each!r}, None)' for each in node.get('publishers', ())]
-        body += [f'node.call_async({each!r}, None)' for each in node.get('service_clients', ())]
-        body += [f'node.send_goal({each!r}, None)' for each in node.get('action_clients', ())]
+        body += [f'node.publish({each!r}, {{}})' for each in node.get('publishers', ())]
+        body += [
+            f'task = node.call_async({each!r}, {{}})' for each in node.get('service_clients', ())
+        ]
+        body += [f'node.send_goal({each!r}, {{}})' for each in node.get('action_clients', ())]
         self.modules[module][name].body = body
         node['on_start'] = self.chance.choice((bound, bound['behaviour']))
         if not node['parameters']:

@@ -60,7 +60,7 @@ class Imports(Part):
             package, _, name = full_name.partition('.')
             if package == 'composer':
                 public = self._evaluator.run.modules.public_names('composer')
-                is_name = '.' not in name and not name.islower()
+                is_name = bool(name) and '.' not in name and not name.islower()
                 if is_name and public and name not in public:
                     self._report_import(place, f"composer has no '{name}'", public, name)
                 return UNKNOWN

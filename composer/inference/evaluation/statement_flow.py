@@ -221,7 +221,7 @@ class Statements(Part):
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
-                is_doubtful |= truth is None and is_chosen(test)
+                is_doubtful |= truth is None and is_chosen(test) > 0
                 before = scope.copy_names()
                 self._evaluator.narrow(node.test, scope, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
