@@ -14,7 +14,7 @@ from composer.language.specs import NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, ProcessSpec, QosSpec, SystemSpec
@@ -24,18 +24,23 @@ if TYPE_CHECKING:
 PossibleEnd: TypeAlias = tuple[ChannelKind, bool, str | None]
 
 _SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
-# By the keys of a node that switch them on (rclpy's `ParameterService` and the like).
+# By the keys of a node that switch them on (rclpy's `ParameterService` and the like), with types.
 _SERVICES_OF_ROS = {
-    'parameter_services': (
-        'describe_parameters',
-        'get_parameter_types',
-        'get_parameters',
-        'list_parameters',
-        'set_parameters',
-        'set_parameters_atomically',
-    ),
-    'type_description_service': ('get_type_description',),
-    'logger_services': ('get_logger_levels', 'set_logger_levels'),
+    'parameter_services': {
+        'describe_parameters': 'rcl_interfaces/srv/DescribeParameters',
+        'get_parameter_types': 'rcl_interfaces/srv/GetParameterTypes',
+        'get_parameters': 'rcl_interfaces/srv/GetParameters',
+        'list_parameters': 'rcl_interfaces/srv/ListParameters',
+        'set_parameters': 'rcl_interfaces/srv/SetParameters',
+        'set_parameters_atomically': 'rcl_interfaces/srv/SetParametersAtomically',
+    },
+    'type_description_service': {
+        'get_type_description': 'type_description_interfaces/srv/GetTypeDescription',
+    },
+    'logger_services': {
+        'get_logger_levels': 'rcl_interfaces/srv/GetLoggerLevels',
+        'set_logger_levels': 'rcl_interfaces/srv/SetLoggerLevels',
+    },
 }
 
 
@@ -92,14 +97,14 @@ class Topology:
     """All channels of a system.
 
     Attributes:
-        ros_services: The full names of the services that ROS itself gives to the nodes.
+        ros_services: The services that ROS itself gives to the nodes: their types by full names.
         possible: Ends that channels may have as well: their names depend on an argument that is
             not given yet, or they are missing or misnamed because of another error.
         left_out: The channels of nodes that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
-    ros_services: frozenset[str]
+    ros_services: Mapping[str, str]
     possible: frozenset[PossibleEnd]
     left_out: frozenset[tuple[ChannelKind, str]]
 
@@ -137,12 +142,12 @@ def build_topology(
         channel = channels.setdefault(key, Channel(*key))
         ends = channel.providers if kind.provides else channel.users
         ends.append(Endpoint(node, entity, kind))
-    services = (name for node in spec.nodes.values() for name in _services_of_ros(node))
+    services = dict(each for node in spec.nodes.values() for each in _services_of_ros(node))
     left_out = (
         (channel_kind, full_name(node, channel_kind, getattr(entity, channel_kind)))
         for node, _, channel_kind, entity in (_ends(system.unused) if system.unused else ())
     )
-    return Topology(channels, frozenset(services), frozenset(possible), frozenset(left_out))
+    return Topology(channels, services, frozenset(possible), frozenset(left_out))
 
 
 def _ends(spec: SystemSpec) -> Iterator[tuple[NodeSpec, EntityKind, ChannelKind, EndSpec]]:
@@ -180,10 +185,11 @@ def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str
     return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
 
 
-def _services_of_ros(node: NodeSpec) -> Iterator[str]:
-    for key, names in _SERVICES_OF_ROS.items():
+def _services_of_ros(node: NodeSpec) -> Iterator[tuple[str, str]]:
+    for key, services in _SERVICES_OF_ROS.items():
         if getattr(node, key):
-            yield from (expand_name(f'~/{name}', node.name, node.namespace) for name in names)
+            for name, type_name in services.items():
+                yield expand_name(f'~/{name}', node.name, node.namespace), type_name
 
 
 class _UncertainNames:

@@ -65,7 +65,7 @@ def test_actions_are_not_remapped_by_name(check):
     action_clients: {do: test_msgs/action/Fibonacci}
     on_start: parts:send
 """
-    assert check(nodes, CODE, installed=False) == []
+    assert check(nodes, CODE, installed=False) == [(4, 'bad-remap')]
 
 
 def test_what_ros_itself_serves_needs_no_other_end(check):

@@ -16,6 +16,7 @@ RULE = 'likely-misspelling'
         ('/front_lidar_scna', '/front_lidar_scan'),
         ('/Camera', '/camera'),
         ('/trajetcori', '/trajectory'),
+        ('/cmd_vle', '/cmd_vel'),
     ],
 )
 def test_a_slip_is_found(word, option):
@@ -29,6 +30,7 @@ def test_a_slip_is_found(word, option):
         ('/camera1', '/camera2'),
         ('/arm_l', '/arm_r'),
         ('/map', '/mop'),
+        ('/arm_lr', '/arm_rl'),
         ('/cmd_vell', '/cmd_vel'),
         ('/left/scan', '/right/scan'),
         ('/scan', '/left/scan'),
@@ -74,6 +76,52 @@ def test_what_is_waited_for_may_be_here_left_out_or_elsewhere(check):
     nodes = WAITS.replace('KIND', 'node').replace('NAME', 'camrea')
     left_out = nodes + '  camrea: {when: false}\n'
     assert check(left_out, CODE, installed=False) == []
+
+
+@pytest.mark.parametrize(
+    ('kind', 'wrong', 'right'),
+    [
+        ('topic', '/frnt/scan', '/front/scan'),
+        ('service', 'docc/start', 'dock/start'),
+        ('action', '/dokc', '/dock'),
+        ('service', '/other/get_paramters', '/other/get_parameters'),
+        ('node', '/drivr', '/driver'),
+    ],
+)
+def test_what_is_elsewhere_has_its_name_from_what_uses_it(check, kind, wrong, right):
+    nodes = """
+  n:
+    wait_for: {KIND: NAME}
+    subscriptions: {/front/scan: {type: std_msgs/msg/String, external: true, behaviour: parts:hear}}
+    service_clients: {dock/start: {type: std_srvs/srv/Empty, external: true}}
+    action_clients: {/dock: {type: test_msgs/action/Fibonacci, external: true}}
+    on_start: parts:go
+  other: {}
+processes:
+  driver: {command: ['true'], name: driver}
+""".replace('KIND', kind)
+    code = """
+        def hear(node, message): ...
+        def go(node):
+            node.call('dock/start', {})
+            node.send_goal('/dock', {})
+    """
+    assert check(nodes.replace('NAME', wrong), code, installed=False) == [(4, RULE)]
+    assert check(nodes.replace('NAME', right), code, installed=False) == []
+
+
+def test_ros_does_not_remap_an_action(check):
+    nodes = """
+  server:
+    remap: {do: done, heard: said}
+    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
+    subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:do}}
+"""
+    code = 'def do(node, it): ...'
+    assert check(nodes, code, rule='bad-remap', installed=False) == [
+        "ROS does not remap actions, such as '/do', and ignores the rule"
+    ]
+    assert check(nodes.replace('do: done', 'do/_action/status: x'), code, installed=False) == []
 
 
 def test_a_remapping_rule_is_for_no_misspelt_name(check):
