@@ -72,7 +72,7 @@ class IncludeEntry:
     def find_file(self) -> Path | None:
         """Return the file that is named; report it if there is none, and return `None`."""
         try:
-            return _locate_file(self.file, self.span)
+            return locate_file(self.file, self.span)
         except PathError as error:
             # What is left out may be in a package of other machines, and have a name that is whole
             # only when it is used.
@@ -123,8 +123,8 @@ def shown_path(path: Path) -> str:
         return plain if os.path.realpath(plain) == real else real
 
 
-def _locate_file(text: str, place: Span) -> Path:
-    """Return the file that an include names.
+def locate_file(text: str, place: Span) -> Path:
+    """Return the file that a text names which is written at `place`.
 
     Raises:
         PathError: There is no such file.
