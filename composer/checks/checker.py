@@ -13,13 +13,14 @@ from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.channels import check_channel_types, check_servers
 from composer.checks.connections.deadlocks import check_deadlocks
 from composer.checks.connections.loops import check_loops
-from composer.checks.connections.qos import check_qos_pairs
+from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.typos import check_typos
 from composer.checks.connections.unconnected import check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.environment import check_environment
 from composer.checks.ignore_comments import apply_ignore_comments
+from composer.checks.left_out import check_left_out
 from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
@@ -65,11 +66,13 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
     check_parameter_files,
     check_executables,
+    check_left_out,
     check_waits,
     check_environment,
     check_channel_types,
     check_servers,
     check_qos_pairs,
+    check_deadlines,
     check_other_ends,
     check_loops,
     check_deadlocks,

@@ -24,6 +24,26 @@ if TYPE_CHECKING:
 PossibleEnd: TypeAlias = tuple[ChannelKind, bool, str | None]
 
 _SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
+# What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
+TOPICS_OF_ROS = {
+    '/clock': 'rosgraph_msgs/msg/Clock',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/diagnostics_agg': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/diagnostics_toplevel_state': 'diagnostic_msgs/msg/DiagnosticStatus',
+    '/parameter_events': 'rcl_interfaces/msg/ParameterEvent',
+    '/rosout': 'rcl_interfaces/msg/Log',
+    '/tf': 'tf2_msgs/msg/TFMessage',
+    '/tf_static': 'tf2_msgs/msg/TFMessage',
+}
+# Between the name of an action and those of the topics and services that it consists of.
+OF_ACTIONS = '/_action/'
+_PARTS_OF_ACTIONS: dict[tuple[ChannelKind, str], str] = {
+    ('topic', 'status'): 'action_msgs/msg/GoalStatusArray',
+    ('topic', 'feedback'): '{}_FeedbackMessage',
+    ('service', 'send_goal'): '{}_SendGoal',
+    ('service', 'get_result'): '{}_GetResult',
+    ('service', 'cancel_goal'): 'action_msgs/srv/CancelGoal',
+}
 # By the keys of a node that switch them on (rclpy's `ParameterService` and the like), with types.
 _SERVICES_OF_ROS = {
     'parameter_services': {
@@ -111,6 +131,25 @@ class Topology:
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
         return (channel for channel in self.channels.values() if channel.kind == kind)
+
+    def type_of_ros(self, channel: Channel) -> str | None:
+        """Return the type that ROS gives to a topic or service of its own, `None` to others."""
+        if channel.kind == 'topic' and channel.name in TOPICS_OF_ROS:
+            return TOPICS_OF_ROS[channel.name]
+        if channel.kind == 'service' and channel.name in self.ros_services:
+            return self.ros_services[channel.name]
+        owner, separator, part = channel.name.partition(OF_ACTIONS)
+        form = _PARTS_OF_ACTIONS.get((channel.kind, part)) if separator else None
+        action = self.channels.get(('action', owner))
+        if form is None or (action is None and '{' in form):
+            return None
+        return form.format(action.ends[0].entity.type if action else '')
+
+    def is_served_by_ros(self, channel: Channel) -> bool:
+        """Return whether ROS serves a service for a node or an action of the system."""
+        owner, separator, _ = channel.name.partition(OF_ACTIONS)
+        action = self.channels.get(('action', owner)) if separator else None
+        return channel.name in self.ros_services or bool(action and action.providers)
 
     def may_have_more(self, channel: Channel) -> bool:
         """Return whether the end that a channel lacks may be one of the possible ones."""
