@@ -26,10 +26,12 @@ class MissingModule:
     Attributes:
         missing: The part of its name that was not found, as in `behaviours.greter`.
         nearest: The module that may have been meant.
+        hidden_by: The `__init__.py` without which Python would find it in another folder.
     """
 
     missing: str
     nearest: str | None
+    hidden_by: Path | None = None
 
 
 def project_search_path(configs: Iterable[Path]) -> list[Path]:
@@ -62,12 +64,16 @@ class ModuleFinder:
     def _find(self, name: str) -> ModuleSource | MissingModule:
         folders = self._roots
         done: list[str] = []
+        package: Path | None = None
         for part in name.split('.'):
             file, inner = _locate(part, folders)
             if file is None and not inner and not done:
                 file, inner = _locate_with_importers(part)
             if file is None and not inner:
-                return MissingModule('.'.join([*done, part]), self._nearest(part, done, folders))
+                missing = '.'.join([*done, part])
+                hidden_by = package if package and self._is_elsewhere([*done, part]) else None
+                return MissingModule(missing, self._nearest(part, done, folders), hidden_by)
+            package = file
             done.append(part)
             folders = inner
         if file is None:
@@ -75,6 +81,10 @@ class ModuleFinder:
         module = read_module(file, self._tokens_left)
         self._tokens_left -= module.tokens
         return module
+
+    def _is_elsewhere(self, parts: list[str]) -> bool:
+        """Return whether another folder has a module, in a package without `__init__.py`."""
+        return any(_is_there(root.joinpath(*parts).with_suffix('.py')) for root in self._roots)
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
         for folder in folders:
