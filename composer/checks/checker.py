@@ -7,6 +7,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.missing_modules import check_missing_modules
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
@@ -57,6 +58,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_missing_modules,
     check_transforms,
     check_processes,
     check_process_parameters,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.diagnostics import has_errors
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-
-_PARTS = ('nodes', 'processes', 'include')
 
 
 def check_left_out(context: CheckContext) -> Iterator[Diagnostic]:
@@ -18,7 +18,8 @@ def check_left_out(context: CheckContext) -> Iterator[Diagnostic]:
     system, spec, unused = context.system, context.spec, context.system.unused
     if spec.nodes or spec.processes or unused is None or system.given.samples:
         return
-    if any(path[:1] == (part,) for path in system.dropped for part in _PARTS):
+    if has_errors(system.diagnostics):
+        # What was dropped may have been something to run.
         return
     paths = [
         *(node.path for node in unused.nodes.values()),

@@ -34,6 +34,21 @@ class MissingModule:
     hidden_by: Path | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Location:
+    """Where a module is.
+
+    Attributes:
+        file: Its file; `None` for a package without one.
+        missing: The part of its name that was not found; empty if all was.
+        folders: Those in which this part was searched, or that the module's own modules are in.
+    """
+
+    file: Path | None
+    missing: str
+    folders: list[Path]
+
+
 def project_search_path(configs: Iterable[Path]) -> list[Path]:
     """Return the folders to search for behaviours before the installed packages.
 
@@ -49,6 +64,7 @@ class ModuleFinder:
     """Finds and reads modules, each once."""
 
     def __init__(self, search_path: list[Path]) -> None:
+        self._project = search_path
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
@@ -61,30 +77,60 @@ class ModuleFinder:
             self._found[name] = self._find(name)
         return self._found[name]
 
+    def has(self, name: str) -> bool:
+        """Return whether there is a module or package of this name."""
+        return not self._locate(name).missing
+
+    def find_missing(self, name: str) -> MissingModule | None:
+        """Return the part of a module's name that is missing, `None` if it is there."""
+        located = self._locate(name)
+        if not located.missing:
+            return None
+        *done, part = located.missing.split('.')
+        nearest = self._nearest(part, done, located.folders)
+        return MissingModule(located.missing, nearest, self._find_hiding(done, part))
+
+    def is_package(self, name: str) -> bool:
+        """Return whether a name is that of a package with an `__init__.py`."""
+        located = self._locate(name)
+        return located.file is not None and located.file.name == '__init__.py'
+
+    def is_of_project(self, name: str) -> bool:
+        """Return whether the package of a module is found before the installed ones."""
+        file, folders = _locate(name.partition('.')[0], self._project)
+        return file is not None or bool(folders)
+
     def _find(self, name: str) -> ModuleSource | MissingModule:
-        folders = self._roots
-        done: list[str] = []
-        package: Path | None = None
-        for part in name.split('.'):
-            file, inner = _locate(part, folders)
-            if file is None and not inner and not done:
-                file, inner = _locate_with_importers(part)
-            if file is None and not inner:
-                missing = '.'.join([*done, part])
-                hidden_by = package if package and self._is_elsewhere([*done, part]) else None
-                return MissingModule(missing, self._nearest(part, done, folders), hidden_by)
-            package = file
-            done.append(part)
-            folders = inner
+        missing = self.find_missing(name)
+        if missing is not None:
+            return missing
+        file = self._locate(name).file
         if file is None:
             return ModuleSource(None)
         module = read_module(file, self._tokens_left)
         self._tokens_left -= module.tokens
         return module
 
-    def _is_elsewhere(self, parts: list[str]) -> bool:
-        """Return whether another folder has a module, in a package without `__init__.py`."""
-        return any(_is_there(root.joinpath(*parts).with_suffix('.py')) for root in self._roots)
+    def _locate(self, name: str) -> _Location:
+        folders = self._roots
+        done: list[str] = []
+        file: Path | None = None
+        for part in name.split('.'):
+            file, inner = _locate(part, folders)
+            if file is None and not inner and not done:
+                file, inner = _locate_with_importers(part)
+            done.append(part)
+            if file is None and not inner:
+                return _Location(None, '.'.join(done), folders)
+            folders = inner
+        return _Location(file, '', folders)
+
+    def _find_hiding(self, done: list[str], part: str) -> Path | None:
+        """Return the `__init__.py` without which a module would be found in another folder."""
+        file = self._locate('.'.join(done)).file if done else None
+        inside = Path(*done, f'{part}.py')
+        is_elsewhere = file is not None and any(_is_there(root / inside) for root in self._roots)
+        return file if is_elsewhere else None
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
         for folder in folders:

@@ -79,6 +79,7 @@ class ModuleSource:
         imports: The full dotted names of what is imported, by name; without names that have
             several meanings, and with imports for type checkers.
         texts: The constants that are texts, with these.
+        required: The imports that are run on no condition.
         lines: The lines of its source.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: The syntax error in its source, or `None`.
@@ -92,6 +93,7 @@ class ModuleSource:
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, str] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
+    required: tuple[ast.Import | ast.ImportFrom, ...] = ()
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
@@ -141,6 +143,7 @@ def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSourc
         reader.constants,
         {name: full_name for name, full_name in reader.imports.items() if full_name},
         {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
+        tuple(reader.required),
         lines,
         reader.is_open,
         tokens=tokens,
@@ -184,6 +187,7 @@ class _ModuleReader:
         self.functions: dict[str, FunctionSource] = {}
         self.constants: dict[str, str] = {}
         self.imports: dict[str, str] = {}
+        self.required: list[ast.Import | ast.ImportFrom] = []
         self.is_open = False
         self._is_conditional = False
 
@@ -213,6 +217,8 @@ class _ModuleReader:
         return []
 
     def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
+        if not self._is_conditional:
+            self.required.append(statement)
         for alias in statement.names:
             if alias.name == '*':
                 self.is_open = True

@@ -1,0 +1,107 @@
+"""Imports of what there is not are found where they stand, and no others."""
+
+from pathlib import Path
+
+import pytest
+
+from composer.python_source.module_finder import ModuleFinder
+
+RULE = 'missing-module'
+NODES = '  n: {on_start: parts:go}\n'
+GO = '\ndef go(node): ...\n'
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """Write a package with modules, and what makes this a Python that can run the system."""
+    monkeypatch.chdir(tmp_path)
+    files = {
+        'rclpy/__init__.py': '',
+        'package/__init__.py': 'from . import inner\nfrom .inner import turn as twist\n',
+        'package/inner.py': 'def turn(node): ...\nname = 1\n',
+        'space/one.py': 'from .other import turn\n',
+        'space/other.py': 'def turn(node): ...\n',
+        'space/deep/__init__.py': 'from .. import one\n',
+        'open.py': 'def __getattr__(name): ...\ndef turn(node): ...\n',
+        'broken_chain.py': 'import package.innner\n',
+        'guarded.py': 'try:\n    import not_there\nexcept ImportError: ...\n',
+    }
+    for name, text in files.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text)
+
+
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    'code',
+    [
+        'import os.path, sys, time as t\nfrom collections.abc import Mapping',
+        'import xml.etree.ElementTree, concurrent.futures, importlib.metadata, logging.handlers',
+        'import xml.parsers.expat.model',
+        'import yaml, jinja2.sandbox\nfrom composer import Node',
+        'import package\nimport package.inner\nfrom package import inner, twist',
+        'from package.inner import turn, name, unlike_anything',
+        'from package.inner import *',
+        'from space import one, deep\nimport space.deep',
+        'from open import trun',
+        'import guarded',
+        'try:\n    import not_there\nexcept ImportError:\n    not_there = None',
+        'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import not_there',
+        'from contextlib import suppress\nwith suppress(ImportError):\n    import not_there',
+        'def unused(node):\n    import not_there',
+        'import sys\nsys.path.insert(0, "elsewhere")\nimport not_there',
+        'from sys import path\npath.append("elsewhere")\nimport not_there',
+        'from declared.msg import Own',
+        'from __future__ import annotations',
+        'class Lazy:\n    def load(self):\n        import not_there',
+    ],
+)
+def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
+    before = 'interfaces: {declared: .}\n'
+    assert check(NODES, code + GO, before=before, rule=RULE) == []
+
+
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    ('code', 'message'),
+    [
+        ('import not_there', "there is no module 'not_there'"),
+        ('import sys, not_there.part', "there is no module 'not_there'"),
+        ('from not_there import this', "there is no module 'not_there'"),
+        ('import json.decode', "there is no module 'json.decode'"),
+        ('from concurrent.future import wait', "there is no module 'concurrent.future'"),
+        ('from package.iner import turn', "there is no module 'package.iner'"),
+        ('from package.inner import trun', "package.inner has no 'trun'"),
+        ('from package import iner', "package has no 'iner'"),
+        ('from space import two', "there is no module 'space.two'"),
+        ('import space.deep.two', "there is no module 'space.deep.two'"),
+        ('from . import inner', "'parts' is in no package that '.' means"),
+        ('from ..package import inner', "'parts' is in no package that '..' means"),
+        ('import broken_chain', "there is no module 'package.innner'"),
+    ],
+)
+def test_what_cannot_be_imported_is_found(check, code, message):
+    assert check(NODES, code + GO, rule=RULE) == [message]
+
+
+@pytest.mark.usefixtures('project')
+def test_what_a_behaviour_imports_first_is_looked_at(check):
+    code = """
+        def go(node):
+            '''Go.'''
+            start = node.now()
+            import not_there
+            if not_there.is_here:
+                return
+            import neither
+    """
+    assert check(NODES, code) == [(5, RULE)]
+    assert check('  n: {on_stop: parts:o}\n', code + '    def o(node): ...', rule=RULE) == []
+
+
+@pytest.mark.usefixtures('project')
+def test_installed_packages_may_be_missing_where_there_is_no_ros(check, monkeypatch):
+    has = ModuleFinder.has
+    monkeypatch.setattr(ModuleFinder, 'has', lambda own, name: name != 'rclpy' and has(own, name))
+    code = 'import not_there\nfrom package import iner' + GO
+    assert check(NODES, code, rule=RULE) == ["package has no 'iner'"]
