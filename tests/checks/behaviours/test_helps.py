@@ -28,6 +28,7 @@ def advise(tmp_path, monkeypatch):
     """Return the help for a behaviour of an own project."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'pyproject.toml').touch()
+    (tmp_path / 'other.py').write_text('def imported(node): ...\n')
 
     def advise(behaviour, **modules):
         for name, text in modules.items():
