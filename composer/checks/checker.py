@@ -30,6 +30,7 @@ from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first
 from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -130,7 +131,7 @@ def check_in_context(
     heard = apply_ignore_comments(
         once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
-    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
+    return _first_of(say_once(sorted(heard, key=lambda finding: finding.sort_key), system))
 
 
 def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:

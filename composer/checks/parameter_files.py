@@ -6,6 +6,7 @@ value does not suit its declaration.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from composer.names import find_namespace_problem, find_node_name_problem, join_
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
-from composer.spelling import suggest
+from composer.spelling import count_edits, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -99,7 +100,7 @@ class _Library:
                     at,
                     each.rule,
                     f'{path}: {each.message}',
-                    help=each.help or _help_for_missing(Path(path)),
+                    help=_help_for_missing(Path(path)) or each.help,
                 )
                 for each in unreadable
             ]
@@ -108,7 +109,7 @@ class _Library:
 
 
 def _help_for_missing(path: Path) -> str | None:
-    return suggest(path.name, list_neighbours(path))
+    return suggest(path.name, list_neighbours(path), 'there are')
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
@@ -153,14 +154,32 @@ _DECIDING = ('namespace', 'parameter_files')
 
 def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:
     names = [user.full_name for user in users if user.full_name]
+    may_have_others = any(user.node is None for user in users)
+    patterns = [pattern for pattern, _ in file.patterns]
+    unused = [name for name in names if not any(matches_pattern(each, name) for each in patterns)]
     for pattern, span in file.patterns:
         if not any(matches_pattern(pattern, name) for name in names):
+            if may_have_others and not _is_misspelt(pattern, names, unused):
+                continue
             yield diagnostic_at(
                 span,
                 'unmatched-node-name',
                 f"'{pattern}' matches no node that uses this file, so ROS ignores it",
                 help=suggest(pattern, names, 'it is used by'),
             )
+
+
+def _is_misspelt(pattern: str, names: list[str], unused: list[str]) -> bool:
+    """Return whether a name means one of these, and not another node of their processes.
+
+    Nobody knows which nodes a process has; they may be called alike, as `camera` and `camera2`.
+    """
+    pattern = f'/{pattern.removeprefix("/")}'
+    if find_nearest(pattern, unused):
+        return True
+    near = find_nearest(pattern, names)
+    are_numbered = near and re.sub(r'\d', '', pattern) == re.sub(r'\d', '', near)
+    return near is not None and not are_numbered and count_edits(pattern, near) == 1
 
 
 def _check_entries(

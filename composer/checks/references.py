@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
+from composer.ament import explain_missing_package
 from composer.interfaces.descriptions import MessageDescription
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
 from composer.python_source.modules import ModuleSource
@@ -142,7 +143,9 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             f"no interface package '{package}' is installed",
             part=package,
             first=True,
-            help=suggest(package, packages, otherwise='install it, or correct its name'),
+            help=explain_missing_package(
+                package, packages, ", or name the folder of its definitions under 'interfaces:'"
+            ),
         )
     known = context.catalogue.names(cast('InterfaceKind', kind), package)
     names = [full.rpartition('/')[2] for full in known]

@@ -82,6 +82,9 @@ def _explain_const(error: ValidationError) -> Iterator[Violation]:
             f'version {show_value(error.instance)} is not supported, only version 1',
             path,
             path,
+            help='write 1 without quotes: a version is a number'
+            if error.instance == str(error.validator_value)
+            else None,
         )
         return
     yield Violation(

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related
 from composer.language.bindings import Binding, node_bindings
+from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
@@ -122,13 +123,17 @@ def _explain_missing_module(
     behaviour = binding.behaviour
     path = behaviour.module.replace('.', '/')
     otherwise = f'create {path}.py in the project, or install the package that has it'
+    if module.hidden_by:
+        otherwise = (
+            f'remove {shown_path(module.hidden_by)}, which hides the other modules of this name'
+        )
     return context.at_value(
         behaviour.path,
         'unknown-behaviour',
         f"there is no module '{module.missing}'",
         part=behaviour.module,
         first=True,
-        help=did_you_mean(module.nearest, otherwise),
+        help=otherwise if module.hidden_by else did_you_mean(module.nearest, otherwise),
     )
 
 
@@ -149,12 +154,17 @@ def _explain_missing_function(
         'unknown-behaviour',
         f"{behaviour.module} has no function '{behaviour.function}'",
         part=behaviour.function,
-        help=suggest(behaviour.function, _public(module.functions), 'it has'),
+        help=_suggest_function(behaviour.function, module),
     )
 
 
-def _public(names: Mapping[str, object]) -> list[str]:
-    return [name for name in names if not name.startswith('_')]
+def _suggest_function(name: str, module: ModuleSource) -> str:
+    """Return the nearest name that a module can call, or its own functions."""
+    # Classes and constants have capitals, and what it imports is there for other ends.
+    callables = [each for each in module.functions if each[0] != '_' and not each[0].isupper()]
+    own = [each for each in callables if each not in module.imports]
+    near = find_nearest(name, callables)
+    return did_you_mean(near) or suggest('', own, 'it has', 'it has no functions') or ''
 
 
 def _check_signature(
