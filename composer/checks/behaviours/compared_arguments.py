@@ -19,28 +19,37 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec
     from composer.python_source.syntax import FunctionNode
 
 
 def check_compared_arguments(context: CheckContext) -> Iterator[Diagnostic]:
     """Check arguments that are compared with parameters against their choices."""
+    pairs: dict[str, set[tuple[str, str]]] = {}
     for node in context.spec.nodes.values():
-        if any(parameter.choices for parameter in node.parameters.values()):
-            for binding in node_bindings(node):
-                yield from _check_binding(context, node, binding)
+        if not any(parameter.choices for parameter in node.parameters.values()):
+            continue
+        for binding in node_bindings(node):
+            behaviour = binding.behaviour
+            if behaviour.arguments and behaviour.name not in pairs:
+                pairs[behaviour.name] = _read_pairs(context, behaviour)
+            if behaviour.arguments:
+                yield from _check_binding(context, node, behaviour, pairs[behaviour.name])
+
+
+def _read_pairs(context: CheckContext, behaviour: BehaviourSpec) -> set[tuple[str, str]]:
+    module = context.modules.find(behaviour.module)
+    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
+    return _compared_pairs(source.definition) if source and source.definition else set()
 
 
 def _check_binding(
-    context: CheckContext, node: NodeSpec, binding: Binding
+    context: CheckContext,
+    node: NodeSpec,
+    behaviour: BehaviourSpec,
+    pairs: set[tuple[str, str]],
 ) -> Iterator[Diagnostic]:
-    behaviour = binding.behaviour
-    module = context.modules.find(behaviour.module)
-    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
-    if not behaviour.arguments or source is None or source.definition is None:
-        return
-    for argument, name in sorted(_compared_pairs(source.definition)):
+    for argument, name in sorted(pairs):
         parameter = node.parameters.get(name)
         if argument not in behaviour.arguments or not parameter or not parameter.choices:
             continue

@@ -70,9 +70,11 @@ class _Walk:
         pending = [name]
         while pending:
             each = pending.pop()
-            if each in self._visited or not self.context.modules.is_of_project(each):
+            if each in self._visited:
                 continue
             self._visited.add(each)
+            if not self.context.modules.is_of_project(each):
+                continue
             pending += [each.rpartition('.')[0]] if '.' in each else []
             module = self.context.modules.find(each)
             if isinstance(module, ModuleSource) and module.path is not None:
