@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,7 +68,10 @@ def count(node: Node, _message: Any, topic: str) -> None:
 
 
 def watch(
-    node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
+    node: Node,
+    topic: str,
+    minimum_rate: Annotated[float, '>= 0'] = 0.0,
+    maximum_age: Annotated[float, '> 0'] = inf,
 ) -> Iterator[bool | None]:
     """Yield at each tick whether a topic is healthy, and log when that changes.
 
@@ -90,7 +93,10 @@ def watch(
 
 
 def diagnose(
-    node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
+    node: Node,
+    topic: str,
+    minimum_rate: Annotated[float, '>= 0'] = 0.0,
+    maximum_age: Annotated[float, '> 0'] = inf,
 ) -> Iterator[dict[str, Any] | None]:
     """Yield the health of a topic as diagnostics; otherwise as `watch`.
 

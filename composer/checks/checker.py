@@ -7,6 +7,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.compared_arguments import check_compared_arguments
 from composer.checks.behaviours.missing_modules import check_missing_modules
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
@@ -59,6 +60,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_parameters,
     check_behaviour_sources,
     check_missing_modules,
+    check_compared_arguments,
     check_transforms,
     check_processes,
     check_process_parameters,

@@ -96,9 +96,10 @@ class ModuleFinder:
         return located.file is not None and located.file.name == '__init__.py'
 
     def is_of_project(self, name: str) -> bool:
-        """Return whether the package of a module is found before the installed ones."""
-        file, folders = _locate(name.partition('.')[0], self._project)
-        return file is not None or bool(folders)
+        """Return whether a module, or the package that it is in, is not an installed one."""
+        file, folders = _locate(name.partition('.')[0], self._roots)
+        found = [*([file] if file else []), *folders[:1]]
+        return any(each.parent in self._project for each in found)
 
     def _find(self, name: str) -> ModuleSource | MissingModule:
         missing = self.find_missing(name)

@@ -22,6 +22,7 @@ def project(tmp_path, monkeypatch):
         'space/one.py': 'from .other import turn\n',
         'space/other.py': 'def turn(node): ...\n',
         'space/deep/__init__.py': 'from .. import one\n',
+        'declared/msg/Own.msg': 'int8 x\n',
         'open.py': 'def __getattr__(name): ...\ndef turn(node): ...\n',
         'broken_chain.py': 'import package.innner\n',
         'guarded.py': 'try:\n    import not_there\nexcept ImportError: ...\n',
@@ -57,7 +58,7 @@ def project(tmp_path, monkeypatch):
     ],
 )
 def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
-    before = 'interfaces: {declared: .}\n'
+    before = 'interfaces: {declared: declared}\n'
     assert check(NODES, code + GO, before=before, rule=RULE) == []
 
 
