@@ -11,7 +11,7 @@ from composer.language.pipeline import load_system
 SYSTEM = """
 version: 1
 args: {simulation: %s}
-nodes: {}
+nodes: {other: {}}
 processes:
   driver: {when: "{{ not simulation }}", package: vendor_camera, executable: driver}
 """
