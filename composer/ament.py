@@ -67,7 +67,15 @@ def explain_missing_package(package: str, known: Iterable[str], otherwise: str =
     if near and package not in _ALIKE and count_edits(package, near) <= _MOST_EDITS:
         return f"did you mean '{near}'?"
     name = package.replace('_', '-')
-    return f'install it (apt install ros-$ROS_DISTRO-{name}, or its wheel with pip){otherwise}'
+    return (
+        f'install it (apt install ros-$ROS_DISTRO-{name}, or its wheel with pip), '
+        f'or source the workspace that has it{otherwise}'
+    )
+
+
+def has_ros() -> bool:
+    """Return whether ROS 2 is installed, by the package that no installation lacks for Python."""
+    return find_share('rclpy') is not None
 
 
 def list_packages() -> list[str]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import list_packages
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, list_neighbours, resolve_path
@@ -77,7 +76,6 @@ class _Library:
         self.files: dict[str, ParameterFile] = {}
         self.findings: list[Diagnostic] = []
         self._context = context
-        self._knows_packages = bool(list_packages())
 
     def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
         """Read the files of a node or process, and yield those that exist."""
@@ -86,10 +84,9 @@ class _Library:
             try:
                 path = str(resolve_path(text, Path()))
             except PathError as error:
-                if self._knows_packages:
-                    self.findings.append(
-                        self._context.at_value(at, 'unknown-package', str(error), help=error.help)
-                    )
+                self.findings.append(
+                    self._context.at_value(at, 'uninstalled-package', str(error), help=error.help)
+                )
                 continue
             if path not in self.files:
                 self.files[path] = read_parameter_file(Path(path))

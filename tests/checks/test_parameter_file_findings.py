@@ -189,7 +189,7 @@ def test_a_missing_file_is_an_error_where_it_is_named(check):
 def test_an_unknown_package_is_an_error_where_it_is_named(check):
     nodes = ARM.replace('p.yaml', 'package://std_msg/p.yaml')
     assert check(nodes) == [
-        "system.yaml:6:23 unknown-package: no package 'std_msg' is installed "
+        "system.yaml:6:23 uninstalled-package: no package 'std_msg' is installed "
         "→ did you mean 'std_msgs'?"
     ]
 
