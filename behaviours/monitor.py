@@ -76,6 +76,11 @@ def watch(
     """Yield at each tick whether a topic is healthy, and log when that changes.
 
     ```yaml
+    subscriptions:
+      scan:
+        type: sensor_msgs/msg/LaserScan
+        behaviour: behaviours.monitor:count
+        with: {topic: scan}
     timers:
       watch_scan:
         period: 1.0
@@ -103,6 +108,11 @@ def diagnose(
     ```yaml
     publishers:
       diagnostics: {type: diagnostic_msgs/msg/DiagnosticArray, topic: /diagnostics}
+    subscriptions:
+      scan:
+        type: sensor_msgs/msg/LaserScan
+        behaviour: behaviours.monitor:count
+        with: {topic: scan}
     timers:
       watch_scan:
         period: 1.0

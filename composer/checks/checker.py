@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
 from composer.checks.behaviours.compared_arguments import check_compared_arguments
 from composer.checks.behaviours.missing_modules import check_missing_modules
+from composer.checks.behaviours.monitors import check_monitors
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
@@ -62,6 +63,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_missing_modules,
     check_compared_arguments,
     check_transforms,
+    check_monitors,
     check_processes,
     check_process_parameters,
     check_annotations,

@@ -177,9 +177,9 @@ def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
         return False
     if inner.validator == 'const':
         return True
-    nested = inner.validator == 'oneOf' and all(
-        _is_mismatch(e, outer) for e in inner.context or ()
-    )
+    # Without a context, several of the alternatives hold.
+    context = inner.context if inner.validator == 'oneOf' else None
+    nested = bool(context) and all(_is_mismatch(e, outer) for e in context or ())
     return inner.validator == 'type' or nested
 
 

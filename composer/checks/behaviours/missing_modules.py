@@ -7,6 +7,7 @@ and those with which a behaviour begins.
 from __future__ import annotations
 
 import ast
+import importlib.util
 import re
 import sys
 from dataclasses import dataclass, field
@@ -147,7 +148,7 @@ class _Walk:
             is_of_python = top in sys.stdlib_module_names
             return is_of_python and modules.is_package(missing.rpartition('.')[0])
         # A Python without ROS cannot run the system: another one has what it needs.
-        return modules.has('rclpy')
+        return bool(importlib.util.find_spec('rclpy'))
 
     def _is_built(self, name: str) -> bool:
         """Return whether a module is of an interface package, which may be built only later."""

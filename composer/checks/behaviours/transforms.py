@@ -28,14 +28,14 @@ def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
             behaviour = subscription.behaviour
             if behaviour and (behaviour.module, behaviour.function) == (_MODULE, _FUNCTION):
                 fields = behaviour.arguments.get('fields')
-                if isinstance(fields, dict) and _is_ours(context):
+                if isinstance(fields, dict) and is_shipped(context, _MODULE):
                     yield from _check_fields(context, node, subscription, fields)
 
 
-def _is_ours(context: CheckContext) -> bool:
-    """Return whether the module is the one that comes with Composer, not another of its name."""
-    module = context.modules.find(_MODULE)
-    own = Path(__file__).parents[3].joinpath(*_MODULE.split('.')).with_suffix('.py')
+def is_shipped(context: CheckContext, name: str) -> bool:
+    """Return whether a module is the one that comes with Composer, not another of its name."""
+    module = context.modules.find(name)
+    own = Path(__file__).parents[3].joinpath(*name.split('.')).with_suffix('.py')
     path = None if isinstance(module, MissingModule) else module.path
     return path is not None and path.resolve() == own.resolve()
 

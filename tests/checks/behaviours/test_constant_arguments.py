@@ -68,8 +68,36 @@ def test_the_monitor_says_what_it_takes(check, behaviour, wrong, wanted):
   n:
     timers: {{t: {{period: 1, behaviour: 'behaviours.monitor:{behaviour}', with: {wrong}}}}}
 """
-    (message,) = check(nodes, rule='bad-argument')
-    assert f'takes {wanted}' in message
+    messages = check(nodes, rule='bad-argument')
+    assert any(f'takes {wanted}' in each for each in messages)
+
+
+@pytest.mark.parametrize(
+    ('topic', 'more', 'is_found'),
+    [
+        ('scan', '', False),
+        ('scna', '', True),
+        ('image', '', True),
+        ('scna', 'on_start: parts:start', False),
+        ('scna', 'on_start: 3', False),
+        ('"{{ topic }}"', '', False),
+    ],
+)
+def test_what_is_watched_is_counted(check, topic, more, is_found):
+    nodes = f"""
+  n:
+    subscriptions:
+      in:
+        type: std_msgs/msg/String
+        external: true
+        behaviour: behaviours.monitor:count
+        with: {{topic: scan}}
+    timers: {{t: {{period: 1, behaviour: behaviours.monitor:watch, with: {{topic: {topic}}}}}}}
+    {more}
+"""
+    before = 'args: {topic: {type: string}}\n'
+    found = check(nodes, 'def start(node): ...', before=before, rule='bad-argument')
+    assert found == ["nothing in node 'n' counts the messages of '" + topic + "'"] * is_found
 
 
 @pytest.mark.ros
