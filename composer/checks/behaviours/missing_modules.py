@@ -32,6 +32,8 @@ _Import = ast.Import | ast.ImportFrom
 _CHANGES_THE_SEARCH = re.compile(
     r'\bsys\.(path|modules|meta_path)\b|\bpath\.(append|extend|insert)\(|\baddsitedir\b|__path__'
 )
+# Each is read as a whole, and a small part of a large project is enough for a system.
+_MOST_MODULES = 50
 # Statements after which a function goes on in any case.
 _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
@@ -74,7 +76,10 @@ class _Walk:
             if each in self._visited:
                 continue
             self._visited.add(each)
-            if not self.context.modules.is_of_project(each):
+            is_followed = (
+                len(self.modules) < _MOST_MODULES and each.partition('.')[0] != 'composer'
+            )
+            if not (is_followed and self.context.modules.is_of_project(each)):
                 continue
             pending += [each.rpartition('.')[0]] if '.' in each else []
             module = self.context.modules.find(each)
@@ -118,7 +123,7 @@ class _Walk:
         if not self._check_module(home, importer, place):
             return []
         aliases = [alias for alias in statement.names if alias.name != '*']
-        if self.context.modules.is_of_project(home) and not self._is_built(home):
+        if self._is_of_project(home) and not self._is_built(home):
             for alias in aliases:
                 self._check_member(home, alias, importer)
         return [home, *(f'{home}.{alias.name}' for alias in aliases)]
@@ -141,7 +146,7 @@ class _Walk:
         """Return whether a module is missing wherever the system can run."""
         top, _, inner = missing.partition('.')
         modules = self.context.modules
-        if inner and modules.is_of_project(top):
+        if inner and self._is_of_project(top):
             return True
         if inner:
             # Packages that are installed may make their modules themselves.
@@ -149,6 +154,11 @@ class _Walk:
             return is_of_python and modules.is_package(missing.rpartition('.')[0])
         # A Python without ROS cannot run the system: another one has what it needs.
         return bool(importlib.util.find_spec('rclpy'))
+
+    def _is_of_project(self, name: str) -> bool:
+        # Where Composer is developed, it is one itself.
+        is_composer = name.partition('.')[0] == 'composer'
+        return not is_composer and self.context.modules.is_of_project(name)
 
     def _is_built(self, name: str) -> bool:
         """Return whether a module is of an interface package, which may be built only later."""
