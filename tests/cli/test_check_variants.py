@@ -188,6 +188,16 @@ def test_an_error_in_a_matrix_has_its_place(run, combination, finding):
     assert f'm.yaml:{finding}' in out
 
 
+def test_of_too_many_combinations_the_first_are_checked(run):
+    text = ''.join(f'c{number}: {{args: {{robot: cart}}}}\n' for number in range(120))
+    code, out, err = run('base.yaml', '--matrix', 'm.yaml', m=text)
+    assert code == 1
+    assert out.startswith(
+        'm.yaml:101:1: error[too-many-entries]: only the first 100 combinations are checked\n'
+    )
+    assert err == '1 error in 1 file, 100 combinations checked\n'
+
+
 @pytest.mark.parametrize('text', ['', '- a', 'a: ['])
 def test_a_matrix_that_cannot_be_read_is_a_finding(run, text):
     code, out, _ = run('base.yaml', '--matrix', 'm.yaml', m=text)
