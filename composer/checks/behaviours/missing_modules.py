@@ -36,6 +36,8 @@ _CHANGES_THE_SEARCH = re.compile(
 )
 # Each is read as a whole, and a small part of a large project is enough for a system.
 _MOST_MODULES = 50
+# A search asks the file system many times.
+_MOST_SEARCHES = 300
 # Statements after which a function goes on in any case.
 _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
@@ -69,6 +71,7 @@ class _Walk:
     findings: list[Diagnostic] = field(default_factory=list)
     modules: list[ModuleSource] = field(default_factory=list)
     _visited: set[str] = field(default_factory=set)
+    _searches: int = 0
 
     def visit(self, name: str, binding: Binding) -> None:
         """Check the imports of a module of the project, and of the packages that it is in."""
@@ -111,6 +114,8 @@ class _Walk:
 
     def _check(self, statement: _Import, importer: _Importer) -> list[str]:
         """Check an import; return the modules that it imports."""
+        if self._searches > _MOST_SEARCHES:
+            return []
         if isinstance(statement, ast.Import):
             for alias in statement.names:
                 self._check_module(alias.name, importer, _place_of_name(alias, importer.source))
@@ -124,7 +129,7 @@ class _Walk:
             return []
         if not self._check_module(home, importer, place):
             return []
-        aliases = [alias for alias in statement.names if alias.name != '*']
+        aliases = [each for each in statement.names[:_MOST_SEARCHES] if each.name != '*']
         for alias in aliases:
             if self._is_of_interfaces(home):
                 self._check_type(home, alias, importer)
@@ -137,7 +142,10 @@ class _Walk:
     def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
         """Check that a module exists; return whether it does."""
         modules = self.context.modules
-        if name in sys.modules or name in sys.stdlib_module_names or modules.has(name):
+        if name in sys.modules or name in sys.stdlib_module_names:
+            return True
+        self._searches += 1
+        if modules.has(name):
             return True
         if self._is_of_interfaces(name):
             # What is declared may be built only later.
