@@ -179,6 +179,8 @@ def test_a_comment_that_silences_something_in_one_combination_is_used(run):
         ('{layers: [sit.yaml]}', "1:14: error[bad-combination]: there is no file 'sit.yaml'"),
         ('{layers: [/etc/passwd]}', "1:14: error[bad-combination]: '/etc/passwd' lies outside of"),
         ('{set: {nodes.x.y: 1}}', "1:11: error[bad-combination]: there is no 'x' in nodes"),
+        ('{set: {"": 1}}', '1:11: error[bad-combination]: the path is empty'),
+        ('{layers: ["\\0"]}', '1:14: error[bad-combination]: there is no file'),
         ('{set: {version: 2}}', '1:20: error[unsupported-version]: '),
     ],
 )
