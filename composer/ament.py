@@ -8,10 +8,14 @@ Source: https://github.com/ament/ament_cmake/blob/master/ament_cmake_core/doc/re
 from __future__ import annotations
 
 import os
+import re
 import sys
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from composer.spelling import count_edits, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,6 +23,11 @@ if TYPE_CHECKING:
 # Folders of a prefix with a file for each package, and for each package with interfaces.
 PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
 INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
+# Packages whose names are close to those of others, and are meant nevertheless.
+_ALIKE = frozenset(('can_msgs', 'gps_msgs', 'map_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs'))
+# More than that is another word.
+_MOST_EDITS = 2
+_REMAPS_ACTIONS = (9, 2, 8)
 # The file in the prefix of a package that Composer built for a system, which installs nothing.
 BUILD_MANIFEST = 'composer_build.json'
 
@@ -50,6 +59,28 @@ def find_share(package: str) -> Path | None:
     return prefix / 'share' / package if prefix else None
 
 
+def explain_missing_package(package: str, known: Iterable[str], otherwise: str = '') -> str:
+    """Return the help for a package that is not installed: the nearest name, or how to get it.
+
+    Args:
+        known: The names that can have been meant.
+        otherwise: What else can be done.
+    """
+    near = find_nearest(package, known)
+    if near and package not in _ALIKE and count_edits(package, near) <= _MOST_EDITS:
+        return f"did you mean '{near}'?"
+    name = package.replace('_', '-')
+    return (
+        f'install it (apt install ros-$ROS_DISTRO-{name}, or its wheel with pip), '
+        f'or source the workspace that has it{otherwise}'
+    )
+
+
+def has_ros() -> bool:
+    """Return whether ROS 2 is installed, by the package that no installation lacks for Python."""
+    return find_share('rclpy') is not None
+
+
 def list_packages() -> list[str]:
     """Return the names of all installed packages, sorted."""
     return sorted(locate_packages(ament_prefixes(), PACKAGE_INDEX))
@@ -72,3 +103,18 @@ def list_executables(package: str) -> list[Path]:
     if folder is None or not folder.is_dir():
         return []
     return sorted(path for path in folder.iterdir() if path.is_file() and os.access(path, os.X_OK))
+
+
+@cache
+def remaps_actions() -> bool | None:
+    """Return whether the installed ROS remaps the names of actions; `None` without ROS.
+
+    Source: rcl_action does since 9.2.8 (https://github.com/ros2/rcl/pull/1170).
+    """
+    share = find_share('rcl_action')
+    try:
+        text = (share / 'package.xml').read_text(encoding='utf-8') if share else ''
+    except OSError:
+        return None
+    found = re.search(r'<version>(\d+)\.(\d+)\.(\d+)</version>', text)
+    return tuple(map(int, found.groups())) >= _REMAPS_ACTIONS if found else None

@@ -11,6 +11,7 @@ import stat
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,6 +25,8 @@ MAX_VALUES = 300_000
 # Levels of data, aliases and merges; the walks over the data are safe from deep recursion by it.
 MAX_DEPTH = 100
 # Files that include each other, one in the other.
+# Each is a check of the whole system.
+MAX_COMBINATIONS = 100
 MAX_INCLUDE_DEPTH = 30
 # The entries of each of nodes, include and processes, unless a file says more.
 MAX_ENTRIES = 10_000
@@ -38,6 +41,7 @@ MAX_MODULE_BYTES = 2_000_000
 MAX_MODULE_TOKENS = 200_000
 MAX_TOKENS_OF_MODULES = 500_000
 
+_YAML = ('.yaml', '.yml')
 _KINDS = {
     stat.S_IFIFO: 'a named pipe',
     stat.S_IFSOCK: 'a socket',
@@ -88,6 +92,32 @@ def read_file(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     if len(content) > limit:
         raise _too_large(limit)
     return content
+
+
+def explain_missing(path: Path) -> str | None:
+    """Return the help for a path that does not exist: the nearest one, or what is there."""
+    lineage = [path, *path.parents]
+    found = next((i for i, at in enumerate(lineage) if os.path.isdir(at)), 0)  # noqa: PTH112
+    folder, missing = lineage[found], lineage[found - 1]
+    try:
+        entries = sorted(folder.iterdir()) if found else []
+    except OSError:
+        return None
+    entries = [each for each in entries if not each.name.startswith('.')]
+    if missing != path:
+        folders = {each.name: each for each in entries if each.is_dir()}
+        if near := find_nearest(missing.name, folders):
+            return did_you_mean(str(folders[near] / path.relative_to(missing)))
+        return suggest(missing.name, folders, f"the folders in '{folder}' are")
+    inside = next((each / path.name for each in entries if (each / path.name).is_file()), None)
+    if inside:
+        return did_you_mean(str(inside))
+    # All have the same suffix, which makes them no more alike.
+    files = {each.stem: each for each in entries if each.suffix in _YAML}
+    if near := find_nearest(path.stem, files):
+        return did_you_mean(str(files[near]))
+    names = [each.name for each in files.values()]
+    return suggest('', names, f"in '{folder}' there are")
 
 
 def format_size(size: int) -> str:

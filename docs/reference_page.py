@@ -23,6 +23,7 @@ _TITLES = {
     'hook': 'A behaviour',
     'argument': 'An argument',
     'include': 'An include',
+    'combination': 'A combination to check',
     'foreach': 'Variables of foreach',
     'process': 'An external process',
     'process_restart': 'A restart policy',

@@ -21,6 +21,7 @@ ROOMS = (
         'input_limits',
         'names',
         'ament',
+        'programs',
         'confidential',
         'entity_kinds',
         'rules',

@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.behaviours.behaviour_bodies import check_bodies
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.compared_arguments import check_compared_arguments
+from composer.checks.behaviours.missing_modules import check_missing_modules
+from composer.checks.behaviours.monitors import check_monitors
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.channels import check_channel_types, check_servers
 from composer.checks.connections.deadlocks import check_deadlocks
 from composer.checks.connections.loops import check_loops
-from composer.checks.connections.qos import check_qos_pairs
+from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.typos import check_typos
 from composer.checks.connections.unconnected import check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.environment import check_environment
 from composer.checks.ignore_comments import apply_ignore_comments
+from composer.checks.left_out import check_left_out
 from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
@@ -28,6 +32,7 @@ from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first
 from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -55,7 +60,10 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_missing_modules,
+    check_compared_arguments,
     check_transforms,
+    check_monitors,
     check_processes,
     check_process_parameters,
     check_annotations,
@@ -66,11 +74,13 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
     check_parameter_files,
     check_executables,
+    check_left_out,
     check_waits,
     check_environment,
     check_channel_types,
     check_servers,
     check_qos_pairs,
+    check_deadlines,
     check_other_ends,
     check_loops,
     check_deadlocks,
@@ -124,7 +134,7 @@ def check_in_context(
     heard = apply_ignore_comments(
         once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
-    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
+    return _first_of(say_once(sorted(heard, key=lambda finding: finding.sort_key), system))
 
 
 def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:

@@ -17,15 +17,31 @@ _RMW_INDEX = 'share/ament_index/resource_index/rmw_typesupport'
 # What of that index are no middlewares themselves.
 _NO_RMW = ('rmw_implementation',)
 _MIDDLEWARES = ('RMW_IMPLEMENTATION', 'RCL_ASSERT_RMW_ID_MATCHES')
+_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
 # The highest domain whose ports exist (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html).
 _MAX_DOMAIN = 232
 # With any other value ROS complains, loses its log, or does without what is asked for (`logging.c`
-# of rcutils, `security.c` of rcl, `discovery_options.c` of rmw).
+# of rcutils, `security.c` and `node.c` of rcl, `discovery_options.c` of rmw, `participant.cpp` of
+# rmw_fastrtps, `RTPSParticipantAttributes.cpp` of Fast DDS).
 _CHOICES = {
+    _TRANSPORTS: (
+        'DEFAULT',
+        'DEFAULTv6',
+        'LARGE_DATA',
+        'LARGE_DATAv6',
+        'NONE',
+        'P2P',
+        'SHM',
+        'UDPv4',
+        'UDPv6',
+    ),
     'RCUTILS_COLORIZED_OUTPUT': ('0', '1'),
     'RCUTILS_LOGGING_BUFFERED_STREAM': ('0', '1'),
     'RCUTILS_LOGGING_USE_STDOUT': ('0', '1'),
+    'RMW_FASTRTPS_PUBLICATION_MODE': ('SYNCHRONOUS', 'ASYNCHRONOUS', 'AUTO'),
+    'RMW_FASTRTPS_USE_QOS_FROM_XML': ('0', '1'),
     'ROS_AUTOMATIC_DISCOVERY_RANGE': ('SUBNET', 'LOCALHOST', 'OFF', 'SYSTEM_DEFAULT'),
+    'ROS_DISABLE_LOANED_MESSAGES': ('0', '1'),
     'ROS_LOCALHOST_ONLY': ('0', '1'),
     'ROS_SECURITY_ENABLE': ('true', 'false'),
     'ROS_SECURITY_STRATEGY': ('Enforce', 'Permissive'),
@@ -37,6 +53,11 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the values that a file gives to the variables that ROS reads."""
     for name, message, advice in find_environment_problems(context.spec.environment):
         yield context.at_value(('environment', name), 'bad-environment', message, help=advice)
+    for process in context.spec.processes.values():
+        # Which middlewares there are where it runs, as in a container, nobody knows.
+        for name, message, advice in _find_bad_values(process.env):
+            path = (*process.path, 'env', name)
+            yield context.at_value(path, 'bad-environment', message, help=advice)
 
 
 def find_environment_problems(
@@ -46,10 +67,6 @@ def find_environment_problems(
 
     Variables that are empty count as not set, as they do for ROS.
     """
-    domain = variables.get('ROS_DOMAIN_ID')
-    if domain and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
-        message = f'ROS_DOMAIN_ID is a number from 0 to {_MAX_DOMAIN}, not {domain!r}'
-        yield 'ROS_DOMAIN_ID', message, None
     installed = installed_middlewares()
     for name in _MIDDLEWARES:
         middleware = variables.get(name)
@@ -57,10 +74,20 @@ def find_environment_problems(
             message = f"no middleware '{middleware}' is installed"
             message = message if name == _MIDDLEWARES[0] else f'{name}: {message}'
             yield name, message, suggest(middleware, installed, 'there are')
+    yield from _find_bad_values(variables)
+
+
+def _find_bad_values(variables: Mapping[str, str]) -> Iterator[tuple[str, str, str | None]]:
+    domain = variables.get('ROS_DOMAIN_ID')
+    if domain and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
+        message = f'ROS_DOMAIN_ID is a number from 0 to {_MAX_DOMAIN}, not {domain!r}'
+        yield 'ROS_DOMAIN_ID', message, None
     for name, choices in _CHOICES.items():
         value = variables.get(name)
-        if value and value not in choices:
-            yield name, f'{name} is {" or ".join(choices)}, not {value!r}', suggest(value, choices)
+        # Options of the transports follow a question mark.
+        word = value.partition('?')[0] if value and name == _TRANSPORTS else value
+        if word and word not in choices:
+            yield name, f'{name} is {" or ".join(choices)}, not {value!r}', suggest(word, choices)
     for peer in variables.get('ROS_STATIC_PEERS', '').split(';'):
         if len(peer) > _LONGEST_PEER:
             message = f'a peer in ROS_STATIC_PEERS has at most {_LONGEST_PEER} characters'

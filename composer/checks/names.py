@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-name'
+# What is wrong with a name that is only for people to read.
+IS_EMPTY = 'reports could not show it'
 
 # By the keys of a node that turn them on.
 _LONGEST_OWN_SERVICES = {
@@ -101,6 +103,14 @@ def _check_own_services(context: CheckContext, node: NodeSpec) -> Iterator[Diagn
 
 
 def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    for kind, entity in node.entities():
+        is_a_ros_name = kind.section == 'parameters' or (
+            kind.channel is not None
+            and ((*entity.path, kind.channel) not in context.system.positions.values)
+        )
+        if not entity.name.strip() and not is_a_ros_name:
+            message = f"'{entity.name}' cannot name {with_article(kind.noun)}: {IS_EMPTY}"
+            yield context.at_key(entity.path, _RULE, message)
     for kind, entity in node.ends():
         channel = str(kind.channel)
         yield from _check_ros_name(context, node, entity.path, channel, getattr(entity, channel))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import list_executables, list_packages
-from composer.checks.names import check_rules
+from composer.ament import explain_missing_package, list_executables, list_packages
+from composer.checks.names import IS_EMPTY, check_rules
+from composer.language.paths import PathError, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
+from composer.programs import base_environment, find_program_problem, is_on_path
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -16,6 +20,9 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ProcessSpec
 
+# Commands of ROS 2 and its tools, which nobody misses where there is no ROS 2.
+_OF_ROS = ('ros2', 'rviz', 'rqt', 'gz', 'plotjuggler', 'foxglove')
+
 
 def check_processes(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that names in processes follow ROS's rules."""
@@ -24,16 +31,22 @@ def check_processes(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check that the packages and executables of processes are installed.
+    """Check that the programs of processes, and the folders that they run in, exist.
 
     Those that are left out by their `when` need not be: a driver is where its device is.
     """
     for process in context.spec.processes.values():
         yield from _check_executable(context, process)
+        yield from _check_folder(context, process)
+        yield from _check_program(context, process)
 
 
 def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
     path = process.path
+    if not process.name.strip():
+        yield context.at_key(
+            path, 'bad-name', f"'{process.name}' cannot name a process: {IS_EMPTY}"
+        )
     problem = find_node_name_problem(process.node_name) if process.node_name is not None else None
     if problem:
         message = f"'{process.node_name}' cannot name a node: {problem}"
@@ -47,14 +60,14 @@ def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterato
 
 def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
     packages = list_packages()
-    if process.package is None or not packages:
+    if process.package is None:
         return
     if process.package not in packages:
         yield context.at_value(
             (*process.path, 'package'),
             'missing-package',
             f"no package '{process.package}' is installed",
-            help=suggest(process.package, packages, 'there are'),
+            help=explain_missing_package(process.package, packages),
         )
         return
     names = [path.name for path in list_executables(process.package)]
@@ -65,3 +78,38 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
             f"'{process.package}' has no executable '{process.executable}'",
             help=suggest(process.executable, names, 'it has', 'it has none'),
         )
+
+
+def _check_folder(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
+    if process.cwd is None:
+        return
+    try:
+        folder = resolve_path(process.cwd, Path())
+    except PathError as error:
+        at, help_text = (*process.path, 'cwd'), error.help
+        yield context.at_value(at, 'uninstalled-package', str(error), help=help_text)
+        return
+    if folder.is_dir():
+        return
+    message = f"there is no folder '{process.cwd}' to run in"
+    yield context.at_value((*process.path, 'cwd'), 'missing-folder', message)
+
+
+def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
+    if not process.command:
+        return
+    program = process.command[0]
+    folder = Path(process.cwd or '.')
+    is_known = process.cwd is not None and folder.is_dir()
+    if '/' in program and not (is_known or Path(program).is_absolute()):
+        # Without `cwd` it is searched from where the system is started.
+        return
+    variables = {**os.environ, **context.spec.environment}
+    environment = {**base_environment(variables), **process.env}
+    if program.startswith(_OF_ROS) and not is_on_path(_OF_ROS[0]):
+        return
+    problem = find_program_problem(program, folder, environment)
+    if problem:
+        message, advice = problem
+        path = (*process.path, 'command', 0)
+        yield context.at_value(path, 'missing-program', message, help=advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from composer.errors import UsageError
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +20,8 @@ _Command = TypeVar('_Command', bound='Callable[..., Any]')
 # Negative numbers are values; `split_words` refuses everything else that starts with a dash.
 NUMBERS_ARE_VALUES = {'ignore_unknown_options': True}
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
+# Of the systems in a folder, the first are listed.
+_MOST_LISTED = 20
 # A dash before a digit or a dot starts a number.
 _OPTION = re.compile(r'-[^\W\d]|--')
 
@@ -44,7 +48,25 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
 
     Raises:
         click.UsageError: There is no file, or an unknown option.
-        UsageError: The first word is empty.
+        UsageError: The first word is empty, or a folder.
+    """
+    refuse_options(words)
+    if not words[0]:
+        message = 'the file name is empty'
+        raise UsageError(message, help='is a shell variable unset?')
+    if os.path.isdir(words[0]):  # noqa: PTH112 - pathlib's raises
+        raise _folder_error(words[0])
+    count = 1
+    while count < len(words) and words[count].endswith(('.yaml', '.yml')):
+        count += 1
+    return [Path(word) for word in words[:count]], list(words[count:])
+
+
+def refuse_options(words: Sequence[str]) -> None:
+    """Check that there are words, and that none of them is meant for an option.
+
+    Raises:
+        click.UsageError: There is none, or an unknown option.
     """
     context = click.get_current_context()
     for word in words:
@@ -53,13 +75,6 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     if not words:
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
-    if not words[0]:
-        message = 'the file name is empty'
-        raise UsageError(message, help='is a shell variable unset?')
-    count = 1
-    while count < len(words) and words[count].endswith(('.yaml', '.yml')):
-        count += 1
-    return [Path(word) for word in words[:count]], list(words[count:])
 
 
 def refuse_together(given: Mapping[str, bool]) -> None:
@@ -112,6 +127,16 @@ def check_rule(
     if value is not None:
         _find_rule(value)
     return value
+
+
+def _folder_error(folder: str) -> UsageError:
+    from composer.cli.file_selection import list_systems
+
+    systems = [escape(str(path)) for path in list_systems(Path(folder))]
+    shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]
+    listed = '\n'.join(f'  {each}' for each in shown)
+    message = f"'{folder}' is a folder, and a system is one file"
+    return UsageError(message, help=f'it holds\n{listed}' if systems else 'it holds no system')
 
 
 def _find_rule(name: str) -> None:

@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_system
-from composer.cli.file_selection import select_files
+from composer.cli.argument_types import split_words
+from composer.cli.file_selection import (
+    SelectedSystem,
+    Selection,
+    has_arguments,
+    read_standard_input,
+    select_files,
+)
 from composer.cli.output import wants_colour, write_file
 from composer.errors import ExitCode, UsageError
-from composer.input_limits import MAX_FILE_BYTES
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system, load_system_text
+from composer.language.pipeline import load_combinations, load_system
 from composer.reports import render_report
-from composer.reports.report import CheckedFile, Report
-from composer.reports.text import render_files, summarize
+from composer.reports.report import CheckedFile, Report, name_combinations
+from composer.reports.text import count, render_files, summarize
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
     from composer.cli.import_check import ImportCheck
     from composer.language.loaded_system import LoadedSystem
-
-_STANDARD_INPUT = '-'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,34 +40,42 @@ class CheckOptions:
     Attributes:
         format: One of `composer.reports.FORMATS`.
         output: The file to write the report to; `None` for standard output.
+        set_values: Values to change, as in `nodes.talker.log_level=debug`.
+        matrix: The file with the combinations to check; `None` for those of the system itself.
         is_strict: Whether warnings count as errors.
         ignored: Rules whose findings are left out.
         expected: If not empty, the check passes only if exactly these rules fire.
         is_quiet: Whether to print only findings.
         imports: Whether to import the behaviours.
         skip_other_files: Whether to skip named files that do not look like systems.
+        strict_packages: Whether packages that are not installed are errors without ROS 2, too.
         stdin_name: The path that findings in standard input are reported under.
     """
 
     format: str = 'text'
     output: Path | None = None
     is_strict: bool = False
+    set_values: tuple[str, ...] = ()
+    matrix: Path | None = None
     ignored: tuple[str, ...] = ()
     expected: tuple[str, ...] = ()
     is_quiet: bool = False
     imports: bool = False
     skip_other_files: bool = False
+    strict_packages: bool = False
     stdin_name: str = '<stdin>'
 
 
 def check(words: Sequence[str], options: CheckOptions) -> int:
-    """Check files and report what was found; return the exit code.
+    """Check systems and report what was found; return the exit code.
 
     Args:
-        words: Files, folders, patterns, and `-` for standard input.
+        words: Files, folders, patterns, and `-` for standard input; or one file with its layers
+            and arguments.
 
     Raises:
-        UsageError: A rule is both ignored and expected.
+        UsageError: A rule is both ignored and expected, arguments or `--set` do not fit the
+            file, or are given together with a matrix.
         ComposerError: The report cannot be written.
     """
     _refuse_contradictions(options)
@@ -83,16 +95,19 @@ def _refuse_contradictions(options: CheckOptions) -> None:
 
 def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     catalogue = InterfaceCatalogue()
-    selection = select_files(words, skip_other_files=options.skip_other_files)
+    selection = _select(words, options)
+    absent = AbsentPackages(is_strict=options.strict_packages)
     imports = _import_check() if options.imports else None
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
-    for path in selection.paths:
-        system = _load(path, options)
-        findings = check_system(system, catalogue, imports)
-        kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
-        nodes = len(system.spec.nodes) if system.spec else None
-        files.append(CheckedFile(str(system.path), kept, nodes))
-    unchecked = _list_unchecked(catalogue, imports)
+    for selected in selection.systems:
+        checked = []
+        for given, combination, system in _load(selected, options):
+            findings = absent.leave_out(check_system(system, catalogue, imports))
+            kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
+            nodes = len(system.spec.nodes) if system.spec else None
+            checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
+        files += name_combinations(checked)
+    unchecked = _list_unchecked(catalogue, imports, absent)
     return Report(tuple(files), unchecked, options.is_strict)
 
 
@@ -102,17 +117,50 @@ def _import_check() -> ImportCheck:
     return ImportCheck()
 
 
-def _load(path: Path, options: CheckOptions) -> LoadedSystem:
-    if str(path) != _STANDARD_INPUT:
-        return load_system(path)
-    return load_system_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), Path(options.stdin_name))
+def _select(words: Sequence[str], options: CheckOptions) -> Selection:
+    """Return the systems to check; one, as for `composer up`, if the words can mean nothing else.
+
+    Raises:
+        UsageError: Several systems, or arguments beside a matrix.
+    """
+    is_changed = has_arguments(words) or bool(options.set_values)
+    if not (is_changed or options.matrix):
+        return select_files(words, skip_other_files=options.skip_other_files)
+    if is_changed and options.matrix:
+        message = '--matrix cannot be used together with arguments or --set'
+        raise UsageError(message, help='write them in the combinations of the matrix')
+    (path, *layers), arguments = split_words(words)
+    return Selection((SelectedSystem(path, tuple(layers), tuple(arguments)),))
 
 
-def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:
+def _load(
+    selected: SelectedSystem, options: CheckOptions
+) -> Iterator[tuple[str, str | None, LoadedSystem]]:
+    """Yield the system in each combination: what the command line gives, the name, the system."""
+    path, text = read_standard_input(selected.path, options.stdin_name)
+    layers, arguments, set_values = selected.layers, selected.arguments, options.set_values
+    given = ' '.join([*map(str, layers), *arguments, *map('--set {}'.format, set_values)])
+    if arguments or set_values:
+        words = arguments or None
+        yield (
+            given,
+            None,
+            load_system(path, words, layers=layers, set_values=set_values, text=text),
+        )
+        return
+    systems = load_combinations(path, layers=layers, matrix=options.matrix, text=text)
+    yield from ((given, name, system) for name, system in systems)
+
+
+def _list_unchecked(
+    catalogue: InterfaceCatalogue, imports: ImportCheck | None, absent: AbsentPackages
+) -> tuple[str, ...]:
     """Return one line with what could not be checked without ROS 2, if anything."""
     unchecked = []
     if not catalogue.available:
         unchecked.append('interface types and the fields of messages')
+    if absent.note:
+        unchecked.append(absent.note)
     if imports and imports.missing_ros:
         unchecked.append(f'what imports ROS itself ({", ".join(sorted(imports.missing_ros))})')
     return (f'not checked without ROS 2: {"; ".join(unchecked)}',) if unchecked else ()
@@ -132,8 +180,11 @@ def _show(report: Report, options: CheckOptions) -> None:
         return
     for line in report.not_checked:
         click.echo(line, err=True)
-    if report.findings:
-        click.echo(summarize(report.findings), err=True)
+    summary = [summarize(report.findings)] if report.findings else []
+    if report.combinations:
+        summary.append(f'{count(report.combinations, "combination")} checked')
+    if summary:
+        click.echo(', '.join(summary), err=True)
 
 
 def _compare(report: Report, options: CheckOptions) -> int:

@@ -14,6 +14,7 @@ from composer.cli.argument_types import (
     check_log_levels,
     check_rule,
     check_rules,
+    refuse_options,
     refuse_together,
     split_words,
     takes_system,
@@ -105,8 +106,15 @@ def up_command(
     return up(paths, arguments, context.obj, log_levels, set_values, ends_process=True)
 
 
-@cli.command('check')
-@click.argument('files', nargs=-1, required=True, metavar='FILE...')
+@cli.command('check', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
+@click.option(
+    '--matrix',
+    metavar='FILE',
+    type=click.Path(path_type=Path, dir_okay=False),
+    help='Check the system in each combination of arguments, layers and settings that this file '
+    "names, instead of those under 'check:'.",
+)
 @click.option(
     '--format',
     'format_name',
@@ -150,14 +158,21 @@ def up_command(
     help='Skip named files that are not systems, such as other YAML.',
 )
 @click.option(
+    '--strict-packages',
+    is_flag=True,
+    help='Without ROS 2: report packages that are not installed as errors, too.',
+)
+@click.option(
     '--stdin-filename',
     metavar='PATH',
     default='<stdin>',
     help='The path to report for standard input, as editors need it.',
 )
 def check_command(  # noqa: PLR0913 - one for each option
-    files: tuple[str, ...],
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
     *,
+    matrix: Path | None,
     format_name: str,
     output: Path | None,
     strict: bool,
@@ -166,27 +181,34 @@ def check_command(  # noqa: PLR0913 - one for each option
     imports: bool,
     quiet: bool,
     skip_other_files: bool,
+    strict_packages: bool,
     stdin_filename: str,
 ) -> int:
-    """Check FILES for errors, without running anything.
+    """Check FILE for errors, without running anything.
 
-    Works without ROS 2. A FILE can be a folder (to check all systems in it), a quoted pattern, or
-    - for standard input.
+    Works without ROS 2. Takes LAYER and NAME:=VALUE as `composer up` does. Without arguments and
+    --set, there can be several systems: a FILE can be a folder (to check all systems in it), a
+    quoted pattern, or - for standard input. Of several files, one without 'version:' is a layer
+    of the one before it.
     """
     from composer.cli.check import CheckOptions, check
 
     options = CheckOptions(
         format=format_name,
         output=output,
+        set_values=set_values,
+        matrix=matrix,
         is_strict=strict,
         ignored=ignored,
         expected=expected,
         is_quiet=quiet,
         imports=imports,
         skip_other_files=skip_other_files,
+        strict_packages=strict_packages,
         stdin_name=stdin_filename,
     )
-    return check(files, options)
+    refuse_options(words)
+    return check(words, options)
 
 
 @cli.command('explain')
@@ -200,11 +222,13 @@ def explain_command(rule: str | None) -> int:
 
 @cli.command('schema')
 @click.option('--path', 'path_only', is_flag=True, help='Print the path of the schema file.')
-def schema_command(*, path_only: bool) -> int:
+@click.option('--matrix', is_flag=True, help='Print the schema of the files of check --matrix.')
+def schema_command(*, path_only: bool, matrix: bool) -> int:
     """Print the JSON Schema of system files, for editors."""
     from composer.cli.schema import print_schema
 
-    return print_schema(path_only=path_only)
+    refuse_together({'--path': path_only, '--matrix': matrix})
+    return print_schema(path_only=path_only, matrix=matrix)
 
 
 @cli.command('show', context_settings=NUMBERS_ARE_VALUES)

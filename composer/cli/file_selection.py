@@ -1,4 +1,4 @@
-"""Find the files to check: those named on the command line, by a pattern, or in a folder."""
+"""Find the systems to check: those named on the command line, by a pattern, or in a folder."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ import difflib
 import glob
 import os
 import re
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic
 from composer.entity_kinds import WORK_KEYS
-from composer.input_limits import UnreadableFileError, read_file
+from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, read_file
+from composer.language.pipeline import load_system
+from composer.schema.structure import known_keys
+from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from composer.language.loaded_system import LoadedSystem
+
+_STANDARD_INPUT = '-'
 _SUFFIXES = ('.yaml', '.yml')
 _SCHEMA = 'composer.schema.json'
 # Not searched: these hold other people's files. Hidden folders belong to tools.
@@ -34,39 +41,116 @@ _ENTITIES = re.compile(rf'^\s+({"|".join(sorted(WORK_KEYS))})\s*:', re.MULTILINE
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
-    """The files to check.
+class SelectedSystem:
+    """A system to check, as `composer up` would be given it.
 
     Attributes:
-        paths: Each once, in the order of the command line; `-` is standard input.
+        path: Its file; `-` is standard input.
+        layers: Files that change it, each over those before it.
+        arguments: Values of its arguments, as on the command line.
+    """
+
+    path: Path
+    layers: tuple[Path, ...] = ()
+    arguments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The systems to check.
+
+    Attributes:
+        systems: Each once, in the order of the command line.
         findings: An error for each pattern or folder without a file to check.
     """
 
-    paths: tuple[Path, ...]
-    findings: tuple[Diagnostic, ...]
+    systems: tuple[SelectedSystem, ...]
+    findings: tuple[Diagnostic, ...] = ()
 
 
 def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Selection:
-    """Return the files that the words of a command line stand for.
+    """Return the systems that the words of a command line stand for.
 
-    Files that are named, or matched by a pattern, are always selected. Folders are searched
+    Files that are named, or matched by a pattern, are always selected. A file that is named after
+    another one, and has keys of a system but no `version`, is a layer of it. Folders are searched
     recursively for `.yaml` and `.yml` files that look like systems.
 
     Args:
         words: Files, folders, patterns, and `-` for standard input.
-        skip_other_files: Also skip named files that do not look like systems.
+        skip_other_files: Also skip named files that do not look like systems. No file is a layer:
+            a tool that names all files of a project says nothing by their order.
     """
-    paths: dict[str, Path] = {}
+    systems: list[SelectedSystem] = []
     findings = []
+    may_have_layer = False
     for word in words:
+        if may_have_layer and not skip_other_files and _is_layer(word):
+            systems[-1] = replace(systems[-1], layers=(*systems[-1].layers, Path(word)))
+            continue
         nothing = None
         for path, is_named in _expand(word):
             if path is None:
                 nothing = _explain_nothing(word)
             elif not (is_named and skip_other_files) or looks_like_system(path):
-                paths.setdefault(os.path.abspath(path) if word != '-' else '-', path)  # noqa: PTH100
+                systems.append(SelectedSystem(path))
         findings += [nothing] if nothing else []
-    return Selection(tuple(paths.values()), tuple(findings))
+        may_have_layer = bool(systems) and str(systems[-1].path) == str(Path(word))
+    once: dict[tuple[str, ...], SelectedSystem] = {}
+    for system in systems:
+        once.setdefault(tuple(map(_identity, (system.path, *system.layers))), system)
+    return Selection(tuple(once.values()), tuple(findings))
+
+
+def list_systems(folder: Path) -> list[Path]:
+    """Return the files in a folder, or in one below it, that look like systems."""
+    return [path for path in _walk(folder) if looks_like_system(path)]
+
+
+def has_arguments(words: Sequence[str]) -> bool:
+    """Return whether some of the words are values of arguments, as `composer up` takes them.
+
+    These are `NAME:=VALUE`, and after a file what is no file, folder or pattern.
+    """
+    first, *others = words
+    is_one_file = first == _STANDARD_INPUT or os.path.isfile(first)  # noqa: PTH113 - pathlib's raises
+    return any(':=' in word or (is_one_file and _is_value(word)) for word in others)
+
+
+def load_given(
+    paths: Sequence[Path], words: Sequence[str] | None = None, set_values: Sequence[str] = ()
+) -> LoadedSystem:
+    """Return the system that a command line gives: a file, its layers and arguments.
+
+    Raises:
+        UsageError: The words or the values to set do not fit the file.
+    """
+    path, text = read_standard_input(paths[0])
+    return load_system(path, words, layers=paths[1:], set_values=set_values, text=text)
+
+
+def read_standard_input(path: Path, name: str = '<stdin>') -> tuple[Path, bytes | None]:
+    """Return a path, and no text; for `-` a name, and the text of standard input."""
+    if str(path) != _STANDARD_INPUT:
+        return path, None
+    return Path(name), sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+
+
+def _is_value(word: str) -> bool:
+    is_file = word == _STANDARD_INPUT or word.endswith(_SUFFIXES) or os.path.lexists(word)
+    return not (is_file or os.sep in word or glob.has_magic(word))
+
+
+def _is_layer(word: str) -> bool:
+    if not word.endswith(_SUFFIXES) or not os.path.isfile(word):  # noqa: PTH113
+        return False
+    data = read_document(Path(word)).data
+    if data is None or _find_near('version', {str(key): 0 for key in data}):
+        return False
+    return not known_keys('').isdisjoint(data)
+
+
+def _identity(path: Path) -> str:
+    return os.path.abspath(path) if str(path) != _STANDARD_INPUT else _STANDARD_INPUT  # noqa: PTH100
 
 
 def looks_like_system(path: Path) -> bool:
@@ -104,7 +188,7 @@ def _find_near(wanted: str, keys: Mapping[str, int]) -> str | None:
 
 def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
     """Yield each file and whether it was named; `None` instead of a file if nothing was found."""
-    if word == '-' or os.path.lexists(word) or (word and not glob.has_magic(word)):
+    if word == _STANDARD_INPUT or os.path.lexists(word) or (word and not glob.has_magic(word)):
         matches = [word]
     else:
         matches = _match(word)
@@ -112,10 +196,10 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
             yield None, False
     for match in matches:
         path = Path(match)
-        if word == '-' or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
-            yield path, word != '-'
+        if word == _STANDARD_INPUT or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
+            yield path, word != _STANDARD_INPUT
             continue
-        found = [inside for inside in _walk(path) if looks_like_system(inside)]
+        found = list_systems(path)
         yield from ((inside, False) for inside in found)
         if not found:
             yield None, False

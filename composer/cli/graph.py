@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
+from composer.cli.file_selection import load_given
 from composer.cli.output import show_findings, write_file
 from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system
 from composer.reports.text import summarize
 
 if TYPE_CHECKING:
@@ -43,9 +44,9 @@ def graph(
         ComposerError: The drawing cannot be written.
     """
     format_name = format_name or _format_of(output)
-    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    system = load_given(paths, words, set_values)
     context = create_context(system, InterfaceCatalogue())
-    findings = check_in_context(system, context)
+    findings = AbsentPackages().leave_out(check_in_context(system, context))
     if context is None:
         show_findings(findings)
         return ExitCode.FAILED

@@ -53,13 +53,21 @@ class ImportCheck:
     def __call__(self, context: CheckContext, found: list[Diagnostic]) -> Iterator[Diagnostic]:
         """Yield findings about the functions, except where their source already has findings."""
         with _own_modules(context):
+            was_told = any(each.rule == 'missing-module' for each in found)
             for binding in _bindings(context.spec):
                 if context.was_dropped(binding.behaviour.path):
                     continue
                 if not _has_finding(context, binding, found):
-                    yield from self._check(context, binding)
+                    yield from self._check(context, binding, was_told=was_told)
 
-    def _check(self, context: CheckContext, binding: Binding) -> Iterator[Diagnostic]:
+    def _check(
+        self, context: CheckContext, binding: Binding, *, was_told: bool
+    ) -> Iterator[Diagnostic]:
+        """Check a behaviour.
+
+        Args:
+            was_told: Whether there are findings about modules that are missing.
+        """
         try:
             # What a module prints must not end up in the report.
             with redirect_stdout(sys.stderr):
@@ -67,7 +75,7 @@ class ImportCheck:
         except behaviours.BehaviourImportError as error:
             if _lacks_ros(error):
                 self.missing_ros.add(binding.behaviour.module)
-            else:
+            elif not (was_told and isinstance(error.__cause__, ImportError)):
                 yield _explain(context, binding, error)
             return
         yield from _check_function(context, binding, function)

@@ -11,6 +11,7 @@ import click
 
 from composer.checks.checker import create_context
 from composer.checks.parameter_files import check_parameter_files
+from composer.cli.file_selection import load_given
 from composer.cli.output import show_findings
 from composer.cli.show_comments import append_comments, find_kept_comments
 from composer.confidential import origin_of
@@ -19,7 +20,6 @@ from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.paths import resolve_path
-from composer.language.pipeline import load_system
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 # Keys that have no meaning any more once a system is resolved.
-_RESOLVED_KEYS = ('args', 'max_nodes')
+_RESOLVED_KEYS = ('args', 'check', 'max_nodes')
 _SIM_TIME = 'use_sim_time'
 
 
@@ -51,7 +51,7 @@ def show(
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    system = load_given(paths, words, set_values)
     show_findings(system.diagnostics)
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
@@ -71,7 +71,7 @@ def show_arguments(paths: Sequence[Path], set_values: Sequence[str]) -> int:
     Raises:
         UsageError: `--set` does not fit the file.
     """
-    system = load_system(paths[0], layers=paths[1:], set_values=set_values)
+    system = load_given(paths, set_values=set_values)
     show_findings(system.diagnostics)
     click.echo(describe_arguments(system.arguments))
     return ExitCode.FAILED if has_errors(system.diagnostics) else ExitCode.DONE
@@ -83,7 +83,7 @@ def show_parameters(paths: Sequence[Path], words: Sequence[str], set_values: Seq
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    system = load_given(paths, words, set_values)
     findings = _check_parameters(system)
     show_findings(findings)
     if has_errors(findings) or system.spec is None:

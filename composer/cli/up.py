@@ -10,6 +10,7 @@ import click
 
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import leave_out_silenced
+from composer.cli.file_selection import load_given
 from composer.cli.import_check import import_behaviours
 from composer.cli.output import show_findings
 from composer.diagnostics import has_errors
@@ -17,7 +18,6 @@ from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
-from composer.language.pipeline import load_system
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def up(
         StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    system = load_system(paths[0], words, layers=paths[1:], set_values=set_values)
+    system = load_given(paths, words, set_values)
     context = create_context(system, InterfaceCatalogue())
     if _report(check_in_context(system, context)) or context is None:
         return ExitCode.FAILED
@@ -114,7 +114,7 @@ def _run(
 
 def describe_file_arguments(paths: Sequence[Path]) -> str:
     """Return the arguments that a file declares, as `--help` shows them."""
-    system = load_system(paths[0], layers=paths[1:])
+    system = load_given(paths)
     if system.spec is None:
         return 'the file cannot be read'
     return describe_arguments(system.arguments)

@@ -150,13 +150,13 @@ def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str 
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
-        if value is not None and (problem := _find_value_problem(value, argument.type)):
+        if value is not None and (problem := _find_default_problem(value, argument.type)):
             yield keys, problem
     if default is not None and choices and default not in choices:
         yield ('default',), f'the default {default!r} is not one of the choices'
 
 
-def _find_value_problem(value: Any, type_name: str) -> str | None:
+def _find_default_problem(value: Any, type_name: str) -> str | None:
     if isinstance(value, list | dict):
         return None  # the schema says so
     if isinstance(value, str) and '{{' in value:
@@ -221,12 +221,17 @@ def _assign_words(
 
 def _parse_value(argument: ArgumentSpec, text: str, problems: list[str]) -> Any:
     value: Any = text if argument.type == 'string' else _parse_text(text, argument.type)
-    problem = find_type_problem(value, argument.type)
-    if problem:
-        problems.append(f"'{argument.name}': {problem}")
-    elif argument.choices and value not in argument.choices:
-        problems.append(f"'{argument.name}': {text!r} is not one of {_listed(argument.choices)}")
+    problem = find_value_problem(argument, value)
+    problems += [problem] if problem else []
     return value
+
+
+def find_value_problem(argument: ArgumentSpec, value: Any) -> str | None:
+    """Return what is wrong with a value for an argument, if anything."""
+    problem = find_type_problem(value, argument.type)
+    if not problem and argument.choices and value not in argument.choices:
+        problem = f'{value!r} is not one of {_listed(argument.choices)}'
+    return problem and f"'{argument.name}': {problem}"
 
 
 def _parse_text(text: str, type_name: str) -> Any:

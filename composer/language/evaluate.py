@@ -46,7 +46,7 @@ def evaluate_expressions(system: LoadedSystem) -> None:
     # jinja2 takes a tenth of a check's time to import, and most files have no expressions.
     from composer.expressions.foreach import expand_document
 
-    declarations = {key: data[key] for key in ('args',) if key in data}
+    declarations = {key: data[key] for key in ('args', 'check') if key in data}
     rest = {key: value for key, value in data.items() if key not in declarations}
     given, before = system.given, len(system.diagnostics)
     origins = {name: _origin(name, system) for name in given.values}

@@ -6,6 +6,7 @@ where it is a value. What a layer means to change and is not there is a finding.
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from composer.spelling import suggest
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -28,16 +29,17 @@ _FREE = ('message', 'state', 'with')
 def merge_documents(documents: Sequence[Document]) -> Document:
     """Return the documents as one; each value keeps its position."""
     merged, *layers = documents
-    for layer in layers:
-        merged = _merge(merged, layer)
+    for index, layer in enumerate(layers):
+        merged = _merge(merged, layer, layers[index:])
     return merged
 
 
-def _merge(below: Document, above: Document) -> Document:
+def _merge(below: Document, above: Document, users: Sequence[Document]) -> Document:
+    """Merge a layer into what is below it; `users` are those that may use what it declares."""
     diagnostics = [*below.diagnostics, *above.diagnostics]
     if below.data is None or above.data is None:
         return Document(None, below.positions, diagnostics)
-    merging = _Merging(below.positions.copy(), above.positions)
+    merging = _Merging(below.positions.copy(), above.positions, users)
     data = merging.merge(below.data, above.data, ())
     return Document(data, merging.positions, [*diagnostics, *merging.findings])
 
@@ -48,12 +50,16 @@ class _Merging:
     Args:
         positions: Those of what is below; they become those of the result.
         new_positions: Those of the layer.
+        users: The layers that may use what this one declares.
     """
 
-    def __init__(self, positions: SourceMap, new_positions: SourceMap) -> None:
+    def __init__(
+        self, positions: SourceMap, new_positions: SourceMap, users: Sequence[Document]
+    ) -> None:
         self.positions = positions
         self.findings: list[Diagnostic] = []
         self._new_positions = new_positions
+        self._users = users
 
     def merge(
         self, below: dict[str, Any], above: dict[str, Any], path: DataPath
@@ -71,6 +77,8 @@ class _Merging:
             else:
                 if key not in merged and _only_changes_a_node(at, value):
                     self._report(at, f"there is no node '{key}' to change", below)
+                if key not in merged and path == ('args',) and not self._is_used(key):
+                    self._report(at, f"there is no argument '{key}' to change", below)
                 merged[key] = self._without_removals(value, at)
                 self.positions.replace(at, self._new_positions)
         return merged
@@ -88,6 +96,15 @@ class _Merging:
                 self._report(at, f"null removes '{key}', which does not exist", {})
         return kept
 
+    def _is_used(self, argument: str) -> bool:
+        """Return whether an expression of a layer may use an argument that it declares."""
+        word = re.compile(rf'\b{re.escape(argument)}\b')
+        return any(
+            '{{' in text and word.search(text)
+            for each in self._users
+            for text in _texts(each.data)
+        )
+
     def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
         self.findings.append(
             diagnostic_at(
@@ -97,6 +114,18 @@ class _Merging:
                 help=suggest(str(path[-1]), there, 'there are'),
             )
         )
+
+
+def _texts(data: Any) -> Iterator[str]:
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _texts(key)
+            yield from _texts(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _texts(value)
+    elif isinstance(data, str):
+        yield data
 
 
 def _only_changes_a_node(path: DataPath, value: Any) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from composer import confidential
 from composer.diagnostics import Diagnostic
-from composer.language.arguments import values_from_words
+from composer.language.arguments import sample_values, values_from_words
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
 from composer.language.includes.includer import Includer
@@ -27,7 +27,7 @@ from composer.schema.structure import check_structure
 from composer.yaml_text.reader import parse_document, read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from composer.language.arguments import GiveValues
     from composer.yaml_text.document import Document
@@ -39,6 +39,7 @@ def load_system(
     *,
     layers: Sequence[Path] = (),
     set_values: Sequence[str] = (),
+    text: bytes | None = None,
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -47,14 +48,56 @@ def load_system(
             with samples where there are none.
         layers: Files that change the first one, each over those before it.
         set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
+        text: The text of the file, if it is not to be read.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
     """
     confidential.begin([path, *layers])
-    documents = [read_document(each) for each in (path, *layers)]
-    return _load(apply_set_values(merge_documents(documents), set_values), path, words)
+    document = apply_set_values(_read([path, *layers], text), set_values)
+    return _load(document, path, partial(values_from_words, words=words))
+
+
+def load_combinations(
+    path: Path,
+    *,
+    layers: Sequence[Path] = (),
+    matrix: Path | None = None,
+    text: bytes | None = None,
+) -> Iterator[tuple[str | None, LoadedSystem]]:
+    """Yield the name of each combination that a file names, and the system read with it.
+
+    Without combinations, that is the system as `load_system` reads it, without a name.
+
+    Args:
+        layers: Files that change the first one, each over those before it.
+        matrix: A file whose combinations take the place of those under `check:`.
+        text: The text of the file, if it is not to be read.
+    """
+    own = [path, *layers, *([matrix] if matrix else [])]
+    confidential.begin(own)
+    document = _read([path, *layers], text)
+    if matrix is None and 'check' not in (document.data or {}):
+        yield None, _load(document, path, sample_values)
+        return
+    # Most files name no combinations.
+    from composer.language import combinations
+
+    if matrix is not None:
+        document = combinations.with_matrix(document, read_document(matrix))
+    named = combinations.read_combinations(document)
+    if not named:
+        yield None, _load(document, path, sample_values)
+    for each in named:
+        confidential.begin(own)
+        findings: list[Diagnostic] = []
+        give_values = partial(
+            combinations.values_from_combination, combination=each, findings=findings
+        )
+        system = _load(combinations.apply_combination(document, each), path, give_values)
+        system.diagnostics += findings
+        yield each.name, system
 
 
 def load_system_text(
@@ -63,10 +106,17 @@ def load_system_text(
     """Read the text of a file that would be at `path`."""
     confidential.begin([path])
     content = text.encode() if isinstance(text, str) else text
-    return _load(parse_document(content, str(path)), path, words)
+    document = parse_document(content, str(path))
+    return _load(document, path, partial(values_from_words, words=words))
 
 
-def _load(document: Document, path: Path, words: Sequence[str] | None) -> LoadedSystem:
+def _read(paths: Sequence[Path], text: bytes | None) -> Document:
+    path, *layers = paths
+    main = read_document(path) if text is None else parse_document(text, str(path))
+    return merge_documents([main, *map(read_document, layers)])
+
+
+def _load(document: Document, path: Path, give_values: GiveValues) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
     if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
         # What is wrong with it would tell what is in it.
@@ -74,7 +124,7 @@ def _load(document: Document, path: Path, words: Sequence[str] | None) -> Loaded
         system.data = None
         system.diagnostics = [Diagnostic('unreadable-file', message, str(path))]
     if system.data is not None:
-        _load_file(system, partial(values_from_words, words=words))
+        _load_file(system, give_values)
         Includer(system, _load_file).include_all()
     if system.data is not None:
         parse_specs(system)

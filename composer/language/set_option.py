@@ -1,12 +1,13 @@
-"""`--set path=value`: changes of single values on the command line, the last layer of a file."""
+"""Settings: changes of single values, as the last layer of a file; `--set` gives them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import SourceFile, Span
 from composer.entity_kinds import KIND_OF_SECTION
-from composer.errors import UsageError
+from composer.errors import ComposerError, UsageError
 from composer.language.layers import is_null_a_value
 from composer.spelling import suggest
 from composer.yaml_text.document import Document
@@ -21,6 +22,27 @@ if TYPE_CHECKING:
 _NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
 
 
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A change of a single value.
+
+    Attributes:
+        path: As in `nodes.talker.timers.tick.period`.
+        value: The new value; `None` removes the old one.
+        path_span: Where the path is written.
+        value_span: Where the value is written.
+    """
+
+    path: str
+    value: Any
+    path_span: Span
+    value_span: Span
+
+
+class SettingError(ComposerError):
+    """A setting has no value, or its path leads nowhere."""
+
+
 def apply_set_values(document: Document, set_values: Sequence[str]) -> Document:
     """Return a document with single values changed; they are typed as in a file.
 
@@ -30,68 +52,89 @@ def apply_set_values(document: Document, set_values: Sequence[str]) -> Document:
     Raises:
         UsageError: An entry has no value, or its path leads nowhere.
     """
-    if document.data is None or not set_values:
+    if document.data is None:
         return document
-    data, positions = document.data, document.positions.copy()
     for set_value in set_values:
-        path_text, separator, value_text = set_value.partition('=')
-        if not separator or not path_text:
-            message = f"'{set_value}' sets nothing"
-            raise UsageError(message, help='write path=value, as in executor.threads=4')
-        path = _resolve(path_text, data)
-        value = _parse(set_value, value_text)
-        if value is None and not is_null_a_value(path):
-            _find(path, data, set_value)
-        data = _changed(data, path, value, keeps_null=is_null_a_value(path))
-        source = SourceFile(f'--set {set_value}', (set_value,), home='.')
-        positions.remove(path)
-        start = len(path_text) + 2
-        written = Span(source, 1, 1, len(path_text))
-        for depth in range(1, len(path)):
-            # What is around the value may be new as well.
-            if positions.keys.setdefault(path[:depth], written) is written:
-                positions.values[path[:depth]] = written
-        positions.keys[path] = written
-        positions.values[path] = Span(source, 1, start, len(value_text))
+        try:
+            document = apply_setting(document, _parse_setting(set_value))
+        except SettingError as error:
+            message = f'--set {set_value}: {error}'
+            raise UsageError(message, help=error.help) from error
+    return document
+
+
+def apply_setting(document: Document, setting: Setting) -> Document:
+    """Return a document, which has data, with one value changed.
+
+    Raises:
+        SettingError: The path leads nowhere.
+    """
+    data, positions = document.data or {}, document.positions.copy()
+    path = _resolve(setting.path, data)
+    if setting.value is None and not is_null_a_value(path):
+        _find(path, data)
+    data = _changed(data, path, setting.value, keeps_null=is_null_a_value(path))
+    positions.remove(path)
+    written = setting.path_span
+    for depth in range(1, len(path)):
+        # What is around the value may be new as well.
+        if positions.keys.setdefault(path[:depth], written) is written:
+            positions.values[path[:depth]] = written
+    positions.keys[path] = written
+    positions.values[path] = setting.value_span
     return Document(data, positions, document.diagnostics)
+
+
+def _parse_setting(set_value: str) -> Setting:
+    path, separator, text = set_value.partition('=')
+    if not separator or not path:
+        message = f"'{set_value}' sets nothing"
+        raise SettingError(message, help='write path=value, as in executor.threads=4')
+    source = SourceFile(f'--set {set_value}', (set_value,), home='.')
+    path_span = Span(source, 1, 1, len(path))
+    value_span = Span(source, 1, len(path) + 2, len(text))
+    return Setting(path, _parse_value(set_value, text), path_span, value_span)
 
 
 def _resolve(text: str, data: dict[str, Any]) -> DataPath:
     """Return the path that a text names; keys may contain dots.
 
     Raises:
-        UsageError: Some part of it does not exist, and is no key of the language either.
+        SettingError: Some part of it does not exist, and is no key of the language either.
     """
     path: list[str] = []
     inside: Any = data
+    if not text:
+        message = 'the path is empty'
+        raise SettingError(message, help='write it as in executor.threads')
     rest = text
     while rest:
         if not isinstance(inside, dict):
-            message = f"--set {text}: '{'.'.join(path)}' is a value, and has no '{rest}' in it"
-            raise UsageError(message, help=_help_for(path, inside))
+            message = f"'{'.'.join(path)}' is a value, and has no '{rest}' in it"
+            raise SettingError(message, help=_help_for(path, inside))
         key = _longest_key(rest, inside) or rest.partition('.')[0]
         if key not in inside and inside and _has_given_names(path):
-            message = f"--set {text}: there is no '{key}' in {'.'.join(path)}"
-            raise UsageError(message, help=suggest(key, inside, 'there are'))
+            message = f"there is no '{key}' in {'.'.join(path)}"
+            raise SettingError(message, help=suggest(key, inside, 'there are'))
         path.append(key)
         rest = rest[len(key) + 1 :]
         inside = inside.get(key, {}) if rest else None
     return tuple(path)
 
 
-def _find(path: DataPath, data: dict[str, Any], set_value: str) -> None:
+def _find(path: DataPath, data: dict[str, Any]) -> None:
     """Make sure that there is something at a path.
 
     Raises:
-        UsageError: There is nothing to remove.
+        SettingError: There is nothing to remove.
     """
     inside: Any = data
     for depth, key in enumerate(path):
         if not isinstance(inside, dict) or key not in inside:
             where = f' in {".".join(map(str, path[:depth]))}' if depth else ''
-            message = f"--set {set_value}: there is no '{key}'{where} to remove"
+            message = f"there is no '{key}'{where} to remove"
             help_text = suggest(str(key), inside, 'there are') if inside else None
-            raise UsageError(message, help=help_text)
+            raise SettingError(message, help=help_text)
         inside = inside[key]
 
 
@@ -117,12 +160,11 @@ def _longest_key(text: str, mapping: dict[str, Any]) -> str | None:
     return max(fitting, key=len, default=None)
 
 
-def _parse(set_value: str, text: str) -> Any:
+def _parse_value(set_value: str, text: str) -> Any:
     document = parse_document(f'value: {text}'.encode(), f'--set {set_value}')
     if document.data is None or document.diagnostics:
         reason = document.diagnostics[0].message if document.diagnostics else 'it is empty'
-        message = f'--set {set_value}: {reason}'
-        raise UsageError(message)
+        raise SettingError(reason)
     return document.data.get('value')
 
 

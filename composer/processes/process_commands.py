@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.ament import list_executables
 from composer.errors import StartError
 from composer.language.paths import PathError, resolve_path
+from composer.programs import find_program_problem
 from composer.ros_parameters.file_writer import render_parameters_for_all
 from composer.spelling import suggest
 
@@ -117,19 +116,12 @@ def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str
         names = [path.name for path in executables]
         message = f"process '{spec.name}': '{spec.package}' has no executable '{spec.executable}'"
         raise StartError(message, help=suggest(spec.executable, names, 'it has'))
-    program = spec.command[0]
-    if '/' not in program:
-        if shutil.which(program, path=environment.get('PATH', os.defpath)) is None:
-            message = f"process '{spec.name}': there is no program '{program}' on the PATH"
-            raise StartError(message)
-        return list(spec.command)
-    path = Path(find_folder(spec) or '.', program)
-    if not path.is_file():
-        message = f"process '{spec.name}': there is no program '{path}'"
-        raise StartError(message)
-    if not os.access(path, os.X_OK):
-        message = f"process '{spec.name}': '{path}' is not executable"
-        raise StartError(message, help=f'chmod +x {path}')
+    folder = Path(find_folder(spec) or '.')
+    problem = find_program_problem(spec.command[0], folder, environment)
+    if problem:
+        message, advice = problem
+        message = f"process '{spec.name}': {message}"
+        raise StartError(message, help=advice)
     return list(spec.command)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import os
 import signal
-import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -20,6 +19,7 @@ from composer.processes.external_process import ExternalProcess, ProcessRun, des
 from composer.processes.process_commands import CommandWriter, find_folder
 from composer.processes.process_output import ProcessOutputs
 from composer.processes.reaper_client import ReaperConnection
+from composer.programs import base_environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -133,7 +133,7 @@ class ProcessSupervisor:
     def _launch(self, process: ExternalProcess) -> ProcessRun | None:
         """Ask the reaper to start a process; return its run, `None` after the stop."""
         spec = process.spec
-        environment = {**_base_environment(), **spec.env}
+        environment = {**base_environment(os.environ), **spec.env}
         with self._lock:
             if self._stopping.is_set():
                 return None
@@ -279,14 +279,3 @@ def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
     else:
         reason = f"'{program}': {os.strerror(answer['errno'])}"
     return StartError(f"process '{spec.name}' cannot be started: {reason}")
-
-
-def _base_environment() -> dict[str, str]:
-    """Return Composer's environment, with its virtual environment activated."""
-    # Python would buffer its output.
-    environment = {'PYTHONUNBUFFERED': '1', **os.environ}
-    if sys.prefix != sys.base_prefix:
-        # The `python3` of the virtual environment can import rclpy as Composer can.
-        folder = Path(sys.executable).parent
-        environment['PATH'] = f'{folder}{os.pathsep}{environment.get("PATH", os.defpath)}'
-    return environment

@@ -51,3 +51,8 @@ def nested_names(nodes: Iterable[ast.AST]) -> set[str]:
         elif isinstance(node, ast.ExceptHandler) and node.name:
             names.add(node.name)
     return names
+
+
+def is_name(node: ast.AST, name: str) -> bool:
+    """Return whether an expression is this name, and nothing else."""
+    return isinstance(node, ast.Name) and node.id == name

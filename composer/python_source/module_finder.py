@@ -26,10 +26,27 @@ class MissingModule:
     Attributes:
         missing: The part of its name that was not found, as in `behaviours.greter`.
         nearest: The module that may have been meant.
+        hidden_by: The `__init__.py` without which Python would find it in another folder.
     """
 
     missing: str
     nearest: str | None
+    hidden_by: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Location:
+    """Where a module is.
+
+    Attributes:
+        file: Its file; `None` for a package without one.
+        missing: The part of its name that was not found; empty if all was.
+        folders: Those in which this part was searched, or that the module's own modules are in.
+    """
+
+    file: Path | None
+    missing: str
+    folders: list[Path]
 
 
 def project_search_path(configs: Iterable[Path]) -> list[Path]:
@@ -47,10 +64,12 @@ class ModuleFinder:
     """Finds and reads modules, each once."""
 
     def __init__(self, search_path: list[Path]) -> None:
+        self._project = search_path
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
         self._listed: dict[Path, list[str]] = {}
+        self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
 
     def find(self, name: str) -> ModuleSource | MissingModule:
@@ -59,22 +78,64 @@ class ModuleFinder:
             self._found[name] = self._find(name)
         return self._found[name]
 
+    def has(self, name: str) -> bool:
+        """Return whether there is a module or package of this name."""
+        return not self._locate(name).missing
+
+    def find_missing(self, name: str) -> MissingModule | None:
+        """Return the part of a module's name that is missing, `None` if it is there."""
+        located = self._locate(name)
+        if not located.missing:
+            return None
+        *done, part = located.missing.split('.')
+        nearest = self._nearest(part, done, located.folders)
+        return MissingModule(located.missing, nearest, self._find_hiding(done, part))
+
+    def is_package(self, name: str) -> bool:
+        """Return whether a name is that of a package with an `__init__.py`."""
+        located = self._locate(name)
+        return located.file is not None and located.file.name == '__init__.py'
+
+    def is_of_project(self, name: str) -> bool:
+        """Return whether a module, or the package that it is in, is not an installed one."""
+        top = name.partition('.')[0]
+        if top not in self._is_own:
+            file, folders = _locate(top, self._roots)
+            found = [*([file] if file else []), *folders[:1]]
+            self._is_own[top] = any(each.parent in self._project for each in found)
+        return self._is_own[top]
+
     def _find(self, name: str) -> ModuleSource | MissingModule:
-        folders = self._roots
-        done: list[str] = []
-        for part in name.split('.'):
-            file, inner = _locate(part, folders)
-            if file is None and not inner and not done:
-                file, inner = _locate_with_importers(part)
-            if file is None and not inner:
-                return MissingModule('.'.join([*done, part]), self._nearest(part, done, folders))
-            done.append(part)
-            folders = inner
+        missing = self.find_missing(name)
+        if missing is not None:
+            return missing
+        file = self._locate(name).file
         if file is None:
             return ModuleSource(None)
         module = read_module(file, self._tokens_left)
         self._tokens_left -= module.tokens
         return module
+
+    def _locate(self, name: str) -> _Location:
+        folders = self._roots
+        done: list[str] = []
+        file: Path | None = None
+        for part in name.split('.'):
+            file, inner = _locate(part, folders)
+            if file is None and not inner and not done:
+                file, inner = _locate_with_importers(part)
+            done.append(part)
+            if file is None and not inner:
+                return _Location(None, '.'.join(done), folders)
+            folders = inner
+        return _Location(file, '', folders)
+
+    def _find_hiding(self, done: list[str], part: str) -> Path | None:
+        """Return the `__init__.py` without which a module would be found in another folder."""
+        file = self._locate('.'.join(done)).file if done else None
+        inside = Path(*done, f'{part}.py')
+        is_elsewhere = file is not None and any(_is_there(root / inside) for root in self._roots)
+        return file if is_elsewhere else None
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
         for folder in folders:

@@ -19,7 +19,7 @@ from composer.input_limits import (
     UnreadableFileError,
     read_file,
 )
-from composer.python_source.local_names import stored_names
+from composer.python_source.local_names import nested_names, stored_names
 from composer.python_source.syntax import (
     BLOCKS,
     FunctionNode,
@@ -54,9 +54,11 @@ class FunctionSource:
 
     Attributes:
         definition: Its syntax tree; `None` if only running the module could tell what it is.
+        class_definition: The syntax tree of a class, which can be called as well.
     """
 
     definition: FunctionNode | None = None
+    class_definition: ast.ClassDef | None = None
 
     @cached_property
     def kind(self) -> FunctionKind | None:
@@ -73,6 +75,8 @@ class FunctionSource:
     @cached_property
     def signature(self) -> inspect.Signature | None:
         """Its parameters, if they are known."""
+        if self.class_definition:
+            return _read_constructor(self.class_definition)
         return read_signature(self.definition.args) if self.definition else None
 
 
@@ -86,6 +90,7 @@ class ModuleSource:
         imports: The full dotted names of what is imported, by name; without names that have
             several meanings, and with imports for type checkers.
         texts: The constants that are texts, with these.
+        required: The imports that are run on no condition.
         lines: The lines of its source.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: The syntax error in its source, or `None`.
@@ -100,6 +105,7 @@ class ModuleSource:
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, str] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
+    required: tuple[ast.Import | ast.ImportFrom, ...] = ()
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
@@ -156,6 +162,7 @@ def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSourc
         reader.constants,
         {name: full_name for name, full_name in reader.imports.items() if full_name},
         {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
+        tuple(reader.required),
         lines,
         reader.is_open,
         tokens=tokens,
@@ -200,6 +207,7 @@ class _ModuleReader:
         self.functions: dict[str, FunctionSource] = {}
         self.constants: dict[str, str] = {}
         self.imports: dict[str, str] = {}
+        self.required: list[ast.Import | ast.ImportFrom] = []
         self.is_open = False
         self._is_conditional = False
 
@@ -218,7 +226,7 @@ class _ModuleReader:
             known = None if statement.decorator_list else statement
             self._bind(statement.name, FunctionSource(known))
         elif isinstance(statement, ast.ClassDef):
-            self._bind(statement.name, FunctionSource())
+            self._bind(statement.name, FunctionSource(class_definition=statement))
         elif isinstance(statement, ast.Import | ast.ImportFrom):
             self._read_import(statement)
         elif isinstance(statement, ast.Assign | ast.AnnAssign):
@@ -249,6 +257,8 @@ class _ModuleReader:
                 ]
 
     def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
+        if not self._is_conditional:
+            self.required.append(statement)
         for alias in statement.names:
             if alias.name == '*':
                 self.is_open = True
@@ -324,6 +334,24 @@ def _own_nodes(function: FunctionNode) -> list[ast.AST]:
         if not isinstance(node, _OWN_SCOPE):
             pending.extend(ast.iter_child_nodes(node))
     return found
+
+
+def _read_constructor(definition: ast.ClassDef) -> inspect.Signature | None:
+    """Return the parameters of a plain class, `None` if others may decide about them."""
+    if definition.bases or definition.keywords or definition.decorator_list:
+        return None
+    names = {name.id for name in stored_names(ast.walk(definition))}
+    inner = nested_names(ast.walk(definition))
+    if '__new__' in names | inner or '__init__' in names:
+        return None
+    functions = (each for each in definition.body if isinstance(each, ast.FunctionDef))
+    makers = [each for each in functions if each.name == '__init__']
+    if not makers:
+        return None if '__init__' in inner else inspect.Signature()
+    if len(makers) > 1 or makers[0].decorator_list:
+        return None
+    signature = read_signature(makers[0].args)
+    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 def read_signature(arguments: ast.arguments) -> inspect.Signature:

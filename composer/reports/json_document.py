@@ -23,7 +23,13 @@ def render_report(report: Report) -> str:
         'version': _VERSION,
         'composer': find_version(),
         'files': [
-            {'file': relative_path(file.name), 'nodes': file.nodes} for file in report.files
+            {
+                'file': relative_path(file.name),
+                'nodes': file.nodes,
+                'given': file.given,
+                'combination': file.combination,
+            }
+            for file in report.files
         ],
         'findings': [_describe(finding) for finding in report.findings],
         'errors': errors,

@@ -42,8 +42,9 @@ def _has_failed(file: CheckedFile, report: Report) -> bool:
 
 
 def _render_case(file: CheckedFile, report: Report) -> Iterator[str]:
-    name = _attribute(relative_path(file.name))
-    case = f'    <testcase classname="composer" name={name} file={name} time="0"'
+    path = relative_path(file.name)
+    name = _attribute(f'{path} ({file.variant})' if file.variant else path)
+    case = f'    <testcase classname="composer" name={name} file={_attribute(path)} time="0"'
     if not file.findings:
         yield f'{case}/>'
         return

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.diagnostics import has_errors
 from composer.rules import Severity
+from composer.terminal import escape
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
     from composer.diagnostics import Diagnostic
+
+FindingKey: TypeAlias = 'tuple[str, int, int, str, str]'
+
+# Of more combinations, the first are named.
+_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +30,20 @@ class CheckedFile:
         name: The path as the user wrote it.
         findings: From top to bottom, with those in the files that it includes.
         nodes: How many nodes it declares; `None` if it could not be read.
+        given: The layers, arguments and settings that the command line gives it.
+        combination: The name of the combination that it was checked with, if any.
     """
 
     name: str
     findings: tuple[Diagnostic, ...] = ()
     nodes: int | None = None
+    given: str = ''
+    combination: str | None = None
+
+    @property
+    def variant(self) -> str:
+        """What distinguishes it from the file as it stands; empty if nothing does."""
+        return ', '.join(filter(None, (self.given, self.combination)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +66,42 @@ class Report:
         return list({finding.sort_key: finding for finding in reversed(found)}.values())[::-1]
 
     @property
+    def combinations(self) -> int:
+        """How many combinations were checked."""
+        return sum(file.combination is not None for file in self.files)
+
+    @property
     def has_failed(self) -> bool:
         """Whether there are errors, or warnings that count as errors."""
         return has_errors(self.findings) or (self.is_strict and bool(self.findings))
+
+
+def name_combinations(files: Sequence[CheckedFile]) -> list[CheckedFile]:
+    """Return a file in its combinations; findings of some of them say in which they hold.
+
+    That a comment silences nothing is a finding only if it holds in all.
+    """
+    named: dict[FindingKey, list[str]] = {}
+    for file in files:
+        for finding in file.findings:
+            named.setdefault(finding.sort_key, []).append(file.combination or '')
+    return [
+        replace(file, findings=tuple(_with_combinations(file.findings, named, len(files))))
+        for file in files
+    ]
+
+
+def _with_combinations(
+    findings: Iterable[Diagnostic], named: Mapping[FindingKey, list[str]], total: int
+) -> Iterator[Diagnostic]:
+    for finding in findings:
+        names = named[finding.sort_key]
+        if len(names) >= total:
+            yield finding
+        elif finding.rule != 'unused-ignore':
+            listed = ', '.join(names[:_MOST_NAMED])
+            more = f' and {len(names) - _MOST_NAMED} more' if len(names) > _MOST_NAMED else ''
+            yield replace(finding, message=f'{finding.message} (in {escape(listed)}{more})')
 
 
 def count_severities(findings: list[Diagnostic]) -> tuple[int, int]:

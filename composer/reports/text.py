@@ -36,7 +36,8 @@ def render_files(report: Report, *, colour: bool, is_quiet: bool = False) -> str
         shown |= {finding.sort_key for finding in fresh}
         blocks += [f'{render_finding(finding, colour=colour)}\n\n' for finding in fresh]
         if not file.findings and file.nodes is not None and not is_quiet:
-            blocks.append(f'{escape(file.name)}: ok, {count(file.nodes, "node")}\n')
+            name = f'{file.name} ({file.variant})' if file.variant else file.name
+            blocks.append(f'{escape(name)}: ok, {count(file.nodes, "node")}\n')
     return ''.join(blocks)
 
 

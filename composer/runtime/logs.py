@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.logging import LoggingSeverity, get_logger, get_logger_level, set_logger_level
 
+from composer.spelling import suggest
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from composer.language.specs import NodeSpec
+    from composer.language.specs import NodeSpec, SystemSpec
 
 # The logger of Composer itself, for messages about the whole system.
 system_logger = EscapingLogger(get_logger('composer'))
@@ -25,6 +26,8 @@ system_logger = EscapingLogger(get_logger('composer'))
 _rosout_is_enabled = ctypes.PyDLL(_rclpy.__file__).rcl_logging_rosout_enabled
 _rosout_is_enabled.restype = ctypes.c_bool
 _PROBE = 'composer_probe'
+# The loggers of ROS itself begin with one of these.
+_LIBRARIES = ('rcl', 'rcutils', 'rmw', 'rosidl')
 
 
 @contextmanager
@@ -41,7 +44,7 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
     for request in requests:
         name, separator, level = request.rpartition(':=')
         if separator:
-            by_name[name.strip('/').replace('/', '.')] = level
+            by_name[_as_logger_name(name)] = level
         else:
             by_name |= dict.fromkeys([*names, system_logger.name], level)
     before = {name: get_logger_level(name) for name in by_name}
@@ -52,6 +55,29 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
     finally:
         for name, severity in before.items():
             set_logger_level(name, severity)
+
+
+def warn_of_unknown_loggers(spec: SystemSpec, requests: Sequence[str]) -> None:
+    """Log a warning for each level that the command line sets for a node that there is not.
+
+    Parts of names are those of all nodes in a namespace, and longer names those of the loggers of
+    a node's behaviours. ROS itself has loggers, too; those of external processes are not known.
+    """
+    if any(process.is_ros for process in spec.processes.values()):
+        return
+    known = [_logger_name(node) for node in spec.nodes.values()]
+    for request in requests:
+        name, separator, _ = request.rpartition(':=')
+        logger = _as_logger_name(name)
+        if not separator or logger == system_logger.name or logger.startswith(_LIBRARIES):
+            continue
+        if not any(_is_within(logger, each) or _is_within(each, logger) for each in known):
+            advice = suggest(logger, known, 'there are', 'it has none')
+            system_logger.warning(f"--log-level: this system has no node '{name}' ({advice})")
+
+
+def _is_within(logger: str, outer: str) -> bool:
+    return f'{logger}.'.startswith(f'{outer}.')
 
 
 def has_rosout_publisher(logger_name: str) -> bool:
@@ -78,6 +104,10 @@ def is_output_unread() -> bool:
             if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
                 poll.register(descriptor, 0)
     return any(event & select.POLLERR for _, event in poll.poll(0))
+
+
+def _as_logger_name(name: str) -> str:
+    return name.strip('/').replace('/', '.')
 
 
 def _logger_name(node: NodeSpec) -> str:

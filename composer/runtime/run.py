@@ -11,7 +11,7 @@ from composer import signals
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forced_exit, forked_children
-from composer.runtime.logs import log_levels, system_logger
+from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
 
@@ -66,6 +66,7 @@ def run_system(
         _guarded(spec, ends_process=ends_process) as guardian,
         _handling_signals(stop, guardian.descriptor),
     ):
+        warn_of_unknown_loggers(spec, log_level_requests)
         system = System(
             spec,
             positions,

@@ -94,11 +94,12 @@ def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _is_known(place: tuple[str, str]) -> bool:
     definition, key = place
-    return key in _known_keys(definition) or (not definition and key.startswith('x-'))
+    return key in known_keys(definition) or (not definition and key.startswith('x-'))
 
 
 @cache
-def _known_keys(definition: str) -> frozenset[str]:
+def known_keys(definition: str) -> frozenset[str]:
+    """Return the keys that a definition of the schema knows; those of a file for `''`."""
     document = _schema().document
     schema = document['$defs'][definition] if definition else document
     branches = (schema, *schema.get('oneOf', ()))

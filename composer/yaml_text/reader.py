@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, SourceFile
@@ -9,6 +10,7 @@ from composer.input_limits import (
     MAX_FILE_BYTES,
     MAX_LINES,
     UnreadableFileError,
+    explain_missing,
     format_size,
     read_file,
 )
@@ -41,7 +43,8 @@ def read_content(path: Path, name: str) -> bytes | Diagnostic:
     try:
         return read_file(path)
     except UnreadableFileError as error:
-        return _unreadable(name, str(error))
+        is_missing = not os.path.lexists(path)
+        return _unreadable(name, str(error), help=explain_missing(path) if is_missing else None)
 
 
 def decode_content(content: bytes, name: str) -> str | Diagnostic:

@@ -1,5 +1,7 @@
 """Processes: what must be installed, and what need not be."""
 
+from pathlib import Path
+
 import pytest
 
 from composer.checks.checker import check_system
@@ -9,7 +11,7 @@ from composer.language.pipeline import load_system
 SYSTEM = """
 version: 1
 args: {simulation: %s}
-nodes: {}
+nodes: {other: {}}
 processes:
   driver: {when: "{{ not simulation }}", package: vendor_camera, executable: driver}
 """
@@ -31,3 +33,58 @@ def test_a_process_that_is_left_out_may_be_of_another_machine(
     findings = check_system(load_system(path), InterfaceCatalogue())
 
     assert [finding.message for finding in findings] == messages
+
+
+@pytest.mark.parametrize(
+    ('process', 'messages'),
+    [
+        ('{command: [sh, -c, exit]}', []),
+        ('{command: [s_h]}', ["there is no program 's_h' on the PATH"]),
+        ('{command: [own]}', ["there is no program 'own' on the PATH"]),
+        ('{command: [own], env: {PATH: bin}}', []),
+        ('{command: [sh], env: {PATH: bin}}', ["there is no program 'sh' on the PATH"]),
+        ('{command: [ros2, bag, record, -a], env: {PATH: bin}}', []),
+        ('{command: [./not_here_but_where_it_is_started]}', []),
+        ('{command: [./own], cwd: bin}', []),
+        ('{command: [./wno], cwd: bin}', ["there is no program 'bin/wno'"]),
+        ('{command: [./text], cwd: bin}', ["'bin/text' is not executable"]),
+        ('{command: [/bin/none]}', ["there is no program '/bin/none'"]),
+        ('{command: [sh], cwd: nib}', ["there is no folder 'nib' to run in"]),
+        (
+            '{command: [own], cwd: package://none/bin, env: {PATH: bin}}',
+            ["no package 'none' is installed"],
+        ),
+        ('{command: [own], cwd: nib, when: false}', []),
+        ('{command: ["{{ program }}"]}', []),
+    ],
+)
+def test_programs_and_folders_are_those_of_this_machine(tmp_path, monkeypatch, process, messages):
+    monkeypatch.chdir(tmp_path)
+    Path('bin').mkdir()
+    Path('bin/own').touch(mode=0o755)
+    Path('bin/text').touch(mode=0o644)
+    path = Path('system.yaml')
+    path.write_text(
+        'version: 1\nargs: {program: {type: string}}\nnodes: {}\n'
+        f'processes:\n  driver: {process}\n'
+    )
+
+    findings = check_system(load_system(path), InterfaceCatalogue(prefixes=[]))
+
+    assert [finding.message for finding in findings] == messages
+
+
+def test_the_environment_of_a_process_has_values_that_ros_knows(tmp_path):
+    path = tmp_path / 'system.yaml'
+    path.write_text("""\
+version: 1
+nodes: {}
+processes:
+  one: {command: [sh], env: {ROS_DOMAIN_ID: '300', RMW_IMPLEMENTATION: rmw_of_a_container}}
+  two: {command: [sh], env: {ROS_AUTOMATIC_DISCOVERY_RANGE: LOCAL, LOCAL: x}}
+""")
+    findings = check_system(load_system(path), InterfaceCatalogue())
+    assert [(each.rule, each.span.line, each.span.text) for each in findings] == [
+        ('bad-environment', 4, "'300'"),
+        ('bad-environment', 5, 'LOCAL'),
+    ]

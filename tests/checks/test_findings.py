@@ -10,7 +10,7 @@ import pytest
 
 import composer
 from composer.checks.checker import check_files, check_system
-from composer.cli.file_selection import select_files
+from composer.cli.file_selection import list_systems
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.reports.text import render_finding
@@ -18,7 +18,7 @@ from composer.rules import Severity
 
 DATA = Path(__file__).parents[1] / 'data'
 INVALID = DATA / 'invalid'
-SHIPPED = select_files([str(Path(composer.__file__).parents[1] / 'configs')]).paths
+SHIPPED = list_systems(Path(composer.__file__).parents[1] / 'configs')
 
 CASES = sorted(path.stem for path in INVALID.glob('*.yaml'))
 # These look into interface packages, which come with ROS.

@@ -27,7 +27,7 @@ def tree(tmp_path, monkeypatch):
 
 def select(*words, **options):
     selection = select_files(words, **options)
-    return [str(path) for path in selection.paths], [
+    return [str(system.path) for system in selection.systems], [
         (finding.rule, finding.file, finding.message) for finding in selection.findings
     ]
 

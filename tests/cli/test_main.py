@@ -265,10 +265,10 @@ def test_up_says_what_is_wrong_and_starts_nothing(run):
     'raised', [RuntimeError('boom'), AssertionError(), RecursionError('deep')]
 )
 def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
-    def fail(path, *more):
+    def fail(path, **more):
         raise raised
 
-    monkeypatch.setattr('composer.cli.check.load_system', fail)
+    monkeypatch.setattr('composer.cli.check.load_combinations', fail)
     code, out, err = run('check', GREETER)
     assert (code, out) == (3, '')
     lines = err.splitlines()
@@ -289,10 +289,10 @@ def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
     ],
 )
 def test_what_is_raised_on_purpose_becomes_an_exit_code(run, monkeypatch, raised, code, said):
-    def fail(path, *more):
+    def fail(path, **more):
         raise raised
 
-    monkeypatch.setattr('composer.cli.check.load_system', fail)
+    monkeypatch.setattr('composer.cli.check.load_combinations', fail)
     assert run('check', GREETER) == (code, '', said)
 
 

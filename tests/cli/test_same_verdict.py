@@ -9,7 +9,8 @@ REFUSED = [
     pytest.param(path.parent.name, marks=pytest.mark.ros if rule.needs else ())
     for path in sorted(RULES_FOLDER.glob('*/bad.yaml'))
     for rule in [load_rule(path.parent.name)]
-    if rule.severity is Severity.ERROR
+    # `up` starts no combination.
+    if rule.severity is Severity.ERROR and rule.name != 'bad-combination'
 ]
 
 

@@ -1,5 +1,7 @@
 """`composer up FILE [NAME:=VALUE]...`: the words of a file's own, and its help."""
 
+import io
+import sys
 from pathlib import Path
 
 import pytest
@@ -108,3 +110,42 @@ def test_a_system_runs_with_the_values_that_are_given(compose):
     child = compose(SYSTEM, CODE, '-7', 'name:=speaker')
     assert child.wait() == 0, child.output
     assert child.matching('[speaker]') == ["[INFO] [speaker]: '-7' <-7> speaker"]
+
+
+# What FILE is
+
+
+@pytest.mark.parametrize('command', ['up', 'show', 'graph'])
+def test_of_a_folder_its_systems_are_listed(run, tmp_path, command):
+    (tmp_path / 'a').mkdir()
+    (tmp_path / 'a/rover.yaml').write_text('version: 1\nnodes: {}\n')
+    code, out, err = run(command, str(tmp_path))
+    assert (code, out) == (2, '')
+    assert err == (
+        f"error: '{tmp_path}' is a folder, and a system is one file\n"
+        f'  help: it holds\n    {tmp_path}/a/rover.yaml\n'
+    )
+
+
+@pytest.mark.parametrize(
+    ('path', 'advice'),
+    [
+        ('configs/robt.yaml', "did you mean 'configs/robot.yaml'?"),
+        ('configs/robot', "did you mean 'configs/robot.yaml'?"),
+        ('confgs/robot.yaml', "did you mean 'configs/robot.yaml'?"),
+        ('robot.yaml', "did you mean 'configs/robot.yaml'?"),
+        ('configs/parts/zzz.yaml', "in 'configs/parts' there are: arm.yaml"),
+        ('configs/robot.yaml/x', "the folders in 'configs' are: parts, programs, sites"),
+    ],
+)
+def test_for_a_missing_file_the_nearest_is_named(run, path, advice):
+    code, _, err = run('up', path)
+    assert code == 1
+    assert err.startswith(f'{path}: error[unreadable-file]: cannot read the file: No')
+    assert err.splitlines()[1] == f'  help: {advice}'
+
+
+def test_a_dash_is_standard_input(run, monkeypatch):
+    text = io.BytesIO(b'version: 1\nargs: {a: 1}\nnodes: {"rover_{{ a }}": {}}\n')
+    monkeypatch.setattr(sys, 'stdin', io.TextIOWrapper(text))
+    assert run('show', '-', 'a:=7')[:2] == (0, 'version: 1\nnodes:\n  rover_7: {}\n')

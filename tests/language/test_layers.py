@@ -101,6 +101,29 @@ def test_a_layer_that_changes_nothing_is_a_finding(write, site, place, message, 
     assert (str(finding.span), finding.message, finding.help) == (place, message, help_text)
 
 
+@pytest.mark.parametrize(
+    ('layers', 'found'),
+    [
+        (['args: {rat: 2}'], ["there is no argument 'rat' to change"]),
+        (['args: {rate: 2}'], []),
+        (['args: {level: debug}\nnodes: {talker: {log_level: "{{ level }}"}}'], []),
+        (['args: {level: debug}', 'nodes: {talker: {log_level: "{{ level }}"}}'], []),
+        (
+            ['args: {level: debug}', 'args: {level: info}'],
+            ["there is no argument 'level' to change"],
+        ),
+        (
+            ['args: {level: debug}\nnodes: {talker: {log_level: debug}}'],
+            ["there is no argument 'level' to change"],
+        ),
+    ],
+)
+def test_a_layer_declares_only_arguments_that_it_uses(write, layers, found):
+    texts = {f'layer_{index}': text for index, text in enumerate(layers)}
+    system = load(write(base='version: 1\nargs: {rate: 1}\nnodes: {talker: {}}', **texts))
+    assert [each.message for each in system.diagnostics] == found
+
+
 def test_a_layer_may_remove_and_change_what_one_before_it_adds(write):
     layers = {
         'one': 'nodes: {new: {publishers: {c: std_msgs/msg/String}}, old: {}}',

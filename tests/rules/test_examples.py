@@ -8,12 +8,14 @@ import pytest
 from composer.checks.checker import check_system
 from composer.cli.import_check import ImportCheck
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system
+from composer.language.pipeline import load_combinations
 from composer.reports.text import render_finding
 from composer.rules import RULES_FOLDER, list_rule_names, load_rule
 from composer.rules.examples import load_example
 
 WITHOUT = {
+    # Only a ROS that remaps no actions shows it.
+    'ignored-remap',
     # It is about the command line, not about a file.
     'nothing-to-check',
     # It takes several files at once.
@@ -41,7 +43,8 @@ def find(rule, kind, monkeypatch):
     # Modules of the examples are no part of this process.
     monkeypatch.setattr(sys, 'dont_write_bytecode', True)
     further = ImportCheck() if rule in ONLY_WHEN_IMPORTED else None
-    return check_system(load_system(Path(f'{kind}.yaml')), InterfaceCatalogue(), further)
+    ((_, system),) = load_combinations(Path(f'{kind}.yaml'))
+    return check_system(system, InterfaceCatalogue(), further)
 
 
 @pytest.mark.parametrize('rule', EXAMPLES)

@@ -163,6 +163,17 @@ UNUSABLE = {
     ('RMW_IMPLEMENTATION', 'rmw_none'): "no middleware 'rmw_none' is installed",
     ('RCUTILS_COLORIZED_OUTPUT', 'yes'): "RCUTILS_COLORIZED_OUTPUT is 0 or 1, not 'yes'",
     ('ROS_SECURITY_ENABLE', 'yes'): "ROS_SECURITY_ENABLE is true or false, not 'yes'",
+    ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCAL'): (
+        'ROS_AUTOMATIC_DISCOVERY_RANGE is SUBNET or LOCALHOST or OFF or SYSTEM_DEFAULT, '
+        "not 'LOCAL'"
+    ),
+    ('RMW_FASTRTPS_PUBLICATION_MODE', 'SYNC'): (
+        "RMW_FASTRTPS_PUBLICATION_MODE is SYNCHRONOUS or ASYNCHRONOUS or AUTO, not 'SYNC'"
+    ),
+    ('FASTDDS_BUILTIN_TRANSPORTS', 'UDP?max_msg_size=1MB'): (
+        'FASTDDS_BUILTIN_TRANSPORTS is DEFAULT or DEFAULTv6 or LARGE_DATA or LARGE_DATAv6 or '
+        "NONE or P2P or SHM or UDPv4 or UDPv6, not 'UDP?max_msg_size=1MB'"
+    ),
     ('ROS_STATIC_PEERS', 'x' * 256): 'a peer in ROS_STATIC_PEERS has at most 255 characters',
 }
 

@@ -20,7 +20,10 @@ def check_channel_types(context: CheckContext) -> Iterator[Diagnostic]:
     for channel in context.topology.channels.values():
         # Of a type that there is not, that has been said.
         ends = [end for end in channel.ends if context.has_real_type(end.entity)]
-        if len({end.entity.type for end in ends}) > 1:
+        of_ros = context.topology.type_of_ros(channel)
+        if of_ros is not None:
+            yield from _compare_with_ros(context, channel, ends, of_ros)
+        elif len({end.entity.type for end in ends}) > 1:
             yield from _explain_types(context, channel, ends)
 
 
@@ -42,10 +45,31 @@ def _explain_types(
             )
 
 
+def _compare_with_ros(
+    context: CheckContext, channel: Channel, ends: list[Endpoint], of_ros: str
+) -> Iterator[Diagnostic]:
+    for end in ends:
+        if end.entity.type != of_ros:
+            yield context.at_value(
+                context.inner(end.path, 'type'),
+                'conflicting-types',
+                f"{channel.kind} '{channel.name}' is one of ROS itself, with the type {of_ros}: "
+                f'here it has {end.entity.type}',
+                help=f'use that type, or name {with_article(channel.kind)} of its own',
+            )
+
+
 def check_servers(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that there is one server; which of several answers is undefined."""
     for channel in context.topology.channels.values():
         if channel.kind == 'topic':
+            continue
+        if channel.kind == 'service' and context.topology.is_served_by_ros(channel):
+            of_ros = context.topology.type_of_ros(channel)
+            for server in channel.providers:
+                # Of another type, that has been said.
+                if server.entity.type == of_ros:
+                    yield _explain_server_of_ros(context, server)
             continue
         for server in channel.providers[1:]:
             first = channel.providers[0]
@@ -57,3 +81,12 @@ def check_servers(context: CheckContext) -> Iterator[Diagnostic]:
                 help=f'serve it once, or give this one another name with {channel.kind}:',
                 related=[context.related(first.path, f'{first} serves it too')],
             )
+
+
+def _explain_server_of_ros(context: CheckContext, server: Endpoint) -> Diagnostic:
+    return context.at_key(
+        server.path,
+        'second-server',
+        f"ROS itself serves '{server.written}' here, and which of them answers is undefined",
+        help='give this one another name with service:',
+    )

@@ -1,13 +1,15 @@
-"""Check the QoS of publishers and subscriptions, clients and servers for matches."""
+"""Check that the QoS of all ends of a topic or service can match, and that deadlines are kept."""
 
 from __future__ import annotations
 
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from composer.language.bindings import node_bindings
 from composer.language.qos import (
     BEST_OF_PUBLISHERS,
     BEST_OF_SERVICES,
+    INFINITE,
     QosError,
     resolve_qos,
     settle_best_available,
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
-    from composer.language.specs import QosSpec
+    from composer.language.specs import NodeSpec, PublisherSpec, QosSpec, TimerSpec
     from composer.yaml_text.positions import DataPath
 
 Policies = tuple[tuple[str, Any], ...]
@@ -83,6 +85,80 @@ def _is_unknown(context: CheckContext, path: DataPath) -> bool:
     lines = {known.positions.value(path).line, known.positions.key(path).line}
     return any(dropped[: len(path)] == path for dropped in known.dropped) or any(
         span.line in lines for span in sampled
+    )
+
+
+def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that timers publish as often as the deadlines of their publishers ask for.
+
+    Where only timers publish, nothing can publish more often. What a publisher cannot keep, no
+    subscription can ask for: their deadlines are no shorter, or do not match.
+    """
+    for node in context.spec.nodes.values():
+        if any(path[:2] == node.path for path in context.system.dropped):
+            continue
+        published = _published_by_behaviours(context, node)
+        for publisher in node.publishers.values():
+            deadline_sec = _known_deadline_sec(context, publisher)
+            timers = _sources_of(context, node, publisher)
+            if deadline_sec is None or not timers or published is None:
+                continue
+            period_sec = 1 / sum(1 / timer.period_sec for timer in timers)
+            if publisher.name not in published and period_sec > deadline_sec:
+                yield _explain_deadline(context, publisher, timers, deadline_sec, period_sec)
+
+
+def _published_by_behaviours(context: CheckContext, node: NodeSpec) -> set[str] | None:
+    """Return what the behaviours of a node publish by themselves; `None` if anything."""
+    readings = [context.behaviours.read(node, binding) for binding in node_bindings(node)]
+    if any(each.reaches_ros or 'publisher' in each.open_kinds for each in readings):
+        return None
+    return {use.name for each in readings for use in each.uses if use.kind == 'publisher'}
+
+
+def _known_deadline_sec(context: CheckContext, publisher: PublisherSpec) -> float | None:
+    if any(_is_unknown(context, path) for path in _sources(context, publisher.qos)):
+        return None
+    try:
+        deadline = resolve_qos(publisher.qos, context.spec.qos).get('deadline', INFINITE)
+    except QosError:
+        return None
+    # 0 means no deadline, too.
+    return None if isinstance(deadline, str) else deadline or None
+
+
+def _sources_of(
+    context: CheckContext, node: NodeSpec, publisher: PublisherSpec
+) -> list[TimerSpec]:
+    """Return the timers that publish on a publisher; none if other things do, or may."""
+    triggers = [each for each in node.triggers if each.publish == publisher.name]
+    timers = [each for each in node.timers.values() if each.publish == publisher.name]
+    positions, sampled = context.system.positions, context.system.sampled
+    for timer in timers:
+        keys = ((*timer.path, 'period'), (*timer.path, 'rate'))
+        # Simulated time may pass faster than that of the middleware.
+        is_simulated = timer.clock == 'ros' and node.use_sim_time
+        if is_simulated or any(positions.values.get(key) in sampled for key in keys):
+            return []
+    return timers if len(timers) == len(triggers) else []
+
+
+def _explain_deadline(
+    context: CheckContext,
+    publisher: PublisherSpec,
+    timers: list[TimerSpec],
+    deadline_sec: float,
+    period_sec: float,
+) -> Diagnostic:
+    path = context.inner(context.inner(publisher.path, 'qos'), 'deadline')
+    who = f"timer '{timers[0].name}' publishes" if len(timers) == 1 else 'its timers publish'
+    return context.at_value(
+        path,
+        'missed-deadline',
+        f"publisher '{publisher.name}' promises a message every {deadline_sec:g} s, and {who} "
+        f'one every {period_sec:g} s',
+        help='make the deadline longer than the period',
+        related=[context.related(timer.path, 'this publishes on it') for timer in timers],
     )
 
 

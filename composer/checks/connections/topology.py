@@ -9,12 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.ament import remaps_actions
 from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
 from composer.language.specs import NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, ProcessSpec, QosSpec, SystemSpec
@@ -23,19 +24,45 @@ if TYPE_CHECKING:
 # An end that may exist: its channel, whether it provides, and its type, `None` for any.
 PossibleEnd: TypeAlias = tuple[ChannelKind, bool, str | None]
 
-_SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
-# By the keys of a node that switch them on (rclpy's `ParameterService` and the like).
+# The schemes of the rules for a name; actions, if at all, are remapped as topics are.
+_SCHEMES = {'topic': 'rostopic', 'service': 'rosservice', 'action': 'rostopic'}
+# What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
+TOPICS_OF_ROS = {
+    '/clock': 'rosgraph_msgs/msg/Clock',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/diagnostics_agg': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/diagnostics_toplevel_state': 'diagnostic_msgs/msg/DiagnosticStatus',
+    '/parameter_events': 'rcl_interfaces/msg/ParameterEvent',
+    '/rosout': 'rcl_interfaces/msg/Log',
+    '/tf': 'tf2_msgs/msg/TFMessage',
+    '/tf_static': 'tf2_msgs/msg/TFMessage',
+}
+# Between the name of an action and those of the topics and services that it consists of.
+OF_ACTIONS = '/_action/'
+_PARTS_OF_ACTIONS: dict[tuple[ChannelKind, str], str] = {
+    ('topic', 'status'): 'action_msgs/msg/GoalStatusArray',
+    ('topic', 'feedback'): '{}_FeedbackMessage',
+    ('service', 'send_goal'): '{}_SendGoal',
+    ('service', 'get_result'): '{}_GetResult',
+    ('service', 'cancel_goal'): 'action_msgs/srv/CancelGoal',
+}
+# By the keys of a node that switch them on (rclpy's `ParameterService` and the like), with types.
 _SERVICES_OF_ROS = {
-    'parameter_services': (
-        'describe_parameters',
-        'get_parameter_types',
-        'get_parameters',
-        'list_parameters',
-        'set_parameters',
-        'set_parameters_atomically',
-    ),
-    'type_description_service': ('get_type_description',),
-    'logger_services': ('get_logger_levels', 'set_logger_levels'),
+    'parameter_services': {
+        'describe_parameters': 'rcl_interfaces/srv/DescribeParameters',
+        'get_parameter_types': 'rcl_interfaces/srv/GetParameterTypes',
+        'get_parameters': 'rcl_interfaces/srv/GetParameters',
+        'list_parameters': 'rcl_interfaces/srv/ListParameters',
+        'set_parameters': 'rcl_interfaces/srv/SetParameters',
+        'set_parameters_atomically': 'rcl_interfaces/srv/SetParametersAtomically',
+    },
+    'type_description_service': {
+        'get_type_description': 'type_description_interfaces/srv/GetTypeDescription',
+    },
+    'logger_services': {
+        'get_logger_levels': 'rcl_interfaces/srv/GetLoggerLevels',
+        'set_logger_levels': 'rcl_interfaces/srv/SetLoggerLevels',
+    },
 }
 
 
@@ -92,20 +119,39 @@ class Topology:
     """All channels of a system.
 
     Attributes:
-        ros_services: The full names of the services that ROS itself gives to the nodes.
+        ros_services: The services that ROS itself gives to the nodes: their types by full names.
         possible: Ends that channels may have as well: their names depend on an argument that is
             not given yet, or they are missing or misnamed because of another error.
         left_out: The channels of nodes that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
-    ros_services: frozenset[str]
+    ros_services: Mapping[str, str]
     possible: frozenset[PossibleEnd]
     left_out: frozenset[tuple[ChannelKind, str]]
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
         return (channel for channel in self.channels.values() if channel.kind == kind)
+
+    def type_of_ros(self, channel: Channel) -> str | None:
+        """Return the type that ROS gives to a topic or service of its own, `None` to others."""
+        if channel.kind == 'topic' and channel.name in TOPICS_OF_ROS:
+            return TOPICS_OF_ROS[channel.name]
+        if channel.kind == 'service' and channel.name in self.ros_services:
+            return self.ros_services[channel.name]
+        owner, separator, part = channel.name.partition(OF_ACTIONS)
+        form = _PARTS_OF_ACTIONS.get((channel.kind, part)) if separator else None
+        action = self.channels.get(('action', owner))
+        if form is None or (action is None and '{' in form):
+            return None
+        return form.format(action.ends[0].entity.type if action else '')
+
+    def is_served_by_ros(self, channel: Channel) -> bool:
+        """Return whether ROS serves a service for a node or an action of the system."""
+        owner, separator, _ = channel.name.partition(OF_ACTIONS)
+        action = self.channels.get(('action', owner)) if separator else None
+        return channel.name in self.ros_services or bool(action and action.providers)
 
     def may_have_more(self, channel: Channel) -> bool:
         """Return whether the end that a channel lacks may be one of the possible ones."""
@@ -137,12 +183,12 @@ def build_topology(
         channel = channels.setdefault(key, Channel(*key))
         ends = channel.providers if kind.provides else channel.users
         ends.append(Endpoint(node, entity, kind))
-    services = (name for node in spec.nodes.values() for name in _services_of_ros(node))
+    services = dict(each for node in spec.nodes.values() for each in _services_of_ros(node))
     left_out = (
         (channel_kind, full_name(node, channel_kind, getattr(entity, channel_kind)))
         for node, _, channel_kind, entity in (_ends(system.unused) if system.unused else ())
     )
-    return Topology(channels, frozenset(services), frozenset(possible), frozenset(left_out))
+    return Topology(channels, services, frozenset(possible), frozenset(left_out))
 
 
 def _ends(spec: SystemSpec) -> Iterator[tuple[NodeSpec, EntityKind, ChannelKind, EndSpec]]:
@@ -175,15 +221,16 @@ def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str
     """Return the full name of a topic, service or action of a node or process."""
     namespace = node.namespace or '/'
     full = expand_name(name, node.name, namespace)
-    if not node.remap or kind not in _SCHEMES:
+    if not node.remap or (kind == 'action' and not remaps_actions()):
         return full
     return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
 
 
-def _services_of_ros(node: NodeSpec) -> Iterator[str]:
-    for key, names in _SERVICES_OF_ROS.items():
+def _services_of_ros(node: NodeSpec) -> Iterator[tuple[str, str]]:
+    for key, services in _SERVICES_OF_ROS.items():
         if getattr(node, key):
-            yield from (expand_name(f'~/{name}', node.name, node.namespace) for name in names)
+            for name, type_name in services.items():
+                yield expand_name(f'~/{name}', node.name, node.namespace), type_name
 
 
 class _UncertainNames:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from composer.ament import remaps_actions
 from composer.checks.connections.topology import full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.language.specs import REENTRANT
@@ -21,12 +22,21 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
+    from composer.language.specs import (
+        ActionClientSpec,
+        ActionSpec,
+        ConditionSpec,
+        NodeSpec,
+        ProcessSpec,
+    )
+    from composer.yaml_text.positions import DataPath
 
 _RULE = 'likely-misspelling'
 _SEPARATORS = re.compile(r'[/_]')
 # In shorter words another letter makes another word: `arm_l` and `arm_r`, `map` and `mop`.
 _SHORTEST = 4
+# Two letters in the wrong order are a slip in these, too: `/cmd_vle`.
+_SHORTEST_SWAPPED = 3
 _LONG = 8
 # More names than these are not compared one by one.
 _MOST_COMPARED = 2_000
@@ -42,8 +52,8 @@ def check_typos(context: CheckContext) -> Iterator[Diagnostic]:
 def find_typo(word: str, options: Iterable[str]) -> str | None:
     """Return the option that a word is most likely a misspelling of.
 
-    One part of it, between slashes and underscores, has a typo; a long one may have two. Other
-    numbers are no typos.
+    One part of it, between slashes and underscores, has a typo; a long one may have two, and a
+    short one only swapped letters. Other numbers are no typos.
     """
     parts = _SEPARATORS.split(word)
     for option in options:
@@ -55,9 +65,16 @@ def find_typo(word: str, options: Iterable[str]) -> str | None:
 
 
 def _is_typo(word: str, other: str) -> bool:
-    if min(len(word), len(other)) < _SHORTEST or _digits(word) != _digits(other):
+    shortest = min(len(word), len(other))
+    if _digits(word) != _digits(other):
         return False
+    if shortest < _SHORTEST:
+        return shortest >= _SHORTEST_SWAPPED and _is_swapped(word, other)
     return count_edits(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
+
+
+def _is_swapped(word: str, other: str) -> bool:
+    return sorted(word) == sorted(other) and count_edits(word, other) == 1
 
 
 def _digits(word: str) -> str:
@@ -90,16 +107,23 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _present(context: CheckContext) -> dict[str, set[str]]:
-    """Return the full names of all that can be waited for, by kind, left out or not."""
-    system = context.system
+    """Return the full names of all that the file names, by kind, left out or not.
+
+    What is elsewhere has its name from the ends that use it.
+    """
+    system, topology = context.system, context.topology
     specs = [context.spec, *([system.unused] if system.unused else [])]
     present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
-    for channel in context.topology.channels.values():
-        if channel.providers:
-            present[channel.kind].add(channel.name)
-    for kind, name in context.topology.left_out:
+    for kind, name in (*topology.channels, *topology.left_out):
         present[kind].add(name)
+    present['service'] |= topology.ros_services.keys()
     present['node'] = {node.full_name for spec in specs for node in spec.nodes.values()}
+    present['node'] |= {
+        expand_name(process.node_name, '', process.namespace or '/')
+        for spec in specs
+        for process in spec.processes.values()
+        if process.node_name
+    }
     return present
 
 
@@ -120,31 +144,55 @@ def _as_written(name: str, full: str, namespace: str) -> str:
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check remapping rules; a rule of an include applies to all that is in it."""
     matching: set[Span] = set()
-    typos: dict[Span, Diagnostic] = {}
+    found: dict[Span, Diagnostic] = {}
     for node in context.spec.nodes.values():
         if not node.remap:
             continue
-        names = _names_of(node)
+        names, actions = _names_of(node), _actions_of(node)
         for source, _ in node.remap:
             path = (*node.path, 'remap', source)
             span = context.system.positions.key(path)
             bare = source.rpartition('://')[2]
             name = expand_name(bare, node.name, node.namespace)
-            if name in names:
+            if name in names or (name in actions and remaps_actions() is not False):
                 matching.add(span)
+            elif name in actions:
+                found[span] = _explain_action(context, path, actions[name], name)
             elif near := find_typo(name, names):
-                typos[span] = context.at_key(
+                found[span] = context.at_key(
                     path,
                     _RULE,
                     f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
                     help=did_you_mean(_as_written(bare, near, node.namespace)),
                 )
-    yield from (finding for span, finding in typos.items() if span not in matching)
+    yield from (finding for span, finding in found.items() if span not in matching)
+
+
+def _explain_action(
+    context: CheckContext, path: DataPath, entity: ActionSpec | ActionClientSpec, name: str
+) -> Diagnostic:
+    return context.at_key(
+        path,
+        'ignored-remap',
+        f"this ROS remaps no actions, such as '{name}', and ignores the rule",
+        help=f"give '{entity.name}' its name with 'action:' instead",
+    )
 
 
 def _names_of(node: NodeSpec) -> set[str]:
-    names = [str(getattr(end, str(kind.channel))) for kind, end in node.ends()]
+    """Return the full names of the topics and services of a node."""
+    ends = ((kind, end) for kind, end in node.ends() if kind.channel != 'action')
+    names = (str(getattr(end, str(kind.channel))) for kind, end in ends)
     return {expand_name(name, node.name, node.namespace) for name in names}
+
+
+def _actions_of(node: NodeSpec) -> dict[str, ActionSpec | ActionClientSpec]:
+    """Return the actions of a node by their full names."""
+    ends: list[ActionSpec | ActionClientSpec] = [
+        *node.actions.values(),
+        *node.action_clients.values(),
+    ]
+    return {expand_name(end.action, node.name, node.namespace): end for end in ends}
 
 
 def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:

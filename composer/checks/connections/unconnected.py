@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.checks.connections.topology import is_misnamed
+from composer.checks.connections.topology import OF_ACTIONS, TOPICS_OF_ROS, is_misnamed
 from composer.spelling import did_you_mean, find_nearest
 
 if TYPE_CHECKING:
@@ -17,19 +17,6 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
 
-# What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
-_OF_ROS = {
-    '/clock',
-    '/diagnostics',
-    '/diagnostics_agg',
-    '/diagnostics_toplevel_state',
-    '/parameter_events',
-    '/rosout',
-    '/tf',
-    '/tf_static',
-}
-# Topics and services that actions consist of.
-_OF_ACTIONS = '/_action/'
 # Names are compared one by one; a file that wants more suggestions is checked without the rest.
 _MOST_COMPARED = 5_000
 
@@ -55,9 +42,9 @@ def _is_alone(context: CheckContext, channel: Channel) -> bool:
         return False
     if (channel.kind, channel.name) in topology.left_out:
         return False
-    if channel.name in _OF_ROS or channel.name in topology.ros_services:
+    if channel.name in TOPICS_OF_ROS or channel.name in topology.ros_services:
         return False
-    if _OF_ACTIONS in channel.name:
+    if OF_ACTIONS in channel.name:
         return False
     # A wrong name is a finding of its own.
     positions = context.system.positions

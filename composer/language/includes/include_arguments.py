@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
-from composer.language.arguments import ArgumentValues, sample_values
-from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_problem
+from composer.language.arguments import ArgumentValues, find_value_problem, sample_values
+from composer.ros_parameters.parameter_types import convert_parameter_value
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def values_from_include(
         path = (*section, name)
         if name in given:
             value = convert_parameter_value(given[name], argument.type)
-            problem = _find_problem(argument, value)
+            problem = find_value_problem(argument, value)
             if not problem:
                 values[name] = value
                 origins[name] = _origin(place.system, path)
@@ -76,13 +76,3 @@ def _missing_argument(argument: ArgumentSpec, place: IncludeEntry) -> Diagnostic
 
 def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
     return suggest(value, argument.choices)
-
-
-def _find_problem(argument: ArgumentSpec, value: Any) -> str | None:
-    problem = find_type_problem(value, argument.type)
-    if problem:
-        return f"'{argument.name}': {problem}"
-    if argument.choices and value not in argument.choices:
-        choices = ', '.join(map(str, argument.choices))
-        return f"'{argument.name}': {value!r} is not one of {choices}"
-    return None

@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.paths import PathError, is_in_package, list_neighbours, resolve_path
+from composer.language.paths import (
+    PackagePathError,
+    PathError,
+    is_in_package,
+    list_neighbours,
+    resolve_path,
+)
 from composer.names import find_namespace_problem
 from composer.spelling import suggest
 
@@ -72,13 +78,15 @@ class IncludeEntry:
     def find_file(self) -> Path | None:
         """Return the file that is named; report it if there is none, and return `None`."""
         try:
-            return _locate_file(self.file, self.span)
+            return locate_file(self.file, self.span)
         except PathError as error:
             # What is left out may be in a package of other machines, and have a name that is whole
             # only when it is used.
             may_be_absent = is_in_package(self.file) or self.is_open((*self.at, 'file'))
             if not (self.is_left_out and may_be_absent):
-                self.report('missing-include', str(error), error.help)
+                is_package = isinstance(error, PackagePathError)
+                rule = 'uninstalled-package' if is_package else 'missing-include'
+                self.report(rule, str(error), error.help)
         return None
 
     def find_namespace(self) -> str:
@@ -114,6 +122,8 @@ class IncludeEntry:
 
 def shown_path(path: Path) -> str:
     """Return a path as findings show it: relative to the working folder if it is inside it."""
+    if '\0' in str(path):
+        return str(path)  # no path at all, and `realpath` raises
     real = os.path.realpath(path)
     try:
         return str(Path(real).relative_to(Path.cwd()))
@@ -123,8 +133,8 @@ def shown_path(path: Path) -> str:
         return plain if os.path.realpath(plain) == real else real
 
 
-def _locate_file(text: str, place: Span) -> Path:
-    """Return the file that an include names.
+def locate_file(text: str, place: Span) -> Path:
+    """Return the file that a text names which is written at `place`.
 
     Raises:
         PathError: There is no such file.

@@ -2,6 +2,8 @@
 
 import pytest
 
+from composer.checks.connections import topology
+
 TALK = 'timers: {a: {period: 1, publish: out, message: hello}}'
 HEAR = 'behaviour: parts:hear'
 CODE = """
@@ -56,16 +58,20 @@ def test_names_that_do_not_meet_are_warned_of_at_both_ends(check, talker, listen
     assert found == ['no-subscription', 'no-publisher']
 
 
-def test_actions_are_not_remapped_by_name(check):
+@pytest.mark.parametrize('remaps', [False, True])
+def test_actions_are_remapped_by_newer_versions_of_ros(check, monkeypatch, remaps):
+    monkeypatch.setattr(topology, 'remaps_actions', lambda: remaps)
     nodes = """
   server:
     remap: {do: done}
     actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
   client:
-    action_clients: {do: test_msgs/action/Fibonacci}
+    action_clients: {do: {type: test_msgs/action/Fibonacci, action: DO}}
     on_start: parts:send
 """
-    assert check(nodes, CODE, installed=False) == []
+    right, wrong = ('done', 'do') if remaps else ('do', 'done')
+    assert check(nodes.replace('DO', right), CODE, rule='no-server', installed=False) == []
+    assert len(check(nodes.replace('DO', wrong), CODE, rule='no-server', installed=False)) == 1
 
 
 def test_what_ros_itself_serves_needs_no_other_end(check):
@@ -89,6 +95,158 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
     assert check(elsewhere, CODE, installed=False) == [(11, 'no-server')]
     without = nodes.replace('b: {}', 'b: {parameter_services: false}')
     assert check(without, CODE, installed=False) == [(11, 'no-server')]
+
+
+@pytest.mark.parametrize(
+    ('section', 'name', 'right'),
+    [
+        ('publishers', '/rosout', 'rcl_interfaces/msg/Log'),
+        ('publishers', '/clock', 'rosgraph_msgs/msg/Clock'),
+        ('publishers', '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'),
+        ('subscriptions', '/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray'),
+        ('subscriptions', '/tf', 'tf2_msgs/msg/TFMessage'),
+        ('subscriptions', '/elsewhere/_action/status', 'action_msgs/msg/GoalStatusArray'),
+        ('subscriptions', '/act/_action/feedback', None),
+        ('subscriptions', '/elsewhere/_action/feedback', 'any/msg/Type'),
+        ('service_clients', '/act/_action/cancel_goal', 'action_msgs/srv/CancelGoal'),
+        ('service_clients', '/act/_action/send_goal', None),
+        ('service_clients', '~/get_parameters', 'rcl_interfaces/srv/GetParameters'),
+        ('service_clients', '/b/list_parameters', 'rcl_interfaces/srv/ListParameters'),
+        ('service_clients', '/c/list_parameters', 'any/srv/Type'),
+        ('service_clients', '/c/get_logger_levels', 'rcl_interfaces/srv/GetLoggerLevels'),
+    ],
+)
+def test_what_ros_has_itself_has_the_types_of_ros(check, section, name, right):
+    folder = 'srv' if section == 'service_clients' else 'msg'
+    key = 'service' if section == 'service_clients' else 'topic'
+    more = ', behaviour: parts:hear' if section == 'subscriptions' else ''
+    nodes = f"""
+  a:
+    {section}:
+      it: {{type: TYPE, {key}: {name}, external: true{more}}}
+    on_start: parts:use
+  b: {{actions: {{/act: {{type: test_msgs/action/Fibonacci, behaviour: parts:do}}}}}}
+  c: {{parameter_services: false, logger_services: true}}
+"""
+    code = (
+        CODE
+        + """
+    def use(node):
+        node.publish('it', {})
+        node.call('it', {})
+    """
+    )
+    rule = 'conflicting-types'
+    found = check(nodes.replace('TYPE', f'std/{folder}/Wrong'), code, rule=rule, installed=False)
+    assert len(found) == (right is None or not right.startswith('any/'))
+    if right:
+        text = nodes.replace('TYPE', right)
+        assert check(text, code, rule=rule, installed=False) == []
+
+
+@pytest.mark.parametrize(
+    ('name', 'type_name'),
+    [
+        ('~/get_parameters', 'rcl_interfaces/srv/GetParameters'),
+        ('/act/_action/cancel_goal', 'action_msgs/srv/CancelGoal'),
+    ],
+)
+def test_what_ros_serves_has_a_server(check, name, type_name):
+    nodes = f"""
+  a:
+    services: {{{name}: {{type: {type_name}, behaviour: parts:serve}}}}
+    actions: {{/act: {{type: test_msgs/action/Fibonacci, behaviour: parts:do}}}}
+"""
+    assert check(nodes, CODE, installed=False) == [(4, 'second-server')]
+    elsewhere = nodes.replace('a:\n', 'a:\n    parameter_services: false\n').replace(
+        'actions: {/act:', 'actions: {/other:'
+    )
+    assert check(elsewhere, CODE, installed=False) == []
+
+
+DEADLINE = """
+  a:
+    publishers: {out: {type: std_msgs/msg/String, qos: {deadline: 0.5}, external: true}}
+    timers:
+      one: {period: 1, publish: out, message: hello}
+"""
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('deadline: 0.5', 'deadline: 1.5'),
+        ('deadline: 0.5', 'deadline: 0'),
+        ('deadline: 0.5', 'deadline: infinite'),
+        ('{deadline: 0.5}', 'best_available'),
+        ('period: 1', 'period: 0.25'),
+        ('period: 1', 'rate: 2'),
+        ('period: 1', 'period: "{{ period }}"'),
+        ('deadline: 0.5', 'deadline: "{{ period }}"'),
+        ('period: 1', 'clock: ros, period: 1'),
+        ('timers:', 'timers:\n      two: {period: 0.8, publish: out, message: hello}'),
+        ('timers:', 'on_start: parts:publish\n    timers:'),
+        ('timers:', 'on_start: parts:reach\n    timers:'),
+        ('timers:', 'on_start: {behaviour: parts:choose, with: {name: out}}\n    timers:'),
+        (
+            'timers:',
+            'subscriptions: {in: {type: std_msgs/msg/String, external: true, publish: out}}\n'
+            '    timers:',
+        ),
+        ('timers:', 'services: {bad}\n    timers:'),
+    ],
+)
+def test_a_deadline_is_kept_where_something_may_publish_in_time(check, old, new):
+    code = """
+        def publish(node):
+            node.publish('out', 'x')
+        def reach(node):
+            use(node.ros)
+        def choose(node, name):
+            node.publish(name, 'x')
+    """
+    before = 'args: {period: {type: double}}\n'
+    nodes = DEADLINE.replace('a:\n', 'a:\n    use_sim_time: true\n')
+    text = nodes.replace('one: {', 'one: {clock: steady, ') if 'clock' not in new else nodes
+    rule = 'missed-deadline'
+    assert len(check(text.replace('clock: ros, ', ''), code, before=before, rule=rule)) == (
+        'clock' not in new
+    )
+    assert check(text.replace(old, new), code, before=before, rule=rule) == []
+
+
+def test_a_deadline_is_compared_with_all_timers_of_a_publisher(check):
+    assert check(DEADLINE) == [(4, 'missed-deadline')]
+    two = DEADLINE + '      two: {period: 2, publish: out, message: hello}\n'
+    assert check(two, rule='missed-deadline') == [
+        "publisher 'out' promises a message every 0.5 s, and its timers publish one every "
+        '0.666667 s'
+    ]
+    profile = 'qos: {fast: {deadline: 0.5}}\n'
+    nodes = DEADLINE.replace('{deadline: 0.5}', 'fast')
+    assert check(nodes, before=profile) == [(5, 'missed-deadline')]
+
+
+@pytest.mark.parametrize(
+    ('args', 'nodes', 'is_left'),
+    [
+        ('{on: false}', '  a: {when: "{{ on }}"}\n  b: {when: false}', False),
+        ('{on: true}', '  a: {when: "{{ on }}"}\n  b: {when: false}', True),
+        ('{on: {type: bool}}', '  a: {when: false}', True),
+        ('{on: false}', '  a: {when: "{{ on }}"}\nprocesses: {p: {command: [sh]}}', True),
+        (
+            '{on: false}',
+            '  a: {when: "{{ on }}"}\nprocesses: {p: {command: [sh], when: false}}',
+            False,
+        ),
+        ('{on: false}', '  a: {when: "{{ on }}"}\n  b: {whne: true}', True),
+        ('{on: false}', '  a: {when: "{{ on }}"}\n  b: 3', True),
+        ('{on: false}', '  a: {foreach: {i: []}}', True),
+    ],
+)
+def test_something_is_left_to_run(check, args, nodes, is_left):
+    found = check(f'{nodes}\n', before=f'args: {args}\n', rule='nothing-to-run')
+    assert len(found) == (not is_left)
 
 
 def test_the_other_end_may_be_external(check):

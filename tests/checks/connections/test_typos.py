@@ -1,7 +1,13 @@
 """Names that are all but those of something in the system."""
 
+import subprocess
+import sys
+from textwrap import dedent
+
 import pytest
 
+from composer.ament import remaps_actions
+from composer.checks.connections import typos
 from composer.checks.connections.typos import find_typo
 
 RULE = 'likely-misspelling'
@@ -16,6 +22,7 @@ RULE = 'likely-misspelling'
         ('/front_lidar_scna', '/front_lidar_scan'),
         ('/Camera', '/camera'),
         ('/trajetcori', '/trajectory'),
+        ('/cmd_vle', '/cmd_vel'),
     ],
 )
 def test_a_slip_is_found(word, option):
@@ -29,6 +36,7 @@ def test_a_slip_is_found(word, option):
         ('/camera1', '/camera2'),
         ('/arm_l', '/arm_r'),
         ('/map', '/mop'),
+        ('/arm_lr', '/arm_rl'),
         ('/cmd_vell', '/cmd_vel'),
         ('/left/scan', '/right/scan'),
         ('/scan', '/left/scan'),
@@ -74,6 +82,72 @@ def test_what_is_waited_for_may_be_here_left_out_or_elsewhere(check):
     nodes = WAITS.replace('KIND', 'node').replace('NAME', 'camrea')
     left_out = nodes + '  camrea: {when: false}\n'
     assert check(left_out, CODE, installed=False) == []
+
+
+@pytest.mark.parametrize(
+    ('kind', 'wrong', 'right'),
+    [
+        ('topic', '/frnt/scan', '/front/scan'),
+        ('service', 'docc/start', 'dock/start'),
+        ('action', '/dokc', '/dock'),
+        ('service', '/other/get_paramters', '/other/get_parameters'),
+        ('node', '/drivr', '/driver'),
+    ],
+)
+def test_what_is_elsewhere_has_its_name_from_what_uses_it(check, kind, wrong, right):
+    nodes = """
+  n:
+    wait_for: {KIND: NAME}
+    subscriptions: {/front/scan: {type: std_msgs/msg/String, external: true, behaviour: parts:hear}}
+    service_clients: {dock/start: {type: std_srvs/srv/Empty, external: true}}
+    action_clients: {/dock: {type: test_msgs/action/Fibonacci, external: true}}
+    on_start: parts:go
+  other: {}
+processes:
+  driver: {command: ['true'], name: driver}
+""".replace('KIND', kind)
+    code = """
+        def hear(node, message): ...
+        def go(node):
+            node.call('dock/start', {})
+            node.send_goal('/dock', {})
+    """
+    assert check(nodes.replace('NAME', wrong), code, installed=False) == [(4, RULE)]
+    assert check(nodes.replace('NAME', right), code, installed=False) == []
+
+
+@pytest.mark.parametrize(('remaps', 'is_ignored'), [(False, True), (True, False), (None, False)])
+def test_an_older_ros_does_not_remap_an_action(check, monkeypatch, remaps, is_ignored):
+    monkeypatch.setattr(typos, 'remaps_actions', lambda: remaps)
+    nodes = """
+  server:
+    remap: {do: done, heard: said}
+    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
+    subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:do}}
+"""
+    code = 'def do(node, it): ...'
+    message = "this ROS remaps no actions, such as '/do', and ignores the rule"
+    rule = 'ignored-remap'
+    assert check(nodes, code, rule=rule, installed=False) == [message] * is_ignored
+    parts = nodes.replace('do: done', 'do/_action/status: x')
+    assert check(parts, code, rule=rule, installed=False) == []
+
+
+@pytest.mark.ros
+def test_the_installed_ros_remaps_actions_as_its_version_says(domain_id):
+    code = """
+        import rclpy
+        from rclpy.action import ActionServer
+        from test_msgs.action import Fibonacci
+        rclpy.init(args=['--ros-args', '-r', 'do:=done'])
+        node = rclpy.create_node('n')
+        server = ActionServer(node, Fibonacci, 'do', lambda goal: None)
+        print([name for name, _ in node.get_service_names_and_types() if '/_action/' in name][0])
+        rclpy.shutdown()
+    """
+    command = [sys.executable, '-c', dedent(code)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.startswith('/done/' if remaps_actions() else '/do/')
 
 
 def test_a_remapping_rule_is_for_no_misspelt_name(check):

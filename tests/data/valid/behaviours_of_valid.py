@@ -5,6 +5,9 @@ from json import dumps
 
 
 class Counter:
+    def __init__(self, node=None):
+        self.node = node
+
     def __call__(self, node):
         return 1
 
@@ -37,7 +40,7 @@ def hear(node, message, repeat=1):
     return message
 
 
-def show(node, message):
+def spell(node, message):
     return str(message.data)
 
 

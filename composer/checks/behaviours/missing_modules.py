@@ -1,0 +1,256 @@
+"""The modules of behaviours import only what there is.
+
+Nothing is imported. Only imports that are run on no condition count: those at the top of a module,
+and those with which a behaviour begins.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import sys
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from composer.diagnostics import Span, diagnostic_at
+from composer.language.bindings import node_bindings
+from composer.python_source.module_finder import MissingModule
+from composer.python_source.modules import ModuleSource
+from composer.spelling import did_you_mean, find_nearest, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.interfaces.catalogue import InterfaceKind
+    from composer.language.bindings import Binding
+
+_RULE = 'missing-module'
+_Import = ast.Import | ast.ImportFrom
+_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+# A module with one of these may find modules, or make some, where nobody knows.
+_CHANGES_THE_SEARCH = re.compile(
+    r'\bsys\.(path|modules|meta_path)\b|\bpath\.(append|extend|insert)\(|\baddsitedir\b|__path__'
+)
+# Each is read as a whole, and a small part of a large project is enough for a system.
+_MOST_MODULES = 50
+# A search asks the file system many times.
+_MOST_SEARCHES = 300
+# Statements after which a function goes on in any case.
+_PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
+
+
+def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check the imports of the modules of behaviours, and of what these import of the project."""
+    walk = _Walk(context)
+    for node in context.spec.nodes.values():
+        for binding in node_bindings(node):
+            if not context.was_dropped(binding.behaviour.path):
+                walk.visit(binding.behaviour.module, binding)
+                walk.visit_function(binding)
+    if not any(_CHANGES_THE_SEARCH.search('\n'.join(module.lines)) for module in walk.modules):
+        yield from walk.findings
+
+
+@dataclass(frozen=True, slots=True)
+class _Importer:
+    """A module with an import, and the first behaviour that needs it."""
+
+    name: str
+    source: ModuleSource
+    binding: Binding
+
+
+@dataclass(slots=True)
+class _Walk:
+    """Follows the imports of a project, each module once."""
+
+    context: CheckContext
+    findings: list[Diagnostic] = field(default_factory=list)
+    modules: list[ModuleSource] = field(default_factory=list)
+    _visited: set[str] = field(default_factory=set)
+    _searches: int = 0
+
+    def visit(self, name: str, binding: Binding) -> None:
+        """Check the imports of a module of the project, and of the packages that it is in."""
+        pending = [name]
+        while pending:
+            each = pending.pop()
+            if each in self._visited:
+                continue
+            self._visited.add(each)
+            is_followed = (
+                len(self.modules) < _MOST_MODULES and each.partition('.')[0] != 'composer'
+            )
+            if not (is_followed and self.context.modules.is_of_project(each)):
+                continue
+            pending += [each.rpartition('.')[0]] if '.' in each else []
+            module = self.context.modules.find(each)
+            if isinstance(module, ModuleSource) and module.path is not None:
+                self.modules.append(module)
+                importer = _Importer(each, module, binding)
+                for statement in module.required:
+                    pending += self._check(statement, importer)
+
+    def visit_function(self, binding: Binding) -> None:
+        """Check the imports with which a behaviour begins."""
+        behaviour = binding.behaviour
+        module = self.context.modules.find(behaviour.module)
+        key = behaviour.name
+        if isinstance(module, MissingModule) or key in self._visited:
+            return
+        self._visited.add(key)
+        source = module.functions.get(behaviour.function)
+        definition = source.definition if source else None
+        for statement in definition.body if definition else ():
+            if not isinstance(statement, _PLAIN):
+                break
+            if isinstance(statement, _Import):
+                importer = _Importer(behaviour.module, module, binding)
+                for name in self._check(statement, importer):
+                    self.visit(name, binding)
+
+    def _check(self, statement: _Import, importer: _Importer) -> list[str]:
+        """Check an import; return the modules that it imports."""
+        if self._searches > _MOST_SEARCHES:
+            return []
+        if isinstance(statement, ast.Import):
+            for alias in statement.names:
+                self._check_module(alias.name, importer, _place_of_name(alias, importer.source))
+            return [alias.name for alias in statement.names]
+        written = '.' * statement.level + (statement.module or '')
+        place = importer.source.place_of(statement.lineno).narrowed_to(written, first=True)
+        home = _resolve(statement, importer)
+        if not home:
+            message = f"'{importer.name}' is in no package that '{'.' * statement.level}' means"
+            self._report(message, 'import it by its full name', importer, place)
+            return []
+        if not self._check_module(home, importer, place):
+            return []
+        aliases = [each for each in statement.names[:_MOST_SEARCHES] if each.name != '*']
+        for alias in aliases:
+            if self._is_of_interfaces(home):
+                self._check_type(home, alias, importer)
+            elif self._is_of_project(home):
+                self._check_member(home, alias, importer)
+            elif home in sys.modules and _is_of_python(home):
+                self._check_attribute(home, alias, importer)
+        return [home, *(f'{home}.{alias.name}' for alias in aliases)]
+
+    def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
+        """Check that a module exists; return whether it does."""
+        modules = self.context.modules
+        if name in sys.modules or name in sys.stdlib_module_names:
+            return True
+        self._searches += 1
+        if modules.has(name):
+            return True
+        if self._is_of_interfaces(name):
+            # What is declared may be built only later.
+            kind = name.split('.')[1] if '.' in name else ''
+            if kind and kind not in _KINDS:
+                help_text = did_you_mean(find_nearest(kind, _KINDS))
+                self._report(f"there is no module '{name}'", help_text, importer, place)
+            return True
+        missing = modules.find_missing(name)
+        if missing is not None and self._is_certain(missing.missing):
+            otherwise = 'correct its name, or install the package that has it'
+            help_text = did_you_mean(missing.nearest, otherwise)
+            self._report(f"there is no module '{missing.missing}'", help_text, importer, place)
+        return False
+
+    def _is_certain(self, missing: str) -> bool:
+        """Return whether a module is missing wherever the system can run."""
+        top, _, inner = missing.partition('.')
+        modules = self.context.modules
+        if inner and self._is_of_project(top):
+            return True
+        if inner:
+            # Packages that are installed may make their modules themselves.
+            return _is_of_python(top) and modules.is_package(missing.rpartition('.')[0])
+        # A Python without ROS cannot run the system: another one has what it needs.
+        return bool(importlib.util.find_spec('rclpy'))
+
+    def _is_of_project(self, name: str) -> bool:
+        # Where Composer is developed, it is one itself.
+        is_composer = name.partition('.')[0] == 'composer'
+        return not is_composer and self.context.modules.is_of_project(name)
+
+    def _is_of_interfaces(self, name: str) -> bool:
+        top = name.partition('.')[0]
+        return top in self.context.spec.interfaces or top in self.context.catalogue.packages()
+
+    def _check_type(self, home: str, alias: ast.alias, importer: _Importer) -> None:
+        """Check a message, service or action, or a part of one, that is imported."""
+        package, _, kind = home.partition('.')
+        known = self.context.catalogue.packages()
+        if kind not in _KINDS or not alias.name[:1].isupper() or package not in known:
+            return
+        names = self.context.catalogue.names(kind, package)
+        types = {each.rpartition('/')[2] for each in names}
+        # The parts of services and actions are called `SetBool_Request` and the like.
+        if alias.name.partition('_')[0] not in types:
+            message, help_text = f"{home} has no '{alias.name}'", suggest(alias.name, types)
+            self._report(message, help_text, importer, _place_of_name(alias, importer.source))
+
+    def _check_attribute(self, home: str, alias: ast.alias, importer: _Importer) -> None:
+        """Check a name that is imported from a module of Python that is loaded already."""
+        module = sys.modules[home]
+        if not hasattr(module, alias.name) and not self.context.modules.has(
+            f'{home}.{alias.name}'
+        ):
+            # Another version of Python may have it.
+            nearest = find_nearest(alias.name, dir(module))
+            if nearest:
+                message, help_text = f"{home} has no '{alias.name}'", did_you_mean(nearest)
+                self._report(message, help_text, importer, _place_of_name(alias, importer.source))
+
+    def _check_member(self, home: str, alias: ast.alias, importer: _Importer) -> None:
+        """Check a name that is imported from a module or package of the project."""
+        source, name = self.context.modules.find(home), f'{home}.{alias.name}'
+        if not isinstance(source, ModuleSource) or self.context.modules.has(name):
+            return
+        place = _place_of_name(alias, importer.source)
+        known = {*source.functions, *source.constants}
+        if source.path is None:
+            missing = self.context.modules.find_missing(name)
+            help_text = did_you_mean(missing.nearest if missing else None)
+            self._report(f"there is no module '{name}'", help_text, importer, place)
+        elif not (source.is_open or source.syntax_error or alias.name in known):
+            # It may be bound where nobody looks, unless it is only misspelt.
+            nearest = find_nearest(alias.name, known)
+            if nearest:
+                message = f"{home} has no '{alias.name}'"
+                self._report(message, did_you_mean(nearest), importer, place)
+
+    def _report(
+        self, message: str, help_text: str | None, importer: _Importer, place: Span
+    ) -> None:
+        behaviour = importer.binding.behaviour
+        where = f"'{behaviour.name}' cannot be imported without it"
+        related = [self.context.related_value(behaviour.path, where)]
+        self.findings.append(diagnostic_at(place, _RULE, message, help=help_text, related=related))
+
+
+def _is_of_python(name: str) -> bool:
+    return name.partition('.')[0] in sys.stdlib_module_names
+
+
+def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:
+    line = source.place_of(alias.lineno)
+    column = len(line.source.line(alias.lineno).encode()[: alias.col_offset].decode()) + 1
+    return Span(line.source, alias.lineno, column, len(alias.name))
+
+
+def _resolve(statement: ast.ImportFrom, importer: _Importer) -> str | None:
+    """Return the full name of the module that names are imported from, `None` if there is none."""
+    if not statement.level:
+        return statement.module
+    path = importer.source.path
+    is_package = path is not None and path.name == '__init__.py'
+    parts = importer.name.split('.')
+    package = parts[: max(0, len(parts) - statement.level + is_package)]
+    inner = [statement.module] if statement.module else []
+    return '.'.join([*package, *inner]) if package else None

@@ -1,0 +1,136 @@
+"""Imports of what there is not are found where they stand, and no others."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+RULE = 'missing-module'
+NODES = '  n: {on_start: parts:go}\n'
+GO = '\ndef go(node): ...\n'
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """Write a package with modules, and what makes this a Python that can run the system."""
+    monkeypatch.chdir(tmp_path)
+    files = {
+        'ros/rclpy/__init__.py': '',
+        'package/__init__.py': 'from . import inner\nfrom .inner import turn as twist\n',
+        'package/inner.py': 'def turn(node): ...\nname = 1\n',
+        'space/one.py': 'from .other import turn\n',
+        'space/other.py': 'def turn(node): ...\n',
+        'space/deep/__init__.py': 'from .. import one\n',
+        'declared/msg/Own.msg': 'int8 x\n',
+        'open.py': 'def __getattr__(name): ...\ndef turn(node): ...\n',
+        'broken_chain.py': 'import package.innner\n',
+        'guarded.py': 'try:\n    import not_there\nexcept ImportError: ...\n',
+    }
+    for name, text in files.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path / 'ros')
+
+
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    'code',
+    [
+        'import os.path, sys, time as t\nfrom collections.abc import Mapping',
+        'import xml.etree.ElementTree, concurrent.futures, importlib.metadata, logging.handlers',
+        'import xml.parsers.expat.model',
+        'import yaml, jinja2.sandbox\nfrom composer import Node',
+        'import package\nimport package.inner\nfrom package import inner, twist',
+        'from package.inner import turn, name, unlike_anything',
+        'from package.inner import *',
+        'from space import one, deep\nimport space.deep',
+        'from open import trun',
+        'import guarded',
+        'from time import tomorrow_or_never',
+        'from os import path, environ\nfrom collections import abc, deque',
+        'try:\n    import not_there\nexcept ImportError:\n    not_there = None',
+        'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import not_there',
+        'from contextlib import suppress\nwith suppress(ImportError):\n    import not_there',
+        'def unused(node):\n    import not_there',
+        'import sys\nsys.path.insert(0, "elsewhere")\nimport not_there',
+        'from sys import path\npath.append("elsewhere")\nimport not_there',
+        'from declared.msg import Own',
+        'from __future__ import annotations',
+        'class Lazy:\n    def load(self):\n        import not_there',
+    ],
+)
+def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
+    before = 'interfaces: {declared: declared}\n'
+    assert check(NODES, code + GO, before=before, rule=RULE) == []
+
+
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    ('code', 'message'),
+    [
+        ('import not_there', "there is no module 'not_there'"),
+        ('import sys, not_there.part', "there is no module 'not_there'"),
+        ('from not_there import this', "there is no module 'not_there'"),
+        ('import json.decode', "there is no module 'json.decode'"),
+        ('from concurrent.future import wait', "there is no module 'concurrent.future'"),
+        ('from time import slep', "time has no 'slep'"),
+        ('from os.path import jion', "os.path has no 'jion'"),
+        ('from package.iner import turn', "there is no module 'package.iner'"),
+        ('from package.inner import trun', "package.inner has no 'trun'"),
+        ('from package import iner', "package has no 'iner'"),
+        ('from space import two', "there is no module 'space.two'"),
+        ('import space.deep.two', "there is no module 'space.deep.two'"),
+        ('from . import inner', "'parts' is in no package that '.' means"),
+        ('from ..package import inner', "'parts' is in no package that '..' means"),
+        ('import broken_chain', "there is no module 'package.innner'"),
+    ],
+)
+def test_what_cannot_be_imported_is_found(check, code, message):
+    assert check(NODES, code + GO, rule=RULE) == [message]
+
+
+@pytest.mark.usefixtures('project')
+def test_what_a_behaviour_imports_first_is_looked_at(check):
+    code = """
+        def go(node):
+            '''Go.'''
+            start = node.now()
+            import not_there
+            if not_there.is_here:
+                return
+            import neither
+    """
+    assert check(NODES, code) == [(5, RULE)]
+    assert check('  n: {on_stop: parts:o}\n', code + '    def o(node): ...', rule=RULE) == []
+
+
+@pytest.mark.ros
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    ('code', 'message'),
+    [
+        ('from std_msgs.msg import String\nimport std_msgs.msg as messages', None),
+        ('from std_msgs import msg', None),
+        ('from std_msgs.msg._string import String', None),
+        ('from std_srvs.srv import SetBool, SetBool_Request', None),
+        ('from declared.msg import Own', None),
+        ('from std_msgs.msg import Strin', "std_msgs.msg has no 'Strin'"),
+        ('from std_msgs.srv import String', "std_msgs.srv has no 'String'"),
+        ('from std_msgs.mgs import String', "there is no module 'std_msgs.mgs'"),
+        ('import std_msgs.mgs', "there is no module 'std_msgs.mgs'"),
+        ('from st_msgs.msg import String', "there is no module 'st_msgs'"),
+        ('from declared.msg import Onw', "declared.msg has no 'Onw'"),
+    ],
+)
+def test_types_are_imported_from_where_they_are(check, code, message):
+    before = 'interfaces: {declared: declared}\n'
+    found = check(NODES, code + GO, before=before, rule=RULE)
+    assert found == ([message] if message else [])
+
+
+@pytest.mark.usefixtures('project')
+def test_installed_packages_may_be_missing_where_there_is_no_ros(check, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name != 'rclpy' and find(name))
+    code = 'import not_there\nfrom package import iner' + GO
+    assert check(NODES, code, rule=RULE) == ["package has no 'iner'"]
