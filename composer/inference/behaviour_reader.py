@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
     from composer.python_source.module_finder import ModuleFinder
+    from composer.python_source.syntax import FunctionNode
 
 
 # What ends a loop; that a call may raise is no way to end one.
@@ -194,9 +195,17 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     for value, place in scope.returned:
         _check(evaluator, returned, value, place)
     nothing = all(is_none(value) for value, _ in scope.returned)
-    if wire.needs_payload and wire.returned and scope.returned and nothing and not is_generator:
+    nothing = nothing and not is_generator and not _is_stub(callee.definition)
+    if wire.needs_payload and wire.returned and scope.returned and nothing:
         _, place = scope.returned[-1]
         evaluator.payloads.check(wire.returned, NONE, place)
+
+
+def _is_stub(definition: FunctionNode | ast.Lambda) -> bool:
+    """Return whether a function is still to be written: it has a docstring, `...` or `pass`."""
+    body = definition.body if isinstance(definition.body, list) else []
+    plain = (each.value if isinstance(each, ast.Expr) else each for each in body)
+    return all(isinstance(each, ast.Constant | ast.Pass) for each in plain)
 
 
 def _check_end(evaluator: Evaluator, callee: Function, binding: Binding) -> None:
