@@ -31,6 +31,8 @@ from composer.executor.sources.waitable_sources import (
 from composer.executor.wait_set_thread import WaitSetThread
 
 _REST_FACTOR = 4
+# rclpy 9 adds an action client to its node first, and gives it a lock last.
+_IS_LOCKED_LAST = '_lock' in ActionClient.__init__.__code__.co_names
 
 
 class _NodeEntities:
@@ -141,12 +143,17 @@ class EntityRegistry:
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
         for entity, source_class in wanted.items():
-            if entity not in seen.sources:
-                with suppress(InvalidHandle):
-                    source = source_class(entity, node, self._parts)
-                    source.observer = self._observers.get(entity)
-                    self._open(source)
-                    seen.sources[entity] = source
+            if entity in seen.sources:
+                continue
+            if _is_half_made(entity):
+                seen.lists = ()
+                self.is_stale = True
+                continue
+            with suppress(InvalidHandle):
+                source = source_class(entity, node, self._parts)
+                source.observer = self._observers.get(entity)
+                self._open(source)
+                seen.sources[entity] = source
 
     def _open(self, source: EventSource) -> None:
         source.open()
@@ -166,6 +173,11 @@ def _class_for(waitable: Any) -> type[EventSource]:
         is_seldom = is_checked_seldom(waitable.callback)
         return SeldomQosEventSource if is_seldom else QosEventSource
     return WaitableSource
+
+
+def _is_half_made(entity: Any) -> bool:
+    """Tell whether another thread is still making `entity`."""
+    return _IS_LOCKED_LAST and isinstance(entity, ActionClient) and not hasattr(entity, '_lock')
 
 
 def _is_waited_for(source: EventSource) -> TypeGuard[WaitSetSource]:
