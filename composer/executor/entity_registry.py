@@ -84,8 +84,12 @@ class EntityRegistry:
             begin = monotonic()
             for node in self._nodes.keys() - set(nodes):
                 self.drop(node)
-            for node in nodes:
-                self._refresh_node(node)
+            try:
+                for node in nodes:
+                    self._refresh_node(node)
+            except BaseException:
+                self.is_stale = True  # Whoever spins on tries again.
+                raise
             end = monotonic()
             self._rest_until = end + _REST_FACTOR * (end - begin)
 
@@ -126,7 +130,6 @@ class EntityRegistry:
         )
         if lists == seen.lists:
             return
-        seen.lists = lists
         classes = (
             TimerSource,
             SubscriptionSource,
@@ -139,21 +142,21 @@ class EntityRegistry:
             for source_class, entities in zip(classes, lists, strict=False)
             for entity in entities
         }
-        wanted.update((waitable, _class_for(waitable)) for waitable in lists[-1])
+        half_made = set(filter(_is_half_made, lists[-1]))
+        wanted.update((each, _class_for(each)) for each in lists[-1] if each not in half_made)
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
         for entity, source_class in wanted.items():
-            if entity in seen.sources:
-                continue
-            if _is_half_made(entity):
-                seen.lists = ()
-                self.is_stale = True
-                continue
-            with suppress(InvalidHandle):
-                source = source_class(entity, node, self._parts)
-                source.observer = self._observers.get(entity)
-                self._open(source)
-                seen.sources[entity] = source
+            if entity not in seen.sources:
+                with suppress(InvalidHandle):
+                    source = source_class(entity, node, self._parts)
+                    source.observer = self._observers.get(entity)
+                    self._open(source)
+                    seen.sources[entity] = source
+        if half_made:
+            self.is_stale = True
+        else:
+            seen.lists = lists
 
     def _open(self, source: EventSource) -> None:
         source.open()
