@@ -78,13 +78,6 @@ class Guardian:
                 self._end_composer()
                 return True
             ready = {each for each, _ in poll.poll(None if rest == _NEVER else rest * 1000 + 1)}
-            if self._ended in ready:
-                if self._deadline == _NEVER:
-                    tell(
-                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
-                        'killed, or a behaviour called os._exit'
-                    )
-                return True
             if self._reports in ready:
                 data = os.read(self._reports, _CHUNK)
                 if not data:
@@ -96,6 +89,14 @@ class Guardian:
                     self._signal(signal.SIGHUP)
                 for byte in data:
                     self._take(byte)
+            # It may have reported a signal right before its end.
+            if self._ended in ready:
+                if self._deadline == _NEVER:
+                    tell(
+                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
+                        'killed, or a behaviour called os._exit'
+                    )
+                return True
         return False
 
     def _take(self, byte: int) -> None:
