@@ -455,7 +455,7 @@ def foreach_of_nothing(folder):
     write(folder, f'{HEAD}nodes:\n  n: {{foreach: {{{lists}}}, when: false}}\n')
 
 
-@case('too-many-entries')
+@case('bad-expression')
 def enormous_max_nodes(folder):
     foreach = '{foreach: {i: "{{ range(90000) }}"}}'
     write(folder, f'{HEAD}max_nodes: 1{"0" * 200}\nnodes: {{"n{{{{ i }}}}": {foreach}}}\n')
