@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 # take one megabyte.
 MAX_FILE_BYTES = 10_000_000
 MAX_LINES = 1_000_000
-# Keys and values of a file, with what its aliases stand for: five times those of such a system.
-MAX_VALUES = 300_000
+# Keys and values of a file, with what its aliases stand for; also of all that a system includes,
+# and of all its parameter files together: nearly three times those of such a system.
+MAX_VALUES = 150_000
 # Levels of data, aliases and merges; the walks over the data are safe from deep recursion by it.
 MAX_DEPTH = 100
 # Files that include each other, one in the other.
@@ -33,9 +34,9 @@ MAX_FINDINGS = 1000
 MAX_DEFINITION_BYTES = 100_000
 MAX_PACKAGE_BYTES = 2_000_000
 # Of a Python module: its words and signs are what its syntax tree grows with. Real code has nine
-# in a line, so that this is 20,000 lines; the modules of a system may have more together.
+# in a line, so that this is 10,000 lines; the modules of a system may have more together.
 MAX_MODULE_BYTES = 2_000_000
-MAX_MODULE_TOKENS = 200_000
+MAX_MODULE_TOKENS = 100_000
 MAX_TOKENS_OF_MODULES = 500_000
 
 _KINDS = {

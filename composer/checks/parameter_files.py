@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from composer.ament import list_packages
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
+from composer.input_limits import MAX_VALUES
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
@@ -77,6 +78,7 @@ class _Library:
         self.findings: list[Diagnostic] = []
         self._context = context
         self._knows_packages = bool(list_packages())
+        self._values_left = MAX_VALUES
 
     def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
         """Read the files of a node or process, and yield those that exist."""
@@ -91,7 +93,8 @@ class _Library:
                     )
                 continue
             if path not in self.files:
-                self.files[path] = read_parameter_file(Path(path))
+                self.files[path] = read_parameter_file(Path(path), self._values_left)
+                self._values_left -= min(self.files[path].values, self._values_left)
                 self.findings += [each for each in self.files[path].findings if each.span]
             unreadable = [each for each in self.files[path].findings if each.span is None]
             self.findings += [

@@ -122,6 +122,10 @@ class TemplateEvaluator:
         return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
+        if self._sandbox.explained > MAX_FINDINGS:
+            # Nobody sees more, and each takes its time.
+            self.document.dropped.add(path)
+            return text
         span = self.positions.key(path) if is_key else self.positions.value(path)
         sampled = False
         expressions: list[slice] = []
@@ -138,8 +142,7 @@ class TemplateEvaluator:
             self.document.dropped.add(path)
             # It may succeed with the real value.
             is_sure = not sampled or isinstance(error, UndefinedError)
-            # To explain one takes long, and nobody sees more.
-            if is_sure and self._sandbox.explained <= MAX_FINDINGS:
+            if is_sure:
                 self._sandbox.explained += 1
                 origin = self._hidden_origin(text, expressions)
                 self.document.diagnostics.append(self._explain(error, span, origin))

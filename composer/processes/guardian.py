@@ -190,7 +190,10 @@ def main() -> None:
     stop_sec, exit_sec, mark = float(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    ended = os.pidfd_open(composer)
+    try:
+        ended = os.pidfd_open(composer)
+    except ProcessLookupError:
+        return  # A signal has ended it, and it had started nothing yet.
     # No child of Composer, or a behaviour that waits for all of its own would wait for ever.
     if os.fork():
         os._exit(0)

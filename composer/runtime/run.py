@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Sent when the terminal is closed, often twice: by the shell and by the kernel.
+# Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
+# with SIGTERM, and Python handles it first.
 _HANG_UP = signal.SIGHUP
 # How much longer than its timeouts a stop may take.
 _MARGIN_SEC = 5.0
@@ -45,9 +46,9 @@ def run_system(
 
     The first SIGINT or SIGTERM stops the system, and a second one ends the process at once with
     exit code 1, whoever asked for the stop. SIGHUP stops the system, too, unless it was ignored
-    before, as by `nohup`; further ones change nothing. If a behaviour does not end, this ends the
-    process with the exit code, since its thread cannot be ended. The guardian ends it if no Python
-    code can run. A SIGINT before the system is up gives the exit code 130.
+    before, as by `nohup`; it never counts as one of the two. If a behaviour does not end, this
+    ends the process with the exit code, since its thread cannot end. The guardian ends it if no
+    Python code can run. A SIGINT before the system is up gives the exit code 130.
 
     Args:
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
@@ -125,10 +126,11 @@ def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
 
     def handle(number: int, _frame: FrameType | None) -> None:
         nonlocal has_come
-        if has_come and number != _HANG_UP:
-            stop.kill_processes()
-            forced_exit.leave(ExitCode.FAILED)
-        has_come = True
+        if number != _HANG_UP:
+            if has_come:
+                stop.kill_processes()
+                forced_exit.leave(ExitCode.FAILED)
+            has_come = True
         if not stop.is_set:  # The system may stop by itself.
             is_early = number == signal.SIGINT and not stop.system_is_up
             stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)

@@ -292,13 +292,13 @@ def long_topic(folder):
 @case('bad-parameter')
 def list_of_parameter_values(folder):
     write(
-        folder, f'{HEAD}nodes: {{n: {{parameters: {{a: [{"1, " * (250_000 // DIVISOR)} a]}}}}}}\n'
+        folder, f'{HEAD}nodes: {{n: {{parameters: {{a: [{"1, " * (145_000 // DIVISOR)} a]}}}}}}\n'
     )
 
 
 @case()
 def hundred_thousand_parameters(folder):
-    text = ''.join(f'      p{index}: 1\n' for index in range(100_000 // DIVISOR))
+    text = ''.join(f'      p{index}: 1\n' for index in range(70_000 // DIVISOR))
     write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
 
 
@@ -314,14 +314,14 @@ def utf_16(folder):
 
 @case('duplicate-key')
 def same_key(folder):
-    write(folder, f'{HEAD}nodes:\n' + '  n: {}\n' * (100_000 // DIVISOR))
+    write(folder, f'{HEAD}nodes:\n' + '  n: {}\n' * (70_000 // DIVISOR))
 
 
 @case('unknown-key')
 def unknown_keys(folder):
     write(
         folder,
-        HEAD + 'nodes:\n  n: {' + ', '.join(f'k{i}: 1' for i in range(100_000 // DIVISOR)) + '}\n',
+        HEAD + 'nodes:\n  n: {' + ', '.join(f'k{i}: 1' for i in range(70_000 // DIVISOR)) + '}\n',
     )
 
 
@@ -455,6 +455,19 @@ def foreach_of_nothing(folder):
     write(folder, f'{HEAD}nodes:\n  n: {{foreach: {{{lists}}}, when: false}}\n')
 
 
+@case('bad-expression')
+def enormous_max_nodes(folder):
+    foreach = '{foreach: {i: "{{ range(90000) }}"}}'
+    write(folder, f'{HEAD}max_nodes: 1{"0" * 200}\nnodes: {{"n{{{{ i }}}}": {foreach}}}\n')
+
+
+@case('missing-include', 'unreadable-file', 'unknown-interfaces', 'bad-name')
+def null_characters_in_paths(folder):
+    text = 'interfaces: {"a\\0": "b\\0"}\ninclude: {x: {file: "a\\0b"}}\n'
+    text += 'nodes: {n: {namespace: "a\\0", parameter_files: ["p\\0"]}}\n'
+    write(folder, HEAD + text)
+
+
 # Python.
 
 
@@ -572,7 +585,7 @@ def functions(folder):
 
 
 @case()
-def functions_that_call_each_other(folder, count=180):
+def functions_that_call_each_other(folder, count=120):
     names = [f'f{index}' for index in range(count)]
     calls = '; '.join(f'{name}(node)' for name in names)
     text = ''.join(f'def {name}(node): node.publish("{name}"); {calls}\n' for name in names)
@@ -752,7 +765,7 @@ def aliases_of_parameters(folder):
 
 @case('undeclared-parameter')
 def hundred_thousand_parameters_of_a_file(folder):
-    text = ''.join(f'    p{index}: 1\n' for index in range(100_000 // DIVISOR))
+    text = ''.join(f'    p{index}: 1\n' for index in range(70_000 // DIVISOR))
     configures(folder, f'n:\n  ros__parameters:\n{text}')
 
 
@@ -767,7 +780,16 @@ def patterns_of_parameters(folder):
 
 @case('bad-parameter-file')
 def documents_of_parameters(folder):
-    configures(folder, '---\n' * (300_000 // DIVISOR))
+    configures(folder, '---\n' * (145_000 // DIVISOR))
+
+
+@case('unreadable-file')
+def many_parameter_files(folder, count=8):
+    names = [f'p{index}.yaml' for index in range(count)]
+    write(folder, f'{HEAD}nodes: {{n: {{parameter_files: [{", ".join(names)}]}}}}\n')
+    text = ''.join(f'    p{index}: 1\n' for index in range(20_000))
+    for name in names:
+        write(folder, f'n:\n  ros__parameters:\n{text}', name)
 
 
 # Large systems, wrong throughout.

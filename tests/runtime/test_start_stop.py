@@ -481,6 +481,17 @@ def test_more_than_one_hang_up_is_no_reason_to_hurry(compose, wait_for):
     assert (compose.folder / 'stopped').exists()
 
 
+@pytest.mark.usefixtures('hears_hang_ups')
+def test_a_hang_up_at_the_same_time_is_no_reason_to_hurry(compose):
+    child = compose(LEAVING_A_FILE, LEAVE_A_FILE)
+    child.wait_until_ready()
+    for number in (signal.SIGSTOP, signal.SIGTERM, signal.SIGHUP):
+        child.send(number)
+
+    assert child.stop(signal.SIGCONT) == 0
+    assert (compose.folder / 'stopped').exists()
+
+
 def test_a_system_that_ignores_hang_ups_goes_on(compose):
     text = """
         version: 1
