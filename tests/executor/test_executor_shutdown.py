@@ -344,8 +344,6 @@ def test_the_executor_can_be_garbage_collected(context: Context) -> None:
     del executor
 
     def is_gone() -> bool:
-        import gc
-
         gc.collect()
         return gone() is None
 
