@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -46,12 +47,14 @@ def read_ignore_comments(source: SourceFile) -> list[IgnoreComment]:
     if not found:
         return []
     texts, end = _find_scalars(source)
-    return [
-        comment
-        for comment in found
-        if (place := _place(comment.span)) < end
-        and not any(start <= place < stop for start, stop in texts)
-    ]
+    starts = [start for start, _ in texts]
+    read = []
+    for comment in found:
+        place = _place(comment.span)
+        before = bisect_right(starts, place)
+        if place < end and not (before and place < texts[before - 1][1]):
+            read.append(comment)
+    return read
 
 
 def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
@@ -67,7 +70,7 @@ def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
 
 
 def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:
-    """Return where scalars begin and end, and where the text stops being YAML."""
+    """Return where scalars begin and end, in order, and where the text stops being YAML."""
     found = []
     try:
         for token in yaml.scan('\n'.join(source.lines), Loader=_Loader):

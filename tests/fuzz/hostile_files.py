@@ -455,7 +455,7 @@ def foreach_of_nothing(folder):
     write(folder, f'{HEAD}nodes:\n  n: {{foreach: {{{lists}}}, when: false}}\n')
 
 
-@case('bad-expression')
+@case('bad-foreach')
 def enormous_max_nodes(folder):
     foreach = '{foreach: {i: "{{ range(90000) }}"}}'
     write(folder, f'{HEAD}max_nodes: 1{"0" * 200}\nnodes: {{"n{{{{ i }}}}": {foreach}}}\n')
@@ -533,7 +533,7 @@ def deeper_than_python(folder):
 
 @case('broken-module')
 def too_many_parentheses(folder):
-    behaves(folder, f'def f(node):\n    return {"(" * 50_000}1{")" * 50_000}\n')
+    behaves(folder, f'def f(node):\n    return {"(" * 49_000}1{")" * 49_000}\n')
 
 
 @case()
@@ -675,7 +675,7 @@ def dotted_module(folder):
 
 @case('unknown-publisher')
 def thousands_of_unknown_publishers(folder):
-    lines = ''.join(f'    node.publish("p{index}", {{}})\n' for index in range(10_000 // DIVISOR))
+    lines = ''.join(f'    node.publish("p{index}", {{}})\n' for index in range(7_000 // DIVISOR))
     behaves(folder, f'def f(node):\n{lines}')
 
 
@@ -871,3 +871,56 @@ def many_large_modules(folder):
     write(folder, f'{HEAD}nodes:\n  n:\n   timers:\n{timers}')
     for index in range(40):
         write(folder, 'def f(node): pass\n' + 'x = [1, 2]\n' * 20_000, f'b{index}.py')
+
+
+@case('unread-module')
+def many_modules(folder):
+    timers = ''.join(f'    t{i}: {{period: 1, behaviour: "b{i}:f"}}\n' for i in range(12))
+    write(folder, f'{HEAD}nodes:\n  n:\n   timers:\n{timers}')
+    for index in range(12):
+        write(folder, 'def f(node): pass\n' + 'x = [1, 2]\n' * 5_600, f'b{index}.py')
+
+
+@case('unused-ignore')
+def comments_between_scalars(folder):
+    comment = '# composer: ignore[unused-parameter]'
+    text = ''.join(f'      p{index}: x {comment}\n' for index in range(20_000 // DIVISOR))
+    write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
+
+
+@case('unknown-rule')
+def comments_with_unknown_rules(folder):
+    comments = '# composer: ignore[a, b]\n' * (100_000 // DIVISOR)
+    write(folder, f'{HEAD}nodes: {{}}\n{comments}')
+
+
+@case('bad-expression')
+def different_expressions(folder):
+    text = ''.join(f'      p{index}: "{{{{ {index} + 1 }}}}"\n' for index in range(30_000))
+    write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
+
+
+@case('undeclared-parameter')
+def parameter_file_of_all(folder):
+    nodes = ''.join(f'  n{i}: {{parameter_files: [p.yaml]}}\n' for i in range(1000))
+    write(folder, f'{HEAD}nodes:\n{nodes}')
+    text = ''.join(f'    p{index}: 1\n' for index in range(20_000 // DIVISOR))
+    write(folder, f'/**:\n  ros__parameters:\n{text}', 'p.yaml')
+
+
+@case('unmatched-node-name')
+def wildcards(folder):
+    nodes = ''.join(f'  n{i}: {{parameter_files: [p.yaml]}}\n' for i in range(1000))
+    write(folder, f'{HEAD}nodes:\n{nodes}')
+    patterns = (f'/**/x{i}/*: {{ros__parameters: {{a: 1}}}}\n' for i in range(10_000 // DIVISOR))
+    write(folder, ''.join(patterns), 'p.yaml')
+
+
+@case('unreadable')
+def packages_of_interfaces(folder):
+    packages = ', '.join(f'odd{index}: odd' for index in range(60))
+    write(folder, f'{HEAD}interfaces: {{{packages}}}\nnodes: {{}}\n')
+    (folder / 'odd/msg').mkdir(parents=True)
+    fields = ''.join(f'int32 a{index}\n' for index in range(600))
+    for index in range(30):
+        write(folder, fields, f'odd/msg/M{index}.msg')
