@@ -78,7 +78,7 @@ class EntityRegistry:
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
         with self._lock:
-            # First this, then that: a node that is added in between makes it stale again.
+            # Before the nodes are listed: one that is added meanwhile makes it stale again.
             self.is_stale = False
             nodes = self._parts.executor.get_nodes()
             begin = monotonic()

@@ -26,8 +26,11 @@ from pathlib import Path
 RLIMIT_LOCKS = 10
 # Prints the stacks of Composer's threads.
 STACKS_SIGNAL = signal.SIGRTMAX
-# What Composer sends, beside the numbers of signals.
+# What Composer sends, beside the numbers of signals: a stop has begun or is over, or the process
+# goes on without the guardian.
 BEGUN, OVER, LEAVE = 101, 102, 103
+# A second one means that the user does not want to wait.
+_INTERRUPTS = {signal.SIGINT, signal.SIGTERM}
 
 _HURRY_SEC = 1.0
 # How long a process that ends may take from its last descriptor to its end.
@@ -101,15 +104,15 @@ class Guardian:
 
     def _take(self, byte: int) -> None:
         now = time.monotonic()
-        if byte in {signal.SIGINT, signal.SIGTERM}:
+        if byte in _INTERRUPTS:
             self._interrupts += 1
-        if byte in {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, BEGUN}:
+            if self._interrupts > 1:
+                self._deadline = min(self._deadline, now + _HURRY_SEC)
+        if byte in {*_INTERRUPTS, signal.SIGHUP, BEGUN}:
             self._deadline = min(self._deadline, now + self._stop_sec)
-        if byte in {signal.SIGINT, signal.SIGTERM} and self._interrupts > 1:
-            self._deadline = min(self._deadline, now + _HURRY_SEC)
-        if byte == OVER:
+        elif byte == OVER:
             self._deadline = now + self._exit_sec
-        if byte == LEAVE:
+        elif byte == LEAVE:
             self._has_left = True
 
     def _end_composer(self) -> None:

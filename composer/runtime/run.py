@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from composer import signals
 from composer.errors import ComposerError, ExitCode, StartError
+from composer.executor.after_fork import flush_output
 from composer.processes.guardian_client import GuardianClient
-from composer.runtime import forced_exit, forked_children
+from composer.runtime import forked_children
 from composer.runtime.logs import log_levels, system_logger
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
@@ -92,8 +94,14 @@ def run_system(
             system_logger.error(str(error))
         signals.end_with(code)
         if not ended:
-            forced_exit.leave(code)
+            _end_process(code)
     return code
+
+
+def _end_process(code: int) -> NoReturn:
+    """End the process at once, whatever its threads do."""
+    flush_output()
+    os._exit(code)
 
 
 @contextmanager
@@ -129,7 +137,7 @@ def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
         if number != _HANG_UP:
             if has_come:
                 stop.kill_processes()
-                forced_exit.leave(ExitCode.FAILED)
+                _end_process(ExitCode.FAILED)
             has_come = True
         if not stop.is_set:  # The system may stop by itself.
             is_early = number == signal.SIGINT and not stop.system_is_up
