@@ -2,6 +2,8 @@
 # With ROS=kilted, it is .venv-kilted, which has the wheels of Kilted instead of Jazzy's.
 CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
+# Most tests wait, for processes and discovery: two cores serve more processes of tests than two.
+WORKERS ?= 4
 VENV := .venv
 ifdef ROS_DISTRO
 EXTRAS := graph,test
@@ -20,7 +22,7 @@ up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal $(ARGS)
 
 check: $(VENV)/ready
 	$(BIN)/ruff check .

@@ -162,10 +162,17 @@ def _monitor(
 
 def _find_problem(rate: float, age_sec: float, minimum_rate: float, maximum_age: float) -> str:
     if age_sec > maximum_age:
-        return f'no message for {age_sec:.3g} s, at most {maximum_age:g} s expected'
+        age = _show_beside(maximum_age, age_sec)
+        return f'no message for {age} s, at most {maximum_age:g} s expected'
     if rate < minimum_rate:
-        return f'{rate:.3g} messages/s, at least {minimum_rate:g} expected'
+        shown = _show_beside(minimum_rate, rate)
+        return f'{shown} messages/s, at least {minimum_rate:g} expected'
     return ''
+
+
+def _show_beside(limit: float, value: float) -> str:
+    """Return a value with as many digits as tell it from its limit, but no fewer than three."""
+    return next(text for digits in range(3, 18) if float(text := f'{value:.{digits}g}') != limit)
 
 
 def _counter(node: Node, topic: str) -> _Counter:

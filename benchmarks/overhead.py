@@ -26,7 +26,6 @@ from composer.runtime.health.statistics import CallTimes
 from composer.runtime.system import System
 
 _MESSAGES = 2000
-_ROUNDS = 15
 _CALLS = 50_000
 _CALL_ROUNDS = 41
 _TIMEOUT_SEC = 60.0
@@ -97,7 +96,7 @@ class _Driver:
             self._done.set()
 
 
-def message_overhead(type_name: str = 'std_msgs/msg/Int32') -> dict[str, float]:
+def message_overhead(type_name: str, rounds: int) -> dict[str, float]:
     """Measure what Composer adds to: subscription, behaviour, publish.
 
     Returns:
@@ -114,14 +113,14 @@ def message_overhead(type_name: str = 'std_msgs/msg/Int32') -> dict[str, float]:
         executor.add_node(node)
     driver.wait_for_peers()
     # The first round warms up.
-    rounds = [(driver.run('composed'), driver.run('plain')) for _ in range(_ROUNDS + 1)][1:]
+    taken = [(driver.run('composed'), driver.run('plain')) for _ in range(1 + rounds)][1:]
     for node in (plain, driving):
         executor.remove_node(node)
         node.destroy_node()
     system.stop()
     return {
-        **_medians('', [(ours[0], theirs[0]) for ours, theirs in rounds]),
-        **_medians('_cpu', [(ours[1], theirs[1]) for ours, theirs in rounds]),
+        **_medians('', [(ours[0], theirs[0]) for ours, theirs in taken]),
+        **_medians('_cpu', [(ours[1], theirs[1]) for ours, theirs in taken]),
     }
 
 
@@ -194,6 +193,6 @@ def _medians(suffix: str, rounds: Sequence[tuple[float, float]]) -> dict[str, fl
 
 
 if __name__ == '__main__':
-    results = {'messages': {name: message_overhead(name) for name in ANSWERS}}
+    results = {'messages': {name: message_overhead(name, 15) for name in ANSWERS}}
     print(json.dumps({**results, 'measuring': measuring_overhead()}, indent=2), flush=True)
     os._exit(0)

@@ -90,8 +90,8 @@ def _round_trips() -> list[Row]:
 
 
 def _overhead() -> list[Row]:
-    ours = _side('overhead', 'composer', 0, 'composed_us')
-    by_hand = _side('overhead', 'composer', 0, 'plain_us')
+    ours = _side('overhead', 'composer', 15, 'composed_us')
+    by_hand = _side('overhead', 'composer', 15, 'plain_us')
     return [Row('us a message, more than by hand', ours, by_hand, more, '<=', 5)]
 
 

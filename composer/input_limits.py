@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 # take one megabyte.
 MAX_FILE_BYTES = 10_000_000
 MAX_LINES = 1_000_000
-# Keys and values of a file, with what its aliases stand for: five times those of such a system.
-MAX_VALUES = 300_000
+# Keys and values of a file, with what its aliases stand for; also of all that a system includes,
+# and of all its parameter files together: nearly three times those of such a system.
+MAX_VALUES = 150_000
 # Levels of data, aliases and merges; the walks over the data are safe from deep recursion by it.
 MAX_DEPTH = 100
 # Files that include each other, one in the other.
@@ -32,14 +33,17 @@ MAX_INCLUDE_DEPTH = 30
 MAX_ENTRIES = 10_000
 # Nobody reads more findings of a file.
 MAX_FINDINGS = 1000
-# Of a .msg, .srv or .action file, and of all of a package.
+# Of a .msg, .srv or .action file, and of all in the packages of a system; a file counts as some
+# lines more. All packages of ROS's common interfaces together have 200 files and 1,200 fields.
 MAX_DEFINITION_BYTES = 100_000
-MAX_PACKAGE_BYTES = 2_000_000
+MAX_BYTES_OF_DEFINITIONS = 2_000_000
+MAX_LINES_OF_DEFINITIONS = 40_000
+LINES_OF_DEFINITION = 5
 # Of a Python module: its words and signs are what its syntax tree grows with. Real code has nine
-# in a line, so that this is 20,000 lines; the modules of a system may have more together.
+# in a line, so that this is 10,000 lines; the modules of a system may have more together.
 MAX_MODULE_BYTES = 2_000_000
-MAX_MODULE_TOKENS = 200_000
-MAX_TOKENS_OF_MODULES = 500_000
+MAX_MODULE_TOKENS = 100_000
+MAX_TOKENS_OF_MODULES = 400_000
 
 _YAML = ('.yaml', '.yml')
 _KINDS = {

@@ -1,4 +1,4 @@
-"""Signals that come before a system runs, or after it has stopped: each ends the process at once.
+"""Signals before a system runs, or after it has stopped: they end the process at once.
 
 Python's `KeyboardInterrupt` would not do: raised while a module is imported, it can be swallowed
 there, or leave half of a module behind. While a system runs, `composer.runtime.run` handles them.
@@ -39,7 +39,7 @@ def end_at_signals() -> None:
 
 
 def end_with(code: int) -> None:
-    """Let later signals end the process with this exit code: its work is done."""
+    """Let later signals, but for SIGHUP, end the process with this exit code: its work is done."""
     global _code  # noqa: PLW0603 - a fact of the whole process
     _code = code
 
@@ -62,7 +62,10 @@ def interrupting() -> Iterator[None]:
 
 def _handle(number: int, _frame: FrameType | None) -> None:
     if _code is not None:
-        os._exit(_code)
+        # A terminal that is closed may send a second one; what is left to do takes no time.
+        if number != signal.SIGHUP:
+            os._exit(_code)
+        return
     if _interrupts:
         raise KeyboardInterrupt(number)
     if number == signal.SIGINT:

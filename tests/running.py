@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import count, islice
 from pathlib import Path
@@ -21,12 +22,15 @@ PATIENCE_SEC = 8.0
 # Domains of DDS whose ports lie below the range that Linux gives to outgoing connections.
 _FIRST_DOMAIN, _DOMAINS = 10, 91
 _domain_offsets = count(os.getpid() * 7)
+_peers = []
 
 
 def wait_for(condition, what):
-    """Return the first true result of `condition`; fail after a deadline."""
+    """Return the first true result of `condition`; fail after a deadline, or as a peer has."""
     deadline = time.monotonic() + DEADLINE_SEC
     while not (result := condition()):
+        for peer in _peers:
+            peer.check()
         if time.monotonic() > deadline:
             pytest.fail(f'in vain waited for {what}')
         time.sleep(0.01)
@@ -183,7 +187,11 @@ class Composing:
 
 
 class Peer:
-    """A plain rclpy node in a context of its own, spun by a thread."""
+    """A plain rclpy node in a context of its own, spun by a thread.
+
+    rclpy's executors raise where a second thread creates or destroys an action client, or destroys
+    a publisher or a subscription, while they spin: that thread does it, see `run`.
+    """
 
     def __init__(self, domain_id):
         import rclpy
@@ -194,20 +202,34 @@ class Peer:
         self.node = rclpy.create_node('peer', context=self.context, use_global_arguments=False)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin)
         self._spinning = True
-        self._thread.start()
+        self._thread = ThreadPoolExecutor(1)
+        self._end = self._thread.submit(self._spin)
+        _peers.append(self)
+
+    def run(self, function, /, *arguments, **keywords):
+        """Call a function in the thread that spins, and return what it returns."""
+        done = Future()
+        task = self._executor.create_task(function, *arguments, **keywords)
+        task.add_done_callback(done.set_result)
+        wait([done, self._end], DEADLINE_SEC, FIRST_COMPLETED)
+        self.check()
+        return done.result(0).result()
+
+    def check(self):
+        """Raise the error that ended the thread that spins, if one did."""
+        if self._end.done():
+            self._end.result()
 
     def listen(self, message_class, topic, qos=10):
         """Return a list that grows by each message."""
         heard = []
-        self.node.create_subscription(message_class, topic, heard.append, qos)
-        self._executor.wake()
+        self.run(self.node.create_subscription, message_class, topic, heard.append, qos)
         return heard
 
     def advertise(self, message_class, topic, qos=10):
         """Return a publisher that has met its first subscription."""
-        publisher = self.node.create_publisher(message_class, topic, qos)
+        publisher = self.run(self.node.create_publisher, message_class, topic, qos)
         wait_for(publisher.get_subscription_count, f'a subscription to {topic}')
         return publisher
 
@@ -218,7 +240,7 @@ class Peer:
 
     def call_all(self, service_class, names, /, **fields):
         """Call several services at the same time and return their responses."""
-        clients = [self.node.create_client(service_class, name) for name in names]
+        clients = [self.run(self.node.create_client, service_class, name) for name in names]
         for client in clients:
             assert client.wait_for_service(DEADLINE_SEC), f'there is no {client.srv_name}'
         request = service_class.Request(**fields)
@@ -235,10 +257,9 @@ class Peer:
                         calls[index] = client.call_async(request)
             return all(call.done() for call in calls)
 
-        self._executor.wake()
         wait_for(all_done, f'the responses of {names}')
         for client in clients:
-            self.node.destroy_client(client)
+            self.run(self.node.destroy_client, client)
         return [call.result() for call in calls]
 
     def meet_action_server(self, name):
@@ -256,11 +277,13 @@ class Peer:
     def close(self):
         self._spinning = False
         self._executor.wake()
-        self._thread.join()
+        self._thread.shutdown()
         self._executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
         self.context.destroy()
+        _peers.remove(self)
+        self.check()
 
     def _spin(self):
         while self._spinning:

@@ -23,7 +23,7 @@ from composer.checks.connections.unconnected import check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.environment import check_environment
-from composer.checks.ignore_comments import apply_ignore_comments
+from composer.checks.ignore_comments import IgnoreComments
 from composer.checks.left_out import check_left_out
 from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
@@ -86,6 +86,8 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_deadlocks,
     check_typos,
 )
+# One more than is shown, as a sign that there are more.
+_ENOUGH = MAX_FINDINGS + 1
 _MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
 
 
@@ -120,10 +122,11 @@ def check_in_context(
     found: list[Diagnostic] = []
     declared: Sequence[Diagnostic] = ()
     unchecked: set[Need] = set() if further else {'import'}
+    comments = IgnoreComments(system.positions.source)
     if context:
         declared = context.interfaces.findings
         unchecked |= set() if context.catalogue.available else {'interfaces'}
-        found += _apply_rules(context)
+        found += _apply_rules(context, comments)
     if context and further:
         samples = _by_line(system.sampled)
         more = further(context, found)
@@ -131,9 +134,9 @@ def check_in_context(
     # What several entries share through an alias, or a file included twice, is wrong once.
     every = [*system.diagnostics, *declared, *found]
     once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
-    heard = apply_ignore_comments(
-        once.values(), system.positions.source, None if system.diagnostics else unchecked
-    )
+    heard = [each for each in once.values() if not comments.silence(each)]
+    knows_all = not system.diagnostics and len(heard) < _ENOUGH
+    heard += islice(comments.check(unchecked if knows_all else None), _ENOUGH)
     return _first_of(say_once(sorted(heard, key=lambda finding: finding.sort_key), system))
 
 
@@ -144,22 +147,29 @@ def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
     return [*shown[:-1], replace(shown[-1], help=_MORE)]
 
 
-def _apply_rules(context: CheckContext) -> Iterator[Diagnostic]:
+def _apply_rules(context: CheckContext, comments: IgnoreComments) -> Iterator[Diagnostic]:
     samples = _by_line(context.system.sampled)
     for rule in (*NODE_RULES, *SYSTEM_RULES):
-        yield from _apply(rule, context, samples)
+        yield from _apply(rule, context, samples, comments)
     if context.system.unused is not None:
         # What is left out this time may be there the next.
         other = replace(context, spec=context.system.unused)
         samples = _by_line((*context.system.sampled, *context.system.sampled_unused))
         for rule in NODE_RULES:
-            yield from _apply(rule, other, samples)
+            yield from _apply(rule, other, samples, comments)
 
 
-def _apply(rule: CheckRule, context: CheckContext, samples: SpansByLine) -> Iterator[Diagnostic]:
-    findings = (each for each in rule(context) if not _hangs_on_samples(each, samples))
-    # One more, as a sign that there are more.
-    yield from islice(findings, MAX_FINDINGS + 1)
+def _apply(
+    rule: CheckRule, context: CheckContext, samples: SpansByLine, comments: IgnoreComments
+) -> Iterator[Diagnostic]:
+    room = _ENOUGH
+    for each in rule(context):
+        if _hangs_on_samples(each, samples):
+            continue
+        yield each
+        room -= not comments.silence(each)
+        if not room:
+            return
 
 
 def _by_line(spans: Iterable[Span]) -> SpansByLine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from composer.ament import ament_prefixes
@@ -47,6 +48,8 @@ _CHOICES = {
     'ROS_SECURITY_STRATEGY': ('Enforce', 'Permissive'),
 }
 _LONGEST_PEER = 255
+# What C reads as a number: no digits of other scripts, and not thousands of them.
+_NUMBER = re.compile('[0-9]{1,9}')
 
 
 def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
@@ -79,7 +82,7 @@ def find_environment_problems(
 
 def _find_bad_values(variables: Mapping[str, str]) -> Iterator[tuple[str, str, str | None]]:
     domain = variables.get('ROS_DOMAIN_ID')
-    if domain and not (domain.isdecimal() and int(domain) <= _MAX_DOMAIN):
+    if domain and not (_NUMBER.fullmatch(domain) and int(domain) <= _MAX_DOMAIN):
         message = f'ROS_DOMAIN_ID is a number from 0 to {_MAX_DOMAIN}, not {domain!r}'
         yield 'ROS_DOMAIN_ID', message, None
     for name, choices in _CHOICES.items():

@@ -2,96 +2,101 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-from composer.diagnostics import diagnostic_at
+from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
 from composer.rules import list_rule_names, load_rule
 from composer.spelling import suggest
 from composer.yaml_text.comments import read_ignore_comments
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterator
 
-    from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.rules import Need
     from composer.yaml_text.comments import IgnoreComment
 
 _READ = ('.yaml', '.yml', '.py')
+# A file, a line of it, and a rule.
+_Place: TypeAlias = tuple[SourceFile, int, str]
 
 
-def apply_ignore_comments(
-    findings: Iterable[Diagnostic], source: SourceFile, unchecked: Collection[Need] | None
-) -> list[Diagnostic]:
-    """Return the findings that no comment silences, and the findings about the comments.
+class IgnoreComments:
+    """The comments that silence findings, of the file that is checked and of those it includes.
 
-    Args:
-        source: The file that was checked; findings in files that it includes count too.
-        unchecked: What could not be looked at, so that nobody knows whether a comment about it
-            is needed; `None` if not all findings are known.
+    Attributes:
+        source: The file that is checked. The comments of others are read with the first finding
+            in them.
     """
-    found = list(findings)
-    comments = _read_comments(found, source)
-    return [
-        *(finding for finding in found if not _is_silenced(finding, comments)),
-        *(finding for comment in comments for finding in _check(comment, found, unchecked)),
-    ]
 
+    def __init__(self, source: SourceFile) -> None:
+        self._comments: dict[SourceFile, list[IgnoreComment]] = {}
+        self._places: set[_Place] = set()
+        self._met: set[_Place] = set()
+        self._read(source)
 
-def leave_out_silenced(findings: list[Diagnostic], source: SourceFile) -> list[Diagnostic]:
-    """Return the findings that no comment silences."""
-    comments = _read_comments(findings, source)
-    return [finding for finding in findings if not _is_silenced(finding, comments)]
+    def silence(self, finding: Diagnostic) -> bool:
+        """Return whether a comment silences a finding."""
+        span = finding.span
+        if span is None:
+            return False
+        if span.source.name.endswith(_READ):
+            self._read(span.source)
+        place = (span.source, span.line, finding.rule)
+        if place not in self._places:
+            return False
+        self._met.add(place)
+        return _may_be_silenced(span.source, finding.rule)
 
+    def check(self, unchecked: Collection[Need] | None) -> Iterator[Diagnostic]:
+        """Yield the findings about the comments, when `silence` was asked about all others.
 
-def _read_comments(findings: list[Diagnostic], source: SourceFile) -> list[IgnoreComment]:
-    spans = [finding.span for finding in findings if finding.span]
-    sources = {source: None} | {
-        span.source: None for span in spans if span.source.name.endswith(_READ)
-    }
-    return [comment for each in sources for comment in read_ignore_comments(each)]
+        Args:
+            unchecked: What could not be looked at, so that nobody knows whether a comment about
+                it is needed; `None` if not all findings are known.
+        """
+        for comments in self._comments.values():
+            for comment in comments:
+                if not comment.rules:
+                    yield _warn(
+                        comment.span,
+                        'unused-ignore',
+                        'the comment names no rule',
+                        'write ignore[rule], with the name of the rule',
+                    )
+                for named in comment.rules:
+                    yield from self._check(named, unchecked)
 
+    def _read(self, source: SourceFile) -> None:
+        if source not in self._comments:
+            self._comments[source] = read_ignore_comments(source)
+            self._places |= {
+                _place(named) for each in self._comments[source] for named in each.rules
+            }
 
-def _is_silenced(finding: Diagnostic, comments: list[IgnoreComment]) -> bool:
-    return any(
-        named.text == finding.rule and _is_beside(finding, named)
-        for comment in comments
-        for named in comment.rules
-    ) and (load_rule(finding.rule).ignorable or _is_in_python(finding))
-
-
-def _is_in_python(finding: Diagnostic) -> bool:
-    """Return whether a finding is about code, with which a system can start."""
-    return finding.file.endswith('.py')
-
-
-def _is_beside(finding: Diagnostic, comment: Span) -> bool:
-    span = finding.span
-    return span is not None and span.source is comment.source and span.line == comment.line
-
-
-def _check(
-    comment: IgnoreComment, findings: list[Diagnostic], unchecked: Collection[Need] | None
-) -> Iterator[Diagnostic]:
-    if not comment.rules:
-        yield _warn(
-            comment.span,
-            'unused-ignore',
-            'the comment names no rule',
-            'write ignore[rule], with the name of the rule',
-        )
-    for named in comment.rules:
-        here = [f for f in findings if f.rule == named.text and _is_beside(f, named)]
-        if named.text not in list_rule_names():
+    def _check(self, named: Span, unchecked: Collection[Need] | None) -> Iterator[Diagnostic]:
+        rule = named.text
+        if rule not in list_rule_names():
             advice = "'composer explain' lists them"
-            help_text = suggest(named.text, list_rule_names(), otherwise=advice)
-            message = f"there is no rule '{named.text}'"
-            yield _warn(named, 'unknown-rule', message, help_text or advice)
-        elif here and not (load_rule(named.text).ignorable or _is_in_python(here[0])):
-            message = f"'{named.text}' cannot be silenced: nothing can run until it is fixed"
-            yield _warn(named, 'unused-ignore', message, 'fix the error and remove the comment')
-        elif not here and unchecked is not None and load_rule(named.text).needs not in unchecked:
-            message = f"there is no '{named.text}' in this line to ignore"
+            help_text = suggest(rule, list_rule_names(), otherwise=advice)
+            yield _warn(named, 'unknown-rule', f"there is no rule '{rule}'", help_text or advice)
+        elif _place(named) in self._met:
+            if not _may_be_silenced(named.source, rule):
+                message = f"'{rule}' cannot be silenced: nothing can run until it is fixed"
+                yield _warn(
+                    named, 'unused-ignore', message, 'fix the error and remove the comment'
+                )
+        elif unchecked is not None and load_rule(rule).needs not in unchecked:
+            message = f"there is no '{rule}' in this line to ignore"
             yield _warn(named, 'unused-ignore', message, 'remove it')
+
+
+def _place(named: Span) -> _Place:
+    return named.source, named.line, named.text
+
+
+def _may_be_silenced(source: SourceFile, rule: str) -> bool:
+    """Return whether a comment may silence a rule; with wrong code, a system can start."""
+    return load_rule(rule).ignorable or source.name.endswith('.py')
 
 
 def _warn(span: Span, rule: str, message: str, help_text: str) -> Diagnostic:

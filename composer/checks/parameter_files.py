@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING
 
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
+from composer.input_limits import MAX_VALUES
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.ros_parameters.file_reader import read_parameter_file
-from composer.ros_parameters.node_patterns import matches_pattern
-from composer.ros_parameters.overrides import find_overrides
+from composer.ros_parameters.node_patterns import PatternIndex
+from composer.ros_parameters.overrides import MergedFiles
 from composer.spelling import count_edits, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
@@ -45,11 +46,8 @@ class _User:
     full_name: str | None
     files: tuple[str, ...]
     node: NodeSpec | None
-    overrides: dict[str, ParameterEntry]
+    overrides: Mapping[str, ParameterEntry]
     is_run: bool
-
-    def may_take(self, entry: ParameterEntry) -> bool:
-        return self.full_name is not None and matches_pattern(entry.pattern, self.full_name)
 
 
 def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
@@ -63,9 +61,10 @@ def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
     for path, file in library.files.items():
         of_file = [user for user in users if path in user.files]
         if all(user.full_name is not None for user in of_file):
+            takers = _find_takers(context, file, of_file)
             if not _may_miss_users(context):
-                yield from _check_names(file, of_file)
-            yield from _check_entries(context, path, file, of_file)
+                yield from _check_names(file, of_file, takers)
+            yield from _check_entries(path, file, takers)
     yield from _check_values(context, users)
 
 
@@ -74,8 +73,10 @@ class _Library:
 
     def __init__(self, context: CheckContext) -> None:
         self.files: dict[str, ParameterFile] = {}
+        self._merged: dict[tuple[str, ...], MergedFiles] = {}
         self.findings: list[Diagnostic] = []
         self._context = context
+        self._values_left = MAX_VALUES
 
     def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
         """Read the files of a node or process, and yield those that exist."""
@@ -89,7 +90,8 @@ class _Library:
                 )
                 continue
             if path not in self.files:
-                self.files[path] = read_parameter_file(Path(path))
+                self.files[path] = read_parameter_file(Path(path), self._values_left)
+                self._values_left -= min(self.files[path].values, self._values_left)
                 self.findings += [each for each in self.files[path].findings if each.span]
             unreadable = [each for each in self.files[path].findings if each.span is None]
             self.findings += [
@@ -104,6 +106,12 @@ class _Library:
             if not unreadable:
                 yield path
 
+    def merge(self, paths: tuple[str, ...]) -> MergedFiles:
+        """Return what files say together; they have been read."""
+        if paths not in self._merged:
+            self._merged[paths] = MergedFiles(self.files[path] for path in paths)
+        return self._merged[paths]
+
 
 def _help_for_missing(path: Path) -> str | None:
     return suggest(path.name, list_neighbours(path), 'there are')
@@ -116,8 +124,7 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
         if not files:
             continue
         name = _full_name(owner)
-        read = [library.files[path] for path in files]
-        overrides = find_overrides(read, name) if name else {}
+        overrides = library.merge(files).find_overrides(name) if name else {}
         node = owner if isinstance(owner, NodeSpec) else None
         yield _User(name, files, node, overrides, is_run)
 
@@ -149,13 +156,76 @@ _DEPTH = 2
 _DECIDING = ('namespace', 'parameter_files')
 
 
-def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:
+class _Takers:
+    """The users of a file that one of its names of nodes matches."""
+
+    def __init__(self, context: CheckContext) -> None:
+        self._context = context
+        self._users: list[_User] = []
+        self._names: set[str] = set()
+        self._declaring: dict[str, list[_User]] = {}
+        # Those of which nobody knows what they declare.
+        self._open: list[_User] = []
+
+    def add(self, user: _User) -> None:
+        self._users.append(user)
+        self._names.add(str(user.full_name))
+        if user.node is None or self._context.was_dropped((*user.node.path, 'parameters')):
+            self._open.append(user)
+            return
+        for name in user.node.parameters:
+            self._declaring.setdefault(name, []).append(user)
+
+    def list_declaring(self, name: str) -> list[_User]:
+        """Return the users that may declare a parameter."""
+        if name in OF_EVERY_NODE:
+            return self._users
+        known = [*self._open, *self._declaring.get(name, ())]
+        return known or [
+            user
+            for user in self._users
+            if user.node and self._context.was_dropped((*user.node.path, 'parameters', name))
+        ]
+
+    def explain_undeclared(self, entry: ParameterEntry) -> Diagnostic:
+        """Return the finding for a parameter that none of them declares."""
+        is_one = len(self._names) == 1
+        who = f"node '{min(self._names)}'" if is_one else f'none of {len(self._names)} nodes'
+        negation = 'no' if is_one else 'a'
+        return diagnostic_at(
+            entry.key_span,
+            'undeclared-parameter',
+            f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
+            help=suggest(
+                entry.name,
+                self._declaring,
+                'declared are',
+                "declare it under 'parameters:' of the node",
+            ),
+        )
+
+
+def _find_takers(
+    context: CheckContext, file: ParameterFile, users: list[_User]
+) -> dict[str, _Takers]:
+    """Return who takes what stands below each name of nodes in a file."""
+    index = PatternIndex(pattern for pattern, _ in file.patterns)
+    takers: dict[str, _Takers] = {}
+    for user in users:
+        for pattern in index.find(str(user.full_name)):
+            takers.setdefault(pattern, _Takers(context)).add(user)
+    return takers
+
+
+def _check_names(
+    file: ParameterFile, users: list[_User], takers: dict[str, _Takers]
+) -> Iterator[Diagnostic]:
     names = [user.full_name for user in users if user.full_name]
     may_have_others = any(user.node is None for user in users)
-    patterns = [pattern for pattern, _ in file.patterns]
-    unused = [name for name in names if not any(matches_pattern(each, name) for each in patterns)]
+    index = PatternIndex(pattern for pattern, _ in file.patterns)
+    unused = [name for name in names if not any(index.find(name))]
     for pattern, span in file.patterns:
-        if not any(matches_pattern(pattern, name) for name in names):
+        if pattern not in takers:
             if may_have_others and not _is_misspelt(pattern, names, unused):
                 continue
             yield diagnostic_at(
@@ -180,40 +250,16 @@ def _is_misspelt(pattern: str, names: list[str], unused: list[str]) -> bool:
 
 
 def _check_entries(
-    context: CheckContext, path: str, file: ParameterFile, users: list[_User]
+    path: str, file: ParameterFile, takers: dict[str, _Takers]
 ) -> Iterator[Diagnostic]:
     for entry in file.entries:
-        takers = [user for user in users if user.may_take(entry)]
-        if not takers:
+        if entry.pattern not in takers:
             continue
-        declaring = [user for user in takers if _may_declare(context, user, entry.name)]
+        declaring = takers[entry.pattern].list_declaring(entry.name)
         if not declaring:
-            yield _explain_undeclared(entry, takers)
+            yield takers[entry.pattern].explain_undeclared(entry)
         elif finding := _find_overridden(path, entry, declaring):
             yield finding
-
-
-def _may_declare(context: CheckContext, user: _User, name: str) -> bool:
-    node = user.node
-    if node is None or name in node.parameters or name in OF_EVERY_NODE:
-        return True
-    section = (*node.path, 'parameters')
-    return any(context.was_dropped(path) for path in ((*section, name), section))
-
-
-def _explain_undeclared(entry: ParameterEntry, takers: list[_User]) -> Diagnostic:
-    declared = {name for user in takers if user.node for name in user.node.parameters}
-    names = sorted({str(user.full_name) for user in takers})
-    who = f"node '{names[0]}'" if len(names) == 1 else f'none of {len(names)} nodes'
-    negation = 'no' if len(names) == 1 else 'a'
-    return diagnostic_at(
-        entry.key_span,
-        'undeclared-parameter',
-        f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
-        help=suggest(
-            entry.name, declared, 'declared are', "declare it under 'parameters:' of the node"
-        ),
-    )
 
 
 def _find_overridden(
@@ -259,7 +305,10 @@ def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Dia
     for user in users:
         if user.node is None or not user.is_run:
             continue
-        for name, entry in user.overrides.items():
+        for name in (*user.node.parameters, *OF_EVERY_NODE):
+            entry = user.overrides.get(name)
+            if entry is None:
+                continue
             problem, help_text = _find_problem(user.node.parameters.get(name), entry)
             if problem is None or (id(entry), problem) in seen:
                 continue

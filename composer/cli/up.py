@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks.checker import check_in_context, create_context
-from composer.checks.ignore_comments import leave_out_silenced
+from composer.checks.ignore_comments import IgnoreComments
 from composer.cli.file_selection import load_given
 from composer.cli.import_check import import_behaviours
 from composer.cli.output import show_findings
@@ -100,7 +100,8 @@ def _run(
     ):
         functions, findings = import_behaviours(context)
         # The check has already reported comments that silence nothing.
-        if _report(leave_out_silenced(findings, system.positions.source)):
+        comments = IgnoreComments(system.positions.source)
+        if _report([each for each in findings if not comments.silence(each)]):
             return ExitCode.FAILED
         return run_system(
             extend_processes(context.spec, prefixes),

@@ -23,14 +23,13 @@ The way of a message:
 5. The source takes the message and calls the callback (`event_source`, `entity_sources`,
    `waitable_sources`).
 6. If the callback awaits something, the rest of it comes back through the scheduler as a task
-   (`event_loop`).
+   (`tasks`).
 
 Beside that way: `deadlines` makes timers ready, `qos_events` QoS events, `wait_set_thread` all
 else that is not announced, and `entity_registry` keeps the sources in step with the entities of
-the nodes.
-`spinner` puts these parts together for `composer_executor`, whose methods are rclpy's, and
-`after_fork` says what a forked child does with all this. A guest of theirs is `switch_interval`:
-how long a computing callback may hold up the others.
+the nodes. `spinner` puts these parts together for `composer_executor`, whose methods are rclpy's.
+`after_fork` says what a forked child does with all this, and `switch_interval` how long a
+computing callback may hold up the others.
 
 Locks are held for moments, and nothing is called under them but the next in this order:
 `entity_registry`, `wait_set_thread`, `worker_threads`, `scheduler`, `deadlines`, `event_fds`.

@@ -45,10 +45,15 @@ def end_child(error: BaseException | None = None) -> NoReturn:
     # The child may have broken anything; it must end all the same.
     with suppress(Exception):
         code = _exit_code(error)
+    flush_output()
+    os._exit(code & 0xFF)
+
+
+def flush_output() -> None:
+    """Write the buffers of standard output and error, if that is still possible."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(Exception):
             stream.flush()
-    os._exit(code & 0xFF)
 
 
 def _exit_code(error: BaseException | None) -> int:

@@ -15,10 +15,9 @@ from rclpy.task import Future, Task
 
 from composer.executor.after_fork import RefusedSpinner
 from composer.executor.deadlines import DelayedCall
-from composer.executor.event_loop import ImmediateCallback
-from composer.executor.scheduler import ExecutorTask, ScheduledTask
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
+from composer.executor.tasks import ExecutorTask, ImmediateCallback, ScheduledTask
 
 _MAX_THREADS = 256
 _NEVER_CALLED = (
@@ -139,7 +138,7 @@ class ComposerExecutor(MultiThreadedExecutor):
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Have `observer` told of what comes to a subscription or a timer of `node`.
 
-        It is a guest: a `QueueObserver` or a `TickObserver` (`sources.entity_sources`).
+        It is a `QueueObserver` or a `TickObserver` (`sources.entity_sources`).
         """
         self._spinner.registry.observe(node, entity, observer)
 

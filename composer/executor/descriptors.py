@@ -148,6 +148,7 @@ class TimerFd:
 
     def __init__(self, *, blocking: bool) -> None:
         self._blocking = blocking
+        self.fd = -1
         self.fd = self._create()
 
     def _create(self) -> int:

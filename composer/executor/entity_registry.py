@@ -31,6 +31,8 @@ from composer.executor.sources.waitable_sources import (
 from composer.executor.wait_set_thread import WaitSetThread
 
 _REST_FACTOR = 4
+# rclpy 9 adds an action client to its node first, and gives it a lock last.
+_IS_LOCKED_LAST = '_lock' in ActionClient.__init__.__code__.co_names
 
 
 class _NodeEntities:
@@ -76,14 +78,18 @@ class EntityRegistry:
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
         with self._lock:
-            # First this, then that: a node that is added in between makes it stale again.
+            # Before the nodes are listed: one that is added meanwhile makes it stale again.
             self.is_stale = False
             nodes = self._parts.executor.get_nodes()
             begin = monotonic()
             for node in self._nodes.keys() - set(nodes):
                 self.drop(node)
-            for node in nodes:
-                self._refresh_node(node)
+            try:
+                for node in nodes:
+                    self._refresh_node(node)
+            except BaseException:
+                self.is_stale = True  # Whoever spins on tries again.
+                raise
             end = monotonic()
             self._rest_until = end + _REST_FACTOR * (end - begin)
 
@@ -124,7 +130,6 @@ class EntityRegistry:
         )
         if lists == seen.lists:
             return
-        seen.lists = lists
         classes = (
             TimerSource,
             SubscriptionSource,
@@ -137,7 +142,8 @@ class EntityRegistry:
             for source_class, entities in zip(classes, lists, strict=False)
             for entity in entities
         }
-        wanted.update((waitable, _class_for(waitable)) for waitable in lists[-1])
+        half_made = set(filter(_is_half_made, lists[-1]))
+        wanted.update((each, _class_for(each)) for each in lists[-1] if each not in half_made)
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
         for entity, source_class in wanted.items():
@@ -147,6 +153,10 @@ class EntityRegistry:
                     source.observer = self._observers.get(entity)
                     self._open(source)
                     seen.sources[entity] = source
+        if half_made:
+            self.is_stale = True
+        else:
+            seen.lists = lists
 
     def _open(self, source: EventSource) -> None:
         source.open()
@@ -166,6 +176,11 @@ def _class_for(waitable: Any) -> type[EventSource]:
         is_seldom = is_checked_seldom(waitable.callback)
         return SeldomQosEventSource if is_seldom else QosEventSource
     return WaitableSource
+
+
+def _is_half_made(entity: Any) -> bool:
+    """Tell whether another thread is still making `entity`."""
+    return _IS_LOCKED_LAST and isinstance(entity, ActionClient) and not hasattr(entity, '_lock')
 
 
 def _is_waited_for(source: EventSource) -> TypeGuard[WaitSetSource]:

@@ -285,7 +285,7 @@ class EventFds:
         except OSError:
             if not self.by_number:
                 raise
-            # Slow, but right.
+            # Without descriptors, any is shared: slow for its listeners, but none is deaf.
             event_fd = min(self.by_number.values(), key=lambda event_fd: len(event_fd.listeners))
             if event_fd.is_shared:
                 return event_fd

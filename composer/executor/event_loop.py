@@ -1,29 +1,26 @@
-"""The leader's loop, and how what it finds is executed: callbacks, coroutines and tasks.
+"""The leader's loop, and how what it finds is executed: callbacks, coroutines and tasks."""
 
-`await future` in rclpy is a generator that yields until the future is done; rclpy's executors
-resume it over and over. Here the future tells when it is done. A coroutine that yields for another
-reason is resumed at once, then at growing intervals; so is one that awaits a future of an executor
-that may never tell, as it calls nobody while it does not spin.
-"""
-
-import types
 from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic
 from typing import Any
 
-from rclpy.task import Future
-
 from composer.executor.after_fork import end_child
 from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
-from composer.executor.scheduler import ExecutorTask, ScheduledTask, Session
+from composer.executor.scheduler import Session
 from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
+from composer.executor.tasks import (
+    ExecutorTask,
+    ImmediateCallback,
+    ScheduledTask,
+    awaited_future,
+    tells_at_once,
+)
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
 
 _RETRY_SEC = 0.001
 _LINGER_SEC = 0.05
-_FUTURE_AWAIT = Future.__await__.__code__
 
 
 class EventLoop:
@@ -284,8 +281,8 @@ class CallbackRunner:
         self._executor.report(error)
 
     def _suspend(self, task: ScheduledTask) -> None:
-        future = _awaited_future(task.task)
-        if future is not None and _tells_at_once(future):
+        future = awaited_future(task.task)
+        if future is not None and tells_at_once(future):
             future.add_done_callback(ImmediateCallback(lambda: self._scheduler.add_task(task)))
             return
         pause_sec = task.next_pause()
@@ -299,33 +296,3 @@ class CallbackRunner:
         with suppress(KeyError):
             self._paused.remove(task)
             self._scheduler.add_task(task)
-
-
-class ImmediateCallback:
-    """A done callback of a future that the executor calls at once, in whichever thread it is."""
-
-    __slots__ = ('_function',)
-
-    def __init__(self, function: Callable[[], None]) -> None:
-        self._function = function
-
-    def __call__(self, _: Any) -> None:
-        """Call the function, whichever future is done."""
-        self._function()
-
-
-def _tells_at_once(future: Any) -> bool:
-    """Tell whether `future` calls an `ImmediateCallback` when it is done."""
-    executor = future._executor()  # noqa: SLF001
-    return executor is None or hasattr(executor, 'calls_immediately')
-
-
-def _awaited_future(task: Any) -> Any:
-    """Return the rclpy future that the coroutine of `task` awaits, None if not known."""
-    awaiting = task._handler  # noqa: SLF001
-    while awaiting is not None:
-        if isinstance(awaiting, types.GeneratorType) and awaiting.gi_code is _FUTURE_AWAIT:
-            frame = awaiting.gi_frame
-            return None if frame is None else frame.f_locals.get('self')
-        awaiting = getattr(awaiting, 'cr_await', None) or getattr(awaiting, 'gi_yieldfrom', None)
-    return None

@@ -34,9 +34,10 @@ class EventPoller:
         self.event_fds = EventFds(self._epoll)
         self._waiting_threads: set[int] = set()
         self._next_check = 0.0
+        self.deadlines = Deadlines(self.wake)
+        # Last, for the others close themselves if there are no more descriptors.
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._epoll.register(self._wake_fd, select.EPOLLIN)
-        self.deadlines = Deadlines(self.wake)
         self._epoll.register(self.deadlines.timer.fd, select.EPOLLIN)
 
     def __del__(self) -> None:

@@ -13,15 +13,12 @@ from weakref import WeakKeyDictionary
 
 import rclpy.timer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.exceptions import InvalidHandle
-from rclpy.task import Task
 
 from composer.executor.event_fds import UNKNOWN_COUNT
+from composer.executor.tasks import ScheduledTask
 
 # rclpy 9, which brought `TimerInfo`, executes the oldest task first.
 _OLDEST_TASK_FIRST = hasattr(rclpy.timer, 'TimerInfo')
-_MIN_PAUSE_SEC = 0.0005
-_MAX_PAUSE_SEC = 0.01
 
 
 class Group:
@@ -89,45 +86,6 @@ class QueuedSource(Protocol):
     queued: bool
     pending: int
     revision: int
-
-
-class ExecutorTask(Task):
-    """A task that the executor resumes; since rclpy 7.1.9, other tasks arrange that themselves."""
-
-    def _add_resume_callback(self, future: Any, executor: Any) -> None:
-        """Leave it to the executor."""
-
-
-class ScheduledTask:
-    """A task, or the rest of a callback that awaits something.
-
-    `source` is the entity whose callback it is; it is resumed only while the executor has `node`.
-    """
-
-    __slots__ = ('node', 'pause_sec', 'slow', 'source', 'task')
-
-    def __init__(self, task: Any, source: Any = None) -> None:
-        self.task = task
-        self.source = source
-        self.node = None if source is None else source.node
-        self.pause_sec = 0.0
-        self.slow = False
-
-    def is_orphan(self) -> bool:
-        """Tell whether its node has been destroyed."""
-        if self.node is None:
-            return False
-        try:
-            with self.node.handle:
-                return False
-        except InvalidHandle:
-            return True
-
-    def next_pause(self) -> float:
-        """Return how long to wait before a coroutine is resumed that awaits nothing known."""
-        pause = self.pause_sec
-        self.pause_sec = min(_MAX_PAUSE_SEC, max(_MIN_PAUSE_SEC, 2 * pause))
-        return pause
 
 
 class Scheduler:

@@ -6,6 +6,7 @@ and in all below it; an entry that is left out is still held against the schema.
 
 from __future__ import annotations
 
+import sys
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -66,7 +67,7 @@ def expand_document(
 def _limit_of(data: Mapping[str, Any]) -> int:
     limit = data.get('max_nodes')
     # The schema reports any other value.
-    return limit if type(limit) is int and limit > 0 else MAX_ENTRIES
+    return min(limit, sys.maxsize - 1) if type(limit) is int and limit > 0 else MAX_ENTRIES
 
 
 class _TooManyError(Exception):

@@ -84,6 +84,7 @@ class Sandbox(SandboxedEnvironment):
         self.globals: dict[str, Any] = {'range': self.globals['range'], **FUNCTIONS}
         self.filters = {name: self.filters[name] for name in sorted(_FILTERS)}
         self._parsed: dict[str, nodes.Expr] = {}
+        self._names: dict[str, frozenset[str]] = {}
         self._context = new_context(self, None, {}, globals=self.globals)
 
     def parse_expression(self, code: str) -> nodes.Expr:
@@ -106,21 +107,23 @@ class Sandbox(SandboxedEnvironment):
         if not parser.stream.eos:
             message = 'unexpected text after the expression'
             raise TemplateSyntaxError(message, parser.stream.current.lineno)
-        expression.set_environment(self)
         return expression
 
-    def names_in(self, code: str) -> set[str]:
+    def names_in(self, code: str) -> frozenset[str]:
         """Return the names that an expression uses.
 
         Raises:
             TemplateError: It cannot be read.
         """
-        expression = self.parse_expression(code)
-        try:
-            found = {each.name for each in expression.find_all(nodes.Name)}
-        except RecursionError:
-            raise too_deep() from None
-        return found | ({expression.name} if isinstance(expression, nodes.Name) else set())
+        if code not in self._names:
+            expression = self.parse_expression(code)
+            try:
+                found = {each.name for each in expression.find_all(nodes.Name)}
+            except RecursionError:
+                raise too_deep() from None
+            found |= {expression.name} if isinstance(expression, nodes.Name) else set()
+            self._names[code] = frozenset(found)
+        return self._names[code]
 
     def attribute(self, owner: Any, name: str) -> Any:
         """Return a method that expressions may call, or what stands under a name in a value."""

@@ -19,6 +19,8 @@ OPEN, CLOSE = '{{', '}}'
 _USUAL, _LONGEST = 200, 10_000
 # An undefined name is searched for so far; beyond, its finding shows the whole scalar.
 _LONGEST_SEARCHED = 1000
+# An expression without braces in its strings: to find its end takes no lexer.
+_PLAIN = re.compile(r"""(?:[^'"{}\\]++|'[^'{}\\]*+'|"[^"{}\\]*+")*+\}\}""")
 _MOST_LINES_SEARCHED = 100
 
 
@@ -30,7 +32,12 @@ def find_expressions(text: str, sandbox: Sandbox) -> Iterator[slice]:
     """
     start = text.find(OPEN)
     while start >= 0:
-        stop = start + len(OPEN) + _measure(text[start + len(OPEN) :], sandbox) + len(CLOSE)
+        begin = start + len(OPEN)
+        if plain := _PLAIN.match(text, begin, begin + _USUAL):
+            stop = plain.end()
+            sandbox.budget.spend_on_scanning(plain.group())
+        else:
+            stop = begin + _measure(text[begin:], sandbox) + len(CLOSE)
         yield slice(start, stop)
         start = text.find(OPEN, stop)
 

@@ -56,6 +56,7 @@ class TemplateEvaluator:
         values: What is in scope, by name.
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
+        sandbox: What is shared with the other evaluators of the document.
     """
 
     def __init__(
@@ -64,13 +65,14 @@ class TemplateEvaluator:
         values: Mapping[str, Any],
         samples: Collection[str] = (),
         origins: Mapping[str, str] | None = None,
+        sandbox: Sandbox | None = None,
     ) -> None:
         self.document = document
         self.positions = document.positions
         self._origins = origins or {}
         self._values = values
         self._samples = frozenset(samples)
-        self._sandbox = Sandbox()
+        self._sandbox = sandbox or Sandbox()
 
     def spend_on_values(self, count: int) -> None:
         """Count the work that a loop of `foreach` takes for so many values.
@@ -84,9 +86,7 @@ class TemplateEvaluator:
         """Return an evaluator with one more name in scope, for the same document."""
         samples = self._samples | {name} if is_sample else self._samples - {name}
         values, origins = {**self._values, name: value}, {**self._origins, name: origin}
-        inner = TemplateEvaluator(self.document, values, samples, origins)
-        inner._sandbox = self._sandbox
-        return inner
+        return TemplateEvaluator(self.document, values, samples, origins, self._sandbox)
 
     def evaluate(self, data: Any, path: DataPath) -> Any:
         """Return data with the values of all expressions in place."""
@@ -123,6 +123,10 @@ class TemplateEvaluator:
         return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
+        if self._sandbox.explained > MAX_FINDINGS:
+            # Nobody sees more, and each takes its time.
+            self.document.dropped.add(path)
+            return text
         span = self.positions.key(path) if is_key else self.positions.value(path)
         sampled = False
         expressions: list[slice] = []
@@ -139,8 +143,7 @@ class TemplateEvaluator:
             self.document.dropped.add(path)
             # It may succeed with the real value.
             is_sure = not sampled or isinstance(error, UndefinedError)
-            # To explain one takes long, and nobody sees more.
-            if is_sure and self._sandbox.explained <= MAX_FINDINGS:
+            if is_sure:
                 self._sandbox.explained += 1
                 origin = self._hidden_origin(text, expressions)
                 self.document.diagnostics.append(self._explain(error, span, origin))
@@ -169,7 +172,9 @@ class TemplateEvaluator:
         return ''.join([*parts, text[start:]])
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
-        scope = {'here': os.path.realpath(span.source.folder), **self._values}
+        scope = self._values
+        if 'here' in self._names_in(text, [expression]):
+            scope = {'here': os.path.realpath(span.source.folder), **scope}
         value = _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
         origin = self._hidden_origin(text, [expression])
         if origin is not None:

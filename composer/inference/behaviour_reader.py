@@ -145,7 +145,6 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
             run.report('bad-signature', place, f'{shown} is called as {binding.call}')
         run.reading.open_all()
         return
-    evaluator.imports.check_imports(module)
     scope = evaluator.functions.enter(callee, arguments, waits=True)
     _check_payloads(evaluator, callee, scope, wire)
     _check_answers(evaluator, scope, binding)

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import ast
     from collections.abc import Iterable, Iterator
 
-    from composer.inference.scopes import Scope
     from composer.interfaces.descriptions import FieldType
     from composer.python_source.modules import ModuleSource
     from composer.python_source.syntax import FunctionNode
@@ -207,14 +206,14 @@ class Function:
     """A function of the project.
 
     Attributes:
-        outer: The scope around it; `None` for the module's own.
+        outer: The `Scope` around it; `None` for the module's own.
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
     """
 
     module: ModuleSource
     definition: FunctionNode | ast.Lambda
-    outer: Scope | None = None
+    outer: Any = None
     owner: Value | None = None
     is_read: bool = False
 
@@ -225,7 +224,7 @@ class Class:
 
     module: ModuleSource
     definition: ast.ClassDef
-    outer: Scope | None = None
+    outer: Any = None
 
 
 @dataclass(slots=True, eq=False)

@@ -111,11 +111,19 @@ def _malformed(full_name: str) -> InterfaceNotFoundError:
 
 
 def _package_missing(package: str, full_name: str) -> InterfaceNotFoundError:
+    packages = InterfaceCatalogue().packages()
+    if package in packages:
+        message = (
+            f'{full_name}: the package {package!r} is installed, but Python finds no module of it'
+        )
+        return InterfaceNotFoundError(
+            message, help='source the setup file of its workspace, which sets PYTHONPATH'
+        )
     message = f'{full_name}: the package {package!r} is not installed'
     install = "install it, or name the folder of its definitions under 'interfaces:'"
     return InterfaceNotFoundError(
         message,
-        help=suggest(package, InterfaceCatalogue().packages(), otherwise=install),
+        help=suggest(package, packages, otherwise=install),
     )
 
 

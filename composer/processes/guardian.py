@@ -26,8 +26,11 @@ from pathlib import Path
 RLIMIT_LOCKS = 10
 # Prints the stacks of Composer's threads.
 STACKS_SIGNAL = signal.SIGRTMAX
-# What Composer sends, beside the numbers of signals.
+# What Composer sends, beside the numbers of signals: a stop has begun or is over, or the process
+# goes on without the guardian.
 BEGUN, OVER, LEAVE = 101, 102, 103
+# A second one means that the user does not want to wait.
+_INTERRUPTS = {signal.SIGINT, signal.SIGTERM}
 
 _HURRY_SEC = 1.0
 # How long a process that ends may take from its last descriptor to its end.
@@ -78,13 +81,6 @@ class Guardian:
                 self._end_composer()
                 return True
             ready = {each for each, _ in poll.poll(None if rest == _NEVER else rest * 1000 + 1)}
-            if self._ended in ready:
-                if self._deadline == _NEVER:
-                    tell(
-                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
-                        'killed, or a behaviour called os._exit'
-                    )
-                return True
             if self._reports in ready:
                 data = os.read(self._reports, _CHUNK)
                 if not data:
@@ -96,19 +92,27 @@ class Guardian:
                     self._signal(signal.SIGHUP)
                 for byte in data:
                     self._take(byte)
+            # It may have reported a signal right before its end.
+            if self._ended in ready:
+                if self._deadline == _NEVER:
+                    tell(
+                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
+                        'killed, or a behaviour called os._exit'
+                    )
+                return True
         return False
 
     def _take(self, byte: int) -> None:
         now = time.monotonic()
-        if byte in {signal.SIGINT, signal.SIGTERM}:
+        if byte in _INTERRUPTS:
             self._interrupts += 1
-        if byte in {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, BEGUN}:
+            if self._interrupts > 1:
+                self._deadline = min(self._deadline, now + _HURRY_SEC)
+        if byte in {*_INTERRUPTS, signal.SIGHUP, BEGUN}:
             self._deadline = min(self._deadline, now + self._stop_sec)
-        if byte in {signal.SIGINT, signal.SIGTERM} and self._interrupts > 1:
-            self._deadline = min(self._deadline, now + _HURRY_SEC)
-        if byte == OVER:
+        elif byte == OVER:
             self._deadline = now + self._exit_sec
-        if byte == LEAVE:
+        elif byte == LEAVE:
             self._has_left = True
 
     def _end_composer(self) -> None:
@@ -189,7 +193,10 @@ def main() -> None:
     stop_sec, exit_sec, mark = float(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    ended = os.pidfd_open(composer)
+    try:
+        ended = os.pidfd_open(composer)
+    except ProcessLookupError:
+        return  # A signal has ended it, and it had started nothing yet.
     # No child of Composer, or a behaviour that waits for all of its own would wait for ever.
     if os.fork():
         os._exit(0)

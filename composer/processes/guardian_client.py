@@ -46,6 +46,7 @@ class GuardianClient:
         self.mark = secrets.randbits(_MARK_BITS) if owns_process else 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         switch = _create_switch()
+        _print_stacks_at_signal()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own script
                 [
@@ -176,12 +177,17 @@ def _create_switch() -> int:
         block.sigevent.notify = _SIGEV_THREAD
         block.sigevent.function = ctypes.cast(libc._exit, ctypes.c_void_p).value  # noqa: SLF001
         libc.aio_read(ctypes.byref(block))
+    return switch
+
+
+@cache
+def _print_stacks_at_signal() -> None:
+    """Let the guardian's signal, and crashes, print the stacks of all threads."""
     # When Python exits, it restores what was before its own handler.
-    libc.signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))
+    ctypes.CDLL(None).signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))
     with suppress(AttributeError, RuntimeError, ValueError):
         # There may be no standard error.
         stderr: Any = sys.__stderr__
         faulthandler.register(guardian.STACKS_SIGNAL, file=stderr, all_threads=True)
         if not faulthandler.is_enabled():
             faulthandler.enable(file=stderr)
-    return switch

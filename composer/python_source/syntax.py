@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.errors import ComposerError
@@ -37,7 +38,8 @@ def count_tokens(content: bytes, path: Path, most: int) -> int:
     Raises:
         UnreadModuleError: They are more than a module may have, or than `most`.
     """
-    count = sum(1 for _ in _TOKEN.finditer(content))
+    enough = min(MAX_MODULE_TOKENS, most) + 1
+    count = sum(1 for _ in islice(_TOKEN.finditer(content), enough))
     if count > MAX_MODULE_TOKENS:
         message = f'{path} has more than {MAX_MODULE_TOKENS:,} words and signs'
         raise UnreadModuleError(message)

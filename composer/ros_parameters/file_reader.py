@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
-from composer.input_limits import MAX_FINDINGS
+from composer.input_limits import MAX_FINDINGS, MAX_VALUES
 from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader, flatten_list
@@ -69,40 +69,44 @@ class ParameterFile:
 
     Attributes:
         patterns: All names of nodes, also those without parameters.
+        values: How many keys and values were read of it.
     """
 
     patterns: tuple[tuple[str, Span], ...] = ()
     entries: tuple[ParameterEntry, ...] = ()
     findings: tuple[Diagnostic, ...] = ()
+    values: int = 0
 
 
-def read_parameter_file(path: Path, name: str | None = None) -> ParameterFile:
+def read_parameter_file(path: Path, most_values: int = MAX_VALUES) -> ParameterFile:
     """Read a file.
 
     Args:
-        name: The name of the file in findings; by default `path`.
+        most_values: How many keys and values it may have.
     """
-    name = name or str(path)
+    name = str(path)
     content = read_content(path, name)
     text = content if isinstance(content, Diagnostic) else decode_content(content, name)
     if isinstance(text, Diagnostic):
         return ParameterFile(findings=(text,))
-    return parse_parameter_file(text, name)
+    return parse_parameter_file(text, name, most_values)
 
 
-def parse_parameter_file(text: str, name: str) -> ParameterFile:
+def parse_parameter_file(text: str, name: str, most_values: int = MAX_VALUES) -> ParameterFile:
     """Read the text of a file that is called `name` in findings."""
     source = SourceFile(name, tuple(text.splitlines()))
     try:
-        trees = compose_trees(text, source, alias_rule=RULE)
+        trees, values = compose_trees(text, source, alias_rule=RULE, most_values=most_values)
     except CompositionError as error:
-        return ParameterFile(findings=(_explain_typo(error.diagnostic),))
+        return ParameterFile(findings=(_explain_typo(error.diagnostic),), values=error.values)
     reader = _Reader()
     # ROS reads several documents as if they were one.
     for tree in trees:
         reader.read_nodes(tree, '')
     reader.check_double_names()
-    return ParameterFile(tuple(reader.patterns), tuple(reader.entries), tuple(reader.findings))
+    return ParameterFile(
+        tuple(reader.patterns), tuple(reader.entries), tuple(reader.findings), values
+    )
 
 
 class _Reader:
@@ -275,6 +279,8 @@ class _Reader:
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:
+        if len(self.findings) > MAX_FINDINGS:
+            return
         if advice := suggest(key, [PARAMETERS_KEY]):
             message = f"'{key}' is not a key of parameter files"
             self._report(node.span, message, advice)

@@ -8,9 +8,39 @@ rclpy (`rclpy/src/rclpy/node.cpp`).
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import TYPE_CHECKING
+
 from composer.names import find_namespace_problem, find_node_name_problem
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 _ONE, _ANY = '*', '**'
+
+
+class PatternIndex:
+    """Names of nodes as parameter files have them, to be matched with many nodes."""
+
+    def __init__(self, patterns: Iterable[str]) -> None:
+        self._order = {pattern: place for place, pattern in enumerate(patterns)}
+        parts = {pattern: set(_split(pattern)) - {_ONE, _ANY} for pattern in self._order}
+        uses = Counter(part for each in parts.values() for part in each)
+        # Each stands below its rarest part that is no wildcard: it matches no node without it.
+        self._by_part: dict[str | None, list[str]] = {}
+        for pattern, literal in parts.items():
+            rarest = min(literal, key=uses.__getitem__, default=None)
+            self._by_part.setdefault(rarest, []).append(pattern)
+
+    def find(self, full_name: str) -> list[str]:
+        """Return those that match a node, in their order."""
+        found = [
+            pattern
+            for part in (None, *dict.fromkeys(_split(full_name)))
+            for pattern in self._by_part.get(part, ())
+            if matches_pattern(pattern, full_name)
+        ]
+        return sorted(found, key=self._order.__getitem__)
 
 
 def find_pattern_problem(pattern: str) -> str | None:
@@ -32,8 +62,7 @@ def find_pattern_problem(pattern: str) -> str | None:
 
 def matches_pattern(pattern: str, full_name: str) -> bool:
     """Return whether a node takes the parameters below `pattern`."""
-    parts = pattern.removeprefix('/').split('/')
-    names = full_name.removeprefix('/').split('/')
+    parts, names = _split(pattern), _split(full_name)
     # How many parts of the name the parts of the pattern so far can match.
     reached = {0}
     for part in parts:
@@ -48,6 +77,10 @@ def matches_pattern(pattern: str, full_name: str) -> bool:
         if not reached:
             return False
     return len(names) in reached
+
+
+def _split(name: str) -> list[str]:
+    return name.removeprefix('/').split('/')
 
 
 def _add_wildcards(problem: str, part: str) -> str:

@@ -16,11 +16,12 @@ Sources: `find_node`, `find_parameter` and `parse_value` in rcl
 from __future__ import annotations
 
 import bisect
+from collections import ChainMap
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from composer.ros_parameters.node_patterns import matches_pattern
+from composer.ros_parameters.node_patterns import PatternIndex
 from composer.ros_parameters.parameter_types import PARAMETER_TYPES
 from composer.ros_parameters.rcl_values import parse_override
 
@@ -37,17 +38,26 @@ _PARAMETER_OPTIONS = ('-p', '--param')
 
 def find_overrides(files: Iterable[ParameterFile], full_name: str) -> dict[str, ParameterEntry]:
     """Return the values that a node takes from its parameter files, by parameter name."""
-    tables: dict[str, _Table] = {}
-    for file in files:
-        for pattern, _ in file.patterns:
-            tables.setdefault(pattern, _Table())
-        for entry in file.entries:
-            tables[entry.pattern].add(entry)
-    found: dict[str, ParameterEntry] = {}
-    for pattern, table in tables.items():
-        if matches_pattern(pattern, full_name):
-            found |= table.values()
-    return found
+    return dict(MergedFiles(files).find_overrides(full_name))
+
+
+class MergedFiles:
+    """The values of parameter files as rcl merges them, for all nodes that have these files."""
+
+    def __init__(self, files: Iterable[ParameterFile]) -> None:
+        tables: dict[str, _Table] = {}
+        for file in files:
+            for pattern, _ in file.patterns:
+                tables.setdefault(pattern, _Table())
+            for entry in file.entries:
+                tables[entry.pattern].add(entry)
+        self._values = {pattern: table.values() for pattern, table in tables.items()}
+        self._index = PatternIndex(tables)
+
+    def find_overrides(self, full_name: str) -> Mapping[str, ParameterEntry]:
+        """Return the values that a node takes, by parameter name; nodes share what is equal."""
+        tables = [self._values[each] for each in self._index.find(full_name)]
+        return ChainMap(*reversed(tables))
 
 
 def parse_command_line(

@@ -55,7 +55,7 @@ def parse_override(text: str) -> tuple[Any, str | None] | None:
     """Return the value after `:=` on a command line, and its type; `None` if rcl refuses it."""
     findings: list[Diagnostic] = []
     try:
-        trees = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
+        trees, _ = compose_trees(text, SourceFile('<command line>', (text,)), alias_rule=RULE)
     except CompositionError:
         return None
     if len(trees) != 1 or isinstance(trees[0], MappingNode):

@@ -9,6 +9,6 @@ Imports go one way through its rooms:
 - `entities`: a file for each kind of entity.
 
 The modules of this folder use them all: `run` makes a `system`, whose nodes `start`, `restart` and
-`stop`. Except for these, which lie below the rooms: `forced_exit`, `forked_children`, `logs`,
+`stop`. Except for these, which lie below the rooms: `forked_children`, `logs`,
 `reserved_methods`, `stop_request` and, above `behaviours`, `system_executor`.
 """

@@ -13,8 +13,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from composer.executor.after_fork import end_child
-from composer.runtime.forced_exit import flush_output
+from composer.executor.after_fork import end_child, flush_output
 
 if TYPE_CHECKING:
     from types import CodeType, FrameType

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from composer import signals
 from composer.errors import ComposerError, ExitCode, StartError
+from composer.executor.after_fork import flush_output
 from composer.processes.guardian_client import GuardianClient
-from composer.runtime import forced_exit, forked_children
+from composer.runtime import forked_children
 from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
@@ -23,7 +25,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Sent when the terminal is closed, often twice: by the shell and by the kernel.
+# Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
+# with SIGTERM, and Python handles it first.
 _HANG_UP = signal.SIGHUP
 # How much longer than its timeouts a stop may take.
 _MARGIN_SEC = 5.0
@@ -44,10 +47,10 @@ def run_system(
     """Start a system, wait until a stop is requested, and stop it.
 
     The first SIGINT or SIGTERM stops the system, and a second one ends the process at once with
-    exit code 1. SIGHUP stops the system, too, unless it was ignored before, as by `nohup`; further
-    ones change nothing. If a behaviour does not end, this ends the process with the exit code,
-    since its thread cannot be ended. The guardian ends it if no Python code can run. A SIGINT
-    before the system is up gives the exit code 130.
+    exit code 1, whoever asked for the stop. SIGHUP stops the system, too, unless it was ignored
+    before, as by `nohup`; it never counts as one of the two. If a behaviour does not end, this
+    ends the process with the exit code, since its thread cannot end. The guardian ends it if no
+    Python code can run. A SIGINT before the system is up gives the exit code 130.
 
     Args:
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
@@ -92,8 +95,14 @@ def run_system(
             system_logger.error(str(error))
         signals.end_with(code)
         if not ended:
-            forced_exit.leave(code)
+            _end_process(code)
     return code
+
+
+def _end_process(code: int) -> NoReturn:
+    """End the process at once, whatever its threads do."""
+    flush_output()
+    os._exit(code)
 
 
 @contextmanager
@@ -122,14 +131,18 @@ def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
         yield
         return
 
+    has_come = False
+
     def handle(number: int, _frame: FrameType | None) -> None:
-        if stop.is_set:
-            if number == _HANG_UP:
-                return
-            stop.kill_processes()
-            forced_exit.leave(ExitCode.FAILED)
-        is_early = number == signal.SIGINT and not stop.system_is_up
-        stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
+        nonlocal has_come
+        if number != _HANG_UP:
+            if has_come:
+                stop.kill_processes()
+                _end_process(ExitCode.FAILED)
+            has_come = True
+        if not stop.is_set:  # The system may stop by itself.
+            is_early = number == signal.SIGINT and not stop.system_is_up
+            stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
 
     handled = list(_SIGNALS)
     if signal.getsignal(_HANG_UP) is not signal.SIG_IGN:

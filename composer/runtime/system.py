@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from time import monotonic, monotonic_ns
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
 from composer.processes.guardian_client import end_marked
 from composer.processes.supervisor import ProcessSupervisor
+from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
 from composer.runtime.health.hangs import HangWatcher
@@ -28,7 +29,7 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.processes.guardian_client import GuardianClient
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 _EXECUTOR_STOP_SEC = 1.0
-_MOST_SUSPECTS = 5
 
 
 class System:
@@ -251,7 +251,7 @@ class System:
         self._restarter.restart(full_name)
 
     def _end(self, code: int) -> None:
-        """Stop the system because of a process, unless it stops already."""
+        """Stop the system, unless it stops already."""
         if not self.stop_requested:
             self.request_stop(code)
 
@@ -290,10 +290,11 @@ class System:
 
     def _on_broken(self, reason: str) -> None:
         try:
+            calls = [(node.spec.key, node.running) for node in list(self._nodes.values())]
             system_logger.error(
                 'the system is broken, and ends. A behaviour may have closed descriptors that are '
                 'not its own, or replaced what all use. The last ones to begin were:\n'
-                f'{_describe_last_calls(list(self._nodes.values()))}\n{reason}'
+                f'{describe_last_calls(calls)}\n{reason}'
             )
         finally:
             self._stop_request.make(ExitCode.FAILED)
@@ -308,14 +309,11 @@ class System:
         self._hang_watcher.stop()
         release(self._context)
         if not (self._guardian.owns_process and leave_graph_at_exit(self._context, self._nodes)):
-            self._destroy_nodes()
+            for node in self._nodes.values():
+                node.destroy()
+            self._nodes.clear()
         self._context.try_shutdown()
         self._context.destroy()
-
-    def _destroy_nodes(self) -> None:
-        for node in self._nodes.values():
-            node.destroy()
-        self._nodes.clear()
 
 
 def _limits(spec: SystemSpec) -> Iterator[float | None]:
@@ -324,21 +322,6 @@ def _limits(spec: SystemSpec) -> Iterator[float | None]:
         for kind in ENTITY_KINDS:
             for entity in getattr(node, kind.section).values():
                 yield getattr(entity, 'warn_after_sec', None)
-
-
-def _describe_last_calls(nodes: Iterable[LiveNode]) -> str:
-    """Return the behaviours that began last, a line for each: those that run, or have ended."""
-    found = []
-    for node in nodes:
-        calls = [(call.owner, call.begun_ns) for call in node.running.calls()]
-        if node.running.last is not None:
-            calls.append(node.running.last)
-        found += [(begun_ns, node.spec.key, str(owner)) for owner, begun_ns in calls]
-    now_ns = monotonic_ns()
-    return '\n'.join(
-        f"  node '{node}': {owner}, {(now_ns - begun_ns) * 1e-9:.3f} s ago"
-        for begun_ns, node, owner in sorted(found, reverse=True)[:_MOST_SUSPECTS]
-    )
 
 
 def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:

@@ -6,6 +6,7 @@ needed only for data that are not valid.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from typing import Any, TypeAlias
@@ -46,9 +47,18 @@ class SchemaCompiler:
         if unknown:
             message = f'the schema compiler does not know the keywords {sorted(unknown)}'
             raise ValueError(message)
-        if len(parts) == 1:
-            return parts[0]
-        return lambda data: all(part(data) for part in parts)
+        return _all_of(parts)
+
+
+def _all_of(parts: list[Check]) -> Check:
+    """Return the check for all parts; a chain of two each is faster than a loop."""
+    if not parts:
+        return lambda _: True
+    first, *others = parts
+    if not others:
+        return first
+    rest = _all_of(others)
+    return lambda data: first(data) and rest(data)
 
 
 def _compile_reference(compiler: SchemaCompiler, schema: Schema) -> Check:
@@ -57,10 +67,20 @@ def _compile_reference(compiler: SchemaCompiler, schema: Schema) -> Check:
 
 def _compile_type(_: SchemaCompiler, schema: Schema) -> Check:
     names = schema['type']
-    tests = [_TYPES[name] for name in ([names] if isinstance(names, str) else names)]
-    if len(tests) == 1:
-        return tests[0]
-    return lambda data: any(test(data) for test in tests)
+    if isinstance(names, str):
+        return _TYPES[names]
+    tests = [_TYPES[name] for name in names]
+    if 'integer' in names:
+        return lambda data: any(test(data) for test in tests)
+    # No other depends on more than the class of the data.
+    known: dict[type, bool] = {}
+
+    def is_valid(data: Any) -> bool:
+        if type(data) not in known:
+            known[type(data)] = any(test(data) for test in tests)
+        return known[type(data)]
+
+    return is_valid
 
 
 def _compile_required(_: SchemaCompiler, schema: Schema) -> Check:
@@ -84,13 +104,17 @@ def _compile_entries(compiler: SchemaCompiler, schema: Schema) -> Check:
             matching.append(known[key])
         return all(is_valid(value) for is_valid in matching or (other,))
 
-    def is_plain_entry_valid(key: str, value: Any) -> bool:
-        return known.get(key, other)(value)
+    def is_valid(data: Any) -> bool:
+        return not isinstance(data, dict) or all(itertools.starmap(is_entry_valid, data.items()))
 
-    is_valid = is_entry_valid if patterns else is_plain_entry_valid
-    return lambda data: (
-        not isinstance(data, dict) or all(is_valid(key, value) for key, value in data.items())
-    )
+    def is_plain_valid(data: Any) -> bool:
+        if isinstance(data, dict):
+            for key, value in data.items():
+                if not known.get(key, other)(value):
+                    return False
+        return True
+
+    return is_valid if patterns else is_plain_valid
 
 
 def _compile_items(compiler: SchemaCompiler, schema: Schema) -> Check:

@@ -51,8 +51,10 @@ def check_structure(document: Document) -> None:
     """
     positions, data = document.positions, document.data or {}
     failed = [_entry_of(path) for path in document.dropped]
-    if failed or not _schema().is_valid(data):
-        data = copy_data(data)
+    if not failed and _schema().is_valid(data):
+        document.data, document.dropped = data, set()
+        return
+    data = copy_data(data)
     _remove_entries(data, failed)
     findings = _correct_keys(data, positions)
     incomplete = {path[:-1] for path in failed}

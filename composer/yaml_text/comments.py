@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tokenize
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -51,12 +52,14 @@ def read_ignore_comments(source: SourceFile) -> list[IgnoreComment]:
         return []
     is_python = source.name.endswith('.py')
     texts, end = _find_texts(source) if is_python else _find_scalars(source)
-    return [
-        comment
-        for comment in found
-        if (place := _place(comment.span)) < end
-        and not any(start <= place < stop for start, stop in texts)
-    ]
+    starts = [start for start, _ in texts]
+    read = []
+    for comment in found:
+        place = _place(comment.span)
+        before = bisect_right(starts, place)
+        if place < end and not (before and place < texts[before - 1][1]):
+            read.append(comment)
+    return read
 
 
 def _find_candidates(source: SourceFile) -> Iterator[IgnoreComment]:
@@ -86,7 +89,7 @@ def _find_texts(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place
 
 
 def _find_scalars(source: SourceFile) -> tuple[list[tuple[_Place, _Place]], _Place]:
-    """Return where scalars begin and end, and where the text stops being YAML."""
+    """Return where scalars begin and end, in order, and where the text stops being YAML."""
     found = []
     try:
         for token in yaml.scan('\n'.join(source.lines), Loader=_Loader):

@@ -35,7 +35,7 @@ def construct_data(
     """Return the data of a tree and the findings; fill in its positions.
 
     Raises:
-        CompositionError: Aliases expand to more than 300,000 values or 100 levels.
+        CompositionError: Aliases expand to more than `MAX_VALUES` values, or to 100 levels.
     """
     constructor = _Constructor(positions)
     data = None if root is None else constructor.construct(root, ())

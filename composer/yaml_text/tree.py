@@ -16,7 +16,7 @@ _QUOTES = ("'", '"')
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class ScalarNode:
     """A scalar as written; `plain` if it has neither quotes nor a block style."""
 
@@ -54,7 +54,10 @@ class CompositionError(Exception):
 
     Attributes:
         diagnostic: Why.
+        values: How many keys and values were read.
     """
+
+    values = 0
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic.message)
@@ -68,25 +71,40 @@ def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
         CompositionError: The text is not YAML, nests too deep, holds several documents, or an
             alias that is unknown or contains itself.
     """
-    trees = _compose(text, source, _TreeBuilder(source, most_documents=1))
+    trees, _ = _compose(text, source, _TreeBuilder(source, most_documents=1))
     return trees[0] if trees else None
 
 
-def compose_trees(text: str, source: SourceFile, *, alias_rule: str) -> list[TreeNode]:
-    """Return all documents of a text in which aliases are not allowed.
+def compose_trees(
+    text: str, source: SourceFile, *, alias_rule: str, most_values: int = MAX_VALUES
+) -> tuple[list[TreeNode], int]:
+    """Return all documents of a text without aliases, and how many keys and values they have.
 
     Args:
         alias_rule: The rule for findings about aliases.
+        most_values: How many keys and values they may have.
 
     Raises:
-        CompositionError: The text is not YAML, nests too deep, or holds an alias.
+        CompositionError: The text is not YAML, nests too deep, holds an alias or too many values.
     """
-    return _compose(text, source, _TreeBuilder(source, alias_rule=alias_rule))
+    return _compose(
+        text, source, _TreeBuilder(source, alias_rule=alias_rule, most_values=most_values)
+    )
 
 
-def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> list[TreeNode]:
+def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> tuple[list[TreeNode], int]:
     try:
-        for event in yaml.parse(text, Loader=_Loader):
+        _parse(text, source, builder)
+    except CompositionError as error:
+        error.values = builder.values
+        raise
+    return builder.roots, builder.values
+
+
+def _parse(text: str, source: SourceFile, builder: _TreeBuilder) -> None:
+    try:
+        loader = _Loader(text)
+        while (event := loader.get_event()) is not None:
             builder.take(event)
     except yaml.MarkedYAMLError as error:
         raise CompositionError(_syntax_problem(error, source)) from error
@@ -96,7 +114,6 @@ def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> list[TreeN
         raise CompositionError(
             diagnostic_at(Span(source, 1, 1, 0), 'yaml-syntax', f'this is not YAML: {error}')
         ) from error
-    return builder.roots
 
 
 class _TreeBuilder:
@@ -108,15 +125,17 @@ class _TreeBuilder:
         *,
         alias_rule: str | None = None,
         most_documents: int | None = None,
+        most_values: int = MAX_VALUES,
     ) -> None:
         self.roots: list[TreeNode] = []
+        self.values = 0
         self._source = source
         self._alias_rule = alias_rule
         self._most_documents = most_documents
+        self._most_values = most_values
         self._open: list[SequenceNode | MappingNode] = []
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
-        self._nodes = 0
 
     def take(self, event: Any) -> None:
         if isinstance(event, yaml.ScalarEvent):
@@ -145,9 +164,10 @@ class _TreeBuilder:
             self._stop(event, 'too-deep', f'the data is nested more than {MAX_DEPTH} levels deep')
 
     def _add(self, node: TreeNode, anchor: str | None) -> None:
-        self._nodes += 1
-        if self._nodes > MAX_VALUES:
-            message = f'the file holds more than {MAX_VALUES:,} keys and values'
+        self.values += 1
+        if self.values > self._most_values:
+            which = 'file holds' if self._most_values == MAX_VALUES else 'files together hold'
+            message = f'the {which} more than {MAX_VALUES:,} keys and values'
             raise CompositionError(diagnostic_at(node.span, 'unreadable-file', message))
         if anchor is not None:
             self._anchors[anchor] = node

@@ -79,3 +79,17 @@ def test_diagnostics_tell_rate_age_and_finding(behaviour_node, set_time):
         ),
     ]
     assert array.header.stamp.sec == 103
+
+
+def test_what_is_beyond_its_limit_is_not_shown_as_the_limit(behaviour_node, set_time):
+    watched = Watched(behaviour_node, set_time, diagnose, minimum_rate=1.0, maximum_age=2.5)
+    watched.tick()
+    found = []
+    for messages in (1, 0, 0):
+        watched.time += 0.0002
+        found.append(watched.tick(messages)['status'][0]['message'])
+    assert found == [
+        '0.9998 messages/s, at least 1 expected',
+        '0 messages/s, at least 1 expected',
+        'no message for 2.5004 s, at most 2.5 s expected',
+    ]

@@ -22,6 +22,7 @@ TINY = {
     'forty': 2,
     'further_node': 1,
     'idle_cpu': 2,
+    'overhead': 1,
     'round_trips': 1,
     'soak': 100,
     'start_stop': 2,

@@ -73,10 +73,10 @@ def test_what_is_meant_by_a_misspelt_name_is_used(check):
             node.call('rest', None)
     """
     assert sorted(check(nodes, code, installed=False)) == [
+        (3, 'unknown-parameter'),
+        (3, 'unknown-publisher'),
+        (4, 'unknown-service-client'),
         (4, 'unused-parameter'),
-        (7, 'unknown-parameter'),
-        (7, 'unknown-publisher'),
-        (7, 'unknown-service-client'),
     ]
 
 
@@ -159,7 +159,7 @@ def test_a_behaviour_in_no_module_hides_no_unknown_parameter(check):
         def tick(node):
             return node.parameters.spede
     """
-    assert check(nodes, code) == [(6, 'unknown-behaviour'), (7, 'unknown-parameter')]
+    assert sorted(check(nodes, code)) == [(3, 'unknown-parameter'), (6, 'unknown-behaviour')]
 
 
 @pytest.mark.parametrize('spoilt', ['"a b"', '1st'])

@@ -3,6 +3,7 @@
 import pytest
 
 from composer.checks.checker import check_system
+from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 
@@ -118,3 +119,11 @@ def test_while_findings_hide_others_no_comment_is_called_unused(check):
         '    log_levl: info\n    on_start: driving:start  # composer: ignore[bad-name]\n'
     )
     assert [finding[1] for finding in found] == ['unknown-key']
+
+
+def test_silenced_findings_leave_room_for_the_others(check):
+    comment = '# composer: ignore[unused-publisher, no-subscription]'
+    line = '      p{}: {{type: std_msgs/msg/String, topic: t{}}}  {}\n'
+    lines = [line.format(index, index, comment) for index in range(MAX_FINDINGS + 10)]
+    found = check('    publishers:\n' + ''.join(lines) + line.format('x', 'x', ''))
+    assert {line for *_, line, _ in found} == {len(lines) + 5}

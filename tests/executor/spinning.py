@@ -1,5 +1,8 @@
-"""What the tests of the executor share: waiting for a condition, and spinning meanwhile."""
+"""What the tests of the executor share: waiting, spinning meanwhile, and programs of their own."""
 
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sized
@@ -48,3 +51,16 @@ def spinning(executor: Any) -> Iterator[list[BaseException]]:
         executor.shutdown(DEADLINE_SEC)
         thread.join(DEADLINE_SEC)
         assert not thread.is_alive()
+
+
+def run_program(source: str, domain_id: int) -> tuple[list[str], str]:
+    """Run a Python program in a ROS domain; return the lines of its output, and its errors."""
+    ended = subprocess.run(
+        [sys.executable, '-c', source],
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    return ended.stdout.splitlines(), ended.stderr

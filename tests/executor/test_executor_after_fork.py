@@ -1,13 +1,12 @@
 """A child that a callback forks: the parent misses nothing, and the child ends."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
 pytest.importorskip('rclpy')
+
+from spinning import run_program
 
 pytestmark = pytest.mark.ros
 
@@ -85,15 +84,8 @@ _CALL = """lambda: client.call_async(Trigger.Request()).add_done_callback(answer
 
 def _run(domain_id, who, in_child):
     program = _PROGRAM.replace('WHO', who).replace('CHILD', in_child)
-    ended = subprocess.run(
-        [sys.executable, '-c', program],
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
-    return [*json.loads(ended.stdout.splitlines()[-1]), ended.stderr]
+    lines, stderr = run_program(program, domain_id)
+    return [*json.loads(lines[-1]), stderr]
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,10 @@
 """Somebody closes or replaces descriptors of the executor: it says so, and ends."""
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 pytest.importorskip('rclpy')
+
+from spinning import run_program
 
 pytestmark = pytest.mark.ros
 
@@ -70,16 +68,8 @@ _HOW = {
 )
 def test_a_lost_descriptor_is_an_error_that_ends_the_spin(domain_id, what, how):
     program = _PROGRAM.replace('WHAT', _WHAT[what]).replace('HOW', _HOW[how])
-    ended = subprocess.run(
-        [sys.executable, '-c', program],
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    *errors, last = ended.stdout.splitlines()
-    assert ended.stderr == ''
+    (*errors, last), stderr = run_program(program, domain_id)
+    assert stderr == ''
     assert len(errors) == 2
     for error in errors:
         assert error.endswith('of the executor, was closed or replaced')

@@ -1,7 +1,10 @@
 """Few descriptors for any number of entities; the busy ones have their own."""
 
+import errno
+import gc
 import os
 import resource
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rclpy.exceptions import InvalidHandle
-from spinning import spinning, wait_for
+from spinning import DEADLINE_SEC, spinning, wait_for
 from std_msgs.msg import Empty
 
 from composer.executor import event_fds
@@ -145,6 +148,48 @@ def test_without_descriptors_an_eventfd_is_shared(poller, monkeypatch):
     (second,) = attach(poller, heard, 'second')
     second.write()
     assert heard_of(poller, heard) == ['first', 'second']
+
+
+def test_a_node_that_was_added_without_descriptors_is_served_when_there_are_some(
+    node: Any, executor: Any, monkeypatch
+) -> None:
+    heard: list[Any] = []
+    node.create_subscription(Empty, 'topic', heard.append, 1)
+    publisher = node.create_publisher(Empty, 'topic', 1)
+
+    def fail(*_: Any) -> int:
+        raise OSError(errno.EMFILE, 'no more')
+
+    monkeypatch.setattr(os, 'eventfd', fail)
+    for _ in range(2):
+        with pytest.raises(OSError, match='no more'):
+            executor.spin_once(timeout_sec=DEADLINE_SEC)
+    monkeypatch.undo()
+    with spinning(executor) as errors:
+        publisher.publish(Empty())
+        wait_for(lambda: heard)
+    assert not errors
+
+
+@pytest.mark.parametrize('spare', range(3))
+def test_a_poller_that_cannot_be_made_leaves_nothing_behind(spare):
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+    taken: list[int] = []
+    try:
+        with suppress(OSError):
+            while True:
+                taken.append(os.open(os.devnull, os.O_RDONLY))
+        for _ in range(spare):
+            os.close(taken.pop())
+        with pytest.raises(OSError, match=r'open files|timerfd'):
+            EventPoller()
+        gc.collect()
+        taken.extend(os.open(os.devnull, os.O_RDONLY) for _ in range(spare))
+    finally:
+        for fd in taken:
+            os.close(fd)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
 def test_an_event_of_a_listener_that_has_just_gone_is_skipped(poller):

@@ -1,5 +1,6 @@
 """`shutdown`, `wake`, contexts and signals."""
 
+import gc
 import signal
 import sys
 import threading
@@ -214,6 +215,7 @@ def interrupt_at(point: int, function: Callable[[], Any]) -> bool:
         return trace
 
     before = sys.gettrace()
+    gc.disable()  # What it calls would swallow the error.
     sys.settrace(trace)
     try:
         function()
@@ -221,6 +223,7 @@ def interrupt_at(point: int, function: Callable[[], Any]) -> bool:
         return True
     finally:
         sys.settrace(before)
+        gc.enable()
     return False
 
 
@@ -341,8 +344,6 @@ def test_the_executor_can_be_garbage_collected(context: Context) -> None:
     del executor
 
     def is_gone() -> bool:
-        import gc
-
         gc.collect()
         return gone() is None
 

@@ -292,13 +292,13 @@ def long_topic(folder):
 @case('bad-parameter')
 def list_of_parameter_values(folder):
     write(
-        folder, f'{HEAD}nodes: {{n: {{parameters: {{a: [{"1, " * (250_000 // DIVISOR)} a]}}}}}}\n'
+        folder, f'{HEAD}nodes: {{n: {{parameters: {{a: [{"1, " * (145_000 // DIVISOR)} a]}}}}}}\n'
     )
 
 
 @case()
 def hundred_thousand_parameters(folder):
-    text = ''.join(f'      p{index}: 1\n' for index in range(100_000 // DIVISOR))
+    text = ''.join(f'      p{index}: 1\n' for index in range(70_000 // DIVISOR))
     write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
 
 
@@ -314,14 +314,14 @@ def utf_16(folder):
 
 @case('duplicate-key')
 def same_key(folder):
-    write(folder, f'{HEAD}nodes:\n' + '  n: {}\n' * (100_000 // DIVISOR))
+    write(folder, f'{HEAD}nodes:\n' + '  n: {}\n' * (70_000 // DIVISOR))
 
 
 @case('unknown-key')
 def unknown_keys(folder):
     write(
         folder,
-        HEAD + 'nodes:\n  n: {' + ', '.join(f'k{i}: 1' for i in range(100_000 // DIVISOR)) + '}\n',
+        HEAD + 'nodes:\n  n: {' + ', '.join(f'k{i}: 1' for i in range(70_000 // DIVISOR)) + '}\n',
     )
 
 
@@ -455,6 +455,19 @@ def foreach_of_nothing(folder):
     write(folder, f'{HEAD}nodes:\n  n: {{foreach: {{{lists}}}, when: false}}\n')
 
 
+@case('bad-foreach')
+def enormous_max_nodes(folder):
+    foreach = '{foreach: {i: "{{ range(90000) }}"}}'
+    write(folder, f'{HEAD}max_nodes: 1{"0" * 200}\nnodes: {{"n{{{{ i }}}}": {foreach}}}\n')
+
+
+@case('missing-include', 'unreadable-file', 'unknown-interfaces', 'bad-name')
+def null_characters_in_paths(folder):
+    text = 'interfaces: {"a\\0": "b\\0"}\ninclude: {x: {file: "a\\0b"}}\n'
+    text += 'nodes: {n: {namespace: "a\\0", parameter_files: ["p\\0"]}}\n'
+    write(folder, HEAD + text)
+
+
 # Python.
 
 
@@ -520,7 +533,7 @@ def deeper_than_python(folder):
 
 @case('broken-module')
 def too_many_parentheses(folder):
-    behaves(folder, f'def f(node):\n    return {"(" * 50_000}1{")" * 50_000}\n')
+    behaves(folder, f'def f(node):\n    return {"(" * 49_000}1{")" * 49_000}\n')
 
 
 @case()
@@ -572,7 +585,7 @@ def functions(folder):
 
 
 @case()
-def functions_that_call_each_other(folder, count=180):
+def functions_that_call_each_other(folder, count=120):
     names = [f'f{index}' for index in range(count)]
     calls = '; '.join(f'{name}(node)' for name in names)
     text = ''.join(f'def {name}(node): node.publish("{name}"); {calls}\n' for name in names)
@@ -662,7 +675,7 @@ def dotted_module(folder):
 
 @case('unknown-publisher')
 def thousands_of_unknown_publishers(folder):
-    lines = ''.join(f'    node.publish("p{index}", {{}})\n' for index in range(10_000 // DIVISOR))
+    lines = ''.join(f'    node.publish("p{index}", {{}})\n' for index in range(7_000 // DIVISOR))
     behaves(folder, f'def f(node):\n{lines}')
 
 
@@ -752,7 +765,7 @@ def aliases_of_parameters(folder):
 
 @case('undeclared-parameter')
 def hundred_thousand_parameters_of_a_file(folder):
-    text = ''.join(f'    p{index}: 1\n' for index in range(100_000 // DIVISOR))
+    text = ''.join(f'    p{index}: 1\n' for index in range(70_000 // DIVISOR))
     configures(folder, f'n:\n  ros__parameters:\n{text}')
 
 
@@ -767,7 +780,16 @@ def patterns_of_parameters(folder):
 
 @case('bad-parameter-file')
 def documents_of_parameters(folder):
-    configures(folder, '---\n' * (300_000 // DIVISOR))
+    configures(folder, '---\n' * (145_000 // DIVISOR))
+
+
+@case('unreadable-file')
+def many_parameter_files(folder, count=8):
+    names = [f'p{index}.yaml' for index in range(count)]
+    write(folder, f'{HEAD}nodes: {{n: {{parameter_files: [{", ".join(names)}]}}}}\n')
+    text = ''.join(f'    p{index}: 1\n' for index in range(20_000))
+    for name in names:
+        write(folder, f'n:\n  ros__parameters:\n{text}', name)
 
 
 # Large systems, wrong throughout.
@@ -849,3 +871,56 @@ def many_large_modules(folder):
     write(folder, f'{HEAD}nodes:\n  n:\n   timers:\n{timers}')
     for index in range(40):
         write(folder, 'def f(node): pass\n' + 'x = [1, 2]\n' * 20_000, f'b{index}.py')
+
+
+@case('unread-module')
+def many_modules(folder):
+    timers = ''.join(f'    t{i}: {{period: 1, behaviour: "b{i}:f"}}\n' for i in range(12))
+    write(folder, f'{HEAD}nodes:\n  n:\n   timers:\n{timers}')
+    for index in range(12):
+        write(folder, 'def f(node): pass\n' + 'x = [1, 2]\n' * 5_600, f'b{index}.py')
+
+
+@case('unused-ignore')
+def comments_between_scalars(folder):
+    comment = '# composer: ignore[unused-parameter]'
+    text = ''.join(f'      p{index}: x {comment}\n' for index in range(20_000 // DIVISOR))
+    write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
+
+
+@case('unknown-rule')
+def comments_with_unknown_rules(folder):
+    comments = '# composer: ignore[a, b]\n' * (100_000 // DIVISOR)
+    write(folder, f'{HEAD}nodes: {{}}\n{comments}')
+
+
+@case('bad-expression')
+def different_expressions(folder):
+    text = ''.join(f'      p{index}: "{{{{ {index} + 1 }}}}"\n' for index in range(30_000))
+    write(folder, f'{HEAD}nodes:\n  n:\n    parameters:\n{text}')
+
+
+@case('undeclared-parameter')
+def parameter_file_of_all(folder):
+    nodes = ''.join(f'  n{i}: {{parameter_files: [p.yaml]}}\n' for i in range(1000))
+    write(folder, f'{HEAD}nodes:\n{nodes}')
+    text = ''.join(f'    p{index}: 1\n' for index in range(20_000 // DIVISOR))
+    write(folder, f'/**:\n  ros__parameters:\n{text}', 'p.yaml')
+
+
+@case('unmatched-node-name')
+def wildcards(folder):
+    nodes = ''.join(f'  n{i}: {{parameter_files: [p.yaml]}}\n' for i in range(1000))
+    write(folder, f'{HEAD}nodes:\n{nodes}')
+    patterns = (f'/**/x{i}/*: {{ros__parameters: {{a: 1}}}}\n' for i in range(10_000 // DIVISOR))
+    write(folder, ''.join(patterns), 'p.yaml')
+
+
+@case('unreadable')
+def packages_of_interfaces(folder):
+    packages = ', '.join(f'odd{index}: odd' for index in range(60))
+    write(folder, f'{HEAD}interfaces: {{{packages}}}\nnodes: {{}}\n')
+    (folder / 'odd/msg').mkdir(parents=True)
+    fields = ''.join(f'int32 a{index}\n' for index in range(600))
+    for index in range(30):
+        write(folder, fields, f'odd/msg/M{index}.msg')

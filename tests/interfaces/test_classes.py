@@ -4,6 +4,7 @@ from types import ModuleType
 
 import pytest
 
+from composer.ament import INTERFACE_INDEX
 from composer.interfaces.classes import InterfaceNotFoundError, import_interface
 
 
@@ -34,6 +35,19 @@ def test_a_package_that_is_not_installed_is_named() -> None:
     assert failure('qqq_zzz/msg/String') == (
         "qqq_zzz/msg/String: the package 'qqq_zzz' is not installed",
         "install it, or name the folder of its definitions under 'interfaces:'",
+    )
+
+
+def test_a_package_that_only_tools_find_is_not_called_absent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    index = tmp_path / INTERFACE_INDEX
+    index.mkdir(parents=True)
+    (index / 'qqq_zzz').write_text('msg/String.msg\n')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    assert failure('qqq_zzz/msg/String') == (
+        "qqq_zzz/msg/String: the package 'qqq_zzz' is installed, but Python finds no module of it",
+        'source the setup file of its workspace, which sets PYTHONPATH',
     )
 
 

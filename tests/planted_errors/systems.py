@@ -28,7 +28,7 @@ class Function:
 
     def source(self, name):
         keywords = [f'*, {", ".join(self.keywords)}'] if self.keywords else []
-        body = self.body or ['return None']
+        body = self.body or ['...']
         lines = ''.join(f'    {line}\n' for line in body)
         return f'def {name}({", ".join(self.parameters + keywords)}):\n{lines}\n\n'
 

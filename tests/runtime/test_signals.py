@@ -96,6 +96,16 @@ def test_while_the_process_exits_the_code_is_that_of_the_stop(compose, moment, n
     assert not child.matching('ignored')
 
 
+def test_a_hang_up_while_the_process_exits_is_no_reason_to_hurry(compose):
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    child = compose(SYSTEM, AT_EXIT.replace('CODE', '4'))
+    signal.signal(signal.SIGHUP, before)
+    child.wait_for_line('busy at exit')
+
+    assert child.stop(signal.SIGHUP) == 4
+    assert child.matching('busy very late')
+
+
 PRINTING = """
 def start(node):
     print('one', 'two', 'three', sep='\\n', flush=True)

@@ -274,6 +274,34 @@ def test_a_second_signal_leaves_at_once(compose):
     assert child.wait() == 1
 
 
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_system_stops_by_itself_is_no_second_one(compose, number):
+    text = """
+        version: 1
+        nodes: {only: {on_stop: 'parts:end', timers: {tick: {period: 0.02, behaviour: 'parts:quit'}}}}
+    """
+    code = """
+import os
+import time
+
+def quit(node):
+    node.shutdown(4)
+
+def end(node):
+    print('stopping', flush=True)
+    while not os.path.exists('signalled'):
+        time.sleep(0.01)
+    print('stopped', flush=True)
+"""
+    child = compose(text, code)
+    child.wait_for_line('stopping')
+    child.send(number)
+    (compose.folder / 'signalled').touch()
+
+    assert child.wait() == 4
+    assert child.lines[-1] == 'stopped'
+
+
 def test_a_behaviour_that_ends_in_time_is_waited_for(compose):
     text = """
         version: 1
@@ -450,6 +478,17 @@ def test_more_than_one_hang_up_is_no_reason_to_hurry(compose, wait_for):
     wait_for((compose.folder / 'stopping').exists, 'the beginning of on_stop')
 
     assert child.stop(signal.SIGHUP) == 0
+    assert (compose.folder / 'stopped').exists()
+
+
+@pytest.mark.usefixtures('hears_hang_ups')
+def test_a_hang_up_at_the_same_time_is_no_reason_to_hurry(compose):
+    child = compose(LEAVING_A_FILE, LEAVE_A_FILE)
+    child.wait_until_ready()
+    for number in (signal.SIGSTOP, signal.SIGTERM, signal.SIGHUP):
+        child.send(number)
+
+    assert child.stop(signal.SIGCONT) == 0
     assert (compose.folder / 'stopped').exists()
 
 

@@ -87,7 +87,7 @@ def test_what_belongs_to_a_node_that_has_not_started_is_not_there(compose, peer)
     """
     child = compose(text, CODE)
     heard = peer.listen(String, '/words')
-    peer.node.create_service(Trigger, 'go', lambda _request, response: response)
+    peer.run(peer.node.create_service, Trigger, 'go', lambda _request, response: response)
     child.wait_until_ready()
 
     names = ['first', 'second', 'third', 'fourth']
@@ -107,13 +107,13 @@ def test_a_node_answers_nobody_before_it_starts(compose, peer):
     """
     code = CODE.replace("return {'success'", "node.logger.info('asked')\n    return {'success'")
     child = compose(text, code)
-    client = peer.node.create_client(Trigger, 'ask')
+    client = peer.run(peer.node.create_client, Trigger, 'ask')
     assert client.wait_for_service(DEADLINE_SEC)
     client.call_async(Trigger.Request())
     child.wait_for_line('tick', times=len(child.matching('tick')) + 20)
     assert not child.matching('asked')
 
-    peer.node.create_publisher(String, 'words', 1)
+    peer.run(peer.node.create_publisher, String, 'words', 1)
     child.wait_until_ready()
     assert peer.call(Trigger, 'ask').success
 
@@ -145,7 +145,7 @@ def test_a_client_of_a_service_is_no_server(compose, peer, wait_for):
             service_clients: {{ask: {{type: std_srvs/srv/Trigger, external: true}}}}
             {WAITING}
     """
-    peer.node.create_client(Trigger, 'ask')
+    peer.run(peer.node.create_client, Trigger, 'ask')
     child = compose(text, CODE)
 
     assert child.wait() == 1
@@ -165,8 +165,8 @@ def test_names_are_those_that_the_node_would_use(compose, peer):
             wait_for: [{{topic: words, timeout: 30}}, {{topic: ~/own, timeout: 30}}]
             {WAITING}
     """
-    peer.node.create_publisher(String, '/far/words', 1)
-    peer.node.create_publisher(String, '/robot/user/own', 1)
+    peer.run(peer.node.create_publisher, String, '/far/words', 1)
+    peer.run(peer.node.create_publisher, String, '/robot/user/own', 1)
     child = compose(text, CODE)
 
     child.wait_until_ready()
@@ -222,7 +222,7 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
         processes:
           driver: {{command: [sleep, '3600']}}
     """
-    peer.node.create_publisher(String, 'scan', 1)
+    peer.run(peer.node.create_publisher, String, 'scan', 1)
     child = compose(text, CODE)
 
     assert child.wait() == 1

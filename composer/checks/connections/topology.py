@@ -34,8 +34,6 @@ TOPICS_OF_ROS = {
     '/diagnostics_toplevel_state': 'diagnostic_msgs/msg/DiagnosticStatus',
     '/parameter_events': 'rcl_interfaces/msg/ParameterEvent',
     '/rosout': 'rcl_interfaces/msg/Log',
-    '/tf': 'tf2_msgs/msg/TFMessage',
-    '/tf_static': 'tf2_msgs/msg/TFMessage',
 }
 # Between the name of an action and those of the topics and services that it consists of.
 OF_ACTIONS = '/_action/'

@@ -24,14 +24,14 @@ _TimerCancelledError = getattr(rclpy.exceptions, 'TimerCancelledError', InvalidH
 
 
 class TickObserver(Protocol):
-    """A guest of the executor that is told of the ticks of a timer."""
+    """Is told of the ticks of a timer."""
 
     def on_tick(self, late_ns: int, next_ns: int, period_ns: int) -> None:
         """Note a tick that began `late_ns` after its time; the next is `next_ns` after its."""
 
 
 class QueueObserver(Protocol):
-    """A guest of the executor that is told what comes to a subscription, and what is taken."""
+    """Is told what comes to a subscription, and what is taken."""
 
     def on_announced(self, count: int | None) -> None:
         """Note that `count` messages came; None: nobody knows how many."""

@@ -42,7 +42,7 @@ class EventSource:
         has_own_event_fd: Whether it has an eventfd of its own from the start, if there are any.
         ask: The method of `Readiness` that tells whether there is something to take.
         watch_entity: The function that has rcl write to an eventfd.
-        observer: A guest of the executor that is told what happens to the entity, or None.
+        observer: Is told what happens to the entity; or None.
         slow: Whether the last callback held up the leader.
     """
 

@@ -33,7 +33,19 @@ class Imports(Part):
     def imported(
         self, module: ModuleSource, statement: ast.Import | ast.ImportFrom, name: str
     ) -> Value:
-        """Return what an import stores under a name."""
+        """Return what an import stores under a name.
+
+        Another check looks at those at the top of a module, but for names of Composer.
+        """
+        of_composer = isinstance(statement, ast.ImportFrom) and statement.module == 'composer'
+        if statement in module.body and not of_composer:
+            with self._evaluator.run.silence():
+                return self._imported(module, statement, name)
+        return self._imported(module, statement, name)
+
+    def _imported(
+        self, module: ModuleSource, statement: ast.Import | ast.ImportFrom, name: str
+    ) -> Value:
         full_name = self._evaluator.run.modules.imported(module, statement, name)
         if not full_name:
             return UNKNOWN
@@ -63,7 +75,8 @@ class Imports(Part):
                 is_name = bool(name) and '.' not in name and not name.islower()
                 if is_name and public and name not in public:
                     self._report_import(place, f"composer has no '{name}'", public, name)
-                return UNKNOWN
+                    return UNKNOWN
+                return External(full_name)
             catalogue = self._evaluator.run.types.catalogue
             folder = name.partition('.')[0]
             is_public = folder.isidentifier() and not folder.startswith('_')
@@ -100,15 +113,7 @@ class Imports(Part):
     ) -> None:
         found = [each.replace('/', '.') for each in elsewhere]
         help_text = f"did you mean '{found[0]}'?" if found else suggest(name, known)
-        self._evaluator.run.report('bad-import', place, message, help_text)
-
-    def check_imports(self, module: ModuleSource) -> None:
-        """Check the names that a module imports, those of helpers included."""
-        for statement in module.body:
-            if isinstance(statement, ast.Import | ast.ImportFrom):
-                for alias in statement.names:
-                    if alias.name != '*':
-                        self.imported(module, statement, _stored(alias))
+        self._evaluator.run.report('missing-module', place, message, help_text)
 
     def is_module_in(self, package: ModuleSource, name: str) -> bool:
         """Return whether a package has a module of this name."""

@@ -6,7 +6,6 @@ import ast
 from typing import cast
 
 from composer.inference.current_run import name_place
-from composer.inference.evaluation.known_functions import KNOWN_RESULTS
 from composer.inference.evaluation.part import Part
 from composer.inference.values import (
     BY_PARAMETER,
@@ -35,6 +34,32 @@ from composer.inference.values import (
     join,
 )
 
+# What functions return, whatever they are called with.
+_BY_TYPE: dict[type, str] = {
+    bool: 'builtins.all builtins.any builtins.bool builtins.callable builtins.issubclass '
+    'math.isclose math.isfinite math.isinf math.isnan',
+    int: 'builtins.hash builtins.id builtins.int builtins.len builtins.ord math.ceil math.floor '
+    'math.trunc random.randint random.randrange time.monotonic_ns time.time_ns',
+    float: 'builtins.float math.acos math.asin math.atan math.atan2 math.copysign math.cos '
+    'math.cosh math.degrees math.dist math.exp math.fabs math.fmod math.fsum math.hypot math.log '
+    'math.log10 math.log2 math.modf math.pow math.radians math.remainder math.sin math.sinh '
+    'math.sqrt math.tan math.tanh random.gauss random.random random.uniform time.monotonic '
+    'time.perf_counter time.process_time time.time',
+    str: 'builtins.ascii builtins.bin builtins.chr builtins.format builtins.hex builtins.input '
+    'builtins.oct builtins.repr builtins.str json.dumps os.getcwd platform.node '
+    'socket.gethostname',
+    bytes: 'builtins.bytes os.urandom pickle.dumps struct.pack',
+}
+_BY_TYPE[float] = _BY_TYPE[float].replace(' math.modf', '')
+
+_KNOWN_RESULTS: dict[str, Value] = {
+    name: Scalar(kind) for kind, names in _BY_TYPE.items() for name in names.split()
+}
+_KNOWN_RESULTS |= {
+    **dict.fromkeys(('math.pi', 'math.e', 'math.tau', 'math.inf', 'math.nan'), Scalar(float)),
+    'builtins.print': NONE,
+    'time.sleep': NONE,
+}
 # How long a `range` is that is followed item by item.
 _LONGEST_RANGE = 256
 
@@ -47,10 +72,10 @@ class LibraryCalls(Part):
         method = getattr(self, f'_call_{name.replace(".", "_")}', None)
         if method is not None:
             return cast('Value', method(arguments, place))
-        if name in KNOWN_RESULTS:
+        if name in _KNOWN_RESULTS:
             if not name.startswith('builtins.is'):
                 self._escape_functions(arguments)
-            result = KNOWN_RESULTS[name]
+            result = _KNOWN_RESULTS[name]
             if isinstance(result, Scalar) and are_chosen(arguments):
                 return Scalar(result.kind, is_chosen=BY_PARAMETER)
             return result

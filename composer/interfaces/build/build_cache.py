@@ -25,6 +25,7 @@ from pathlib import Path
 
 from composer.ament import BUILD_MANIFEST
 from composer.errors import ComposerError
+from composer.input_limits import UnreadableFileError, read_file
 from composer.interfaces.build.manifest import is_intact, read_manifest, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.signals import interrupting
@@ -247,15 +248,19 @@ def _lock_file(place: Path) -> Path:
 def _numpy_version() -> str:
     """Return the version of NumPy, on which built extensions depend, without importing it."""
     spec = find_spec('numpy')
-    with suppress(OSError):
-        if spec and spec.origin:
-            return Path(spec.origin).with_name('version.py').read_text(encoding='utf-8')
-    return ''
+    return _read_text(Path(spec.origin).with_name('version.py')) if spec and spec.origin else ''
 
 
 def _package_version(package: str, prefixes: Iterable[Path]) -> str:
     """Return the manifest of a package, which has its version; an empty text if it is missing."""
     for prefix in prefixes:
-        with suppress(OSError):
-            return (prefix / 'share' / package / 'package.xml').read_text(encoding='utf-8')
+        if text := _read_text(prefix / 'share' / package / 'package.xml'):
+            return text
+    return ''
+
+
+def _read_text(path: Path) -> str:
+    """Return the text of a file; an empty text if it cannot be read."""
+    with suppress(UnreadableFileError):
+        return read_file(path).decode(errors='replace')
     return ''

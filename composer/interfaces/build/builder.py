@@ -16,6 +16,7 @@ from pathlib import Path
 
 from composer.ament import INTERFACE_INDEX, PACKAGE_INDEX, find_package
 from composer.errors import ComposerError
+from composer.input_limits import UnreadableFileError, read_file
 from composer.interfaces.build.build_cache import FULL
 from composer.interfaces.build.compilation import BuildPlan, plan_jobs, write_generation_arguments
 from composer.interfaces.build.jobs import JobError, run_jobs
@@ -156,8 +157,12 @@ def _all_used(definitions: PackageDefinitions, dependencies: Dependencies) -> se
     for message in {reference.message for reference in definitions.references}:
         package, _, name = message.partition('/')
         if package != definitions.package:
-            share = dependencies.locate(package) / 'share' / package
-            document = json.loads((share / 'msg' / f'{name}.json').read_bytes())
+            path = dependencies.locate(package) / 'share' / package / 'msg' / f'{name}.json'
+            try:
+                document = json.loads(read_file(path))
+            except (UnreadableFileError, ValueError, RecursionError) as error:
+                problem = f"'{path}' cannot be used: {error}"
+                raise ComposerError(problem) from error
             described = document['type_description_msg']['referenced_type_descriptions']
             found |= {each['type_name'].partition('/')[0] for each in described}
     return found

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.ament import BUILD_MANIFEST
 from composer.errors import ComposerError
+from composer.input_limits import UnreadableFileError, read_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -78,10 +79,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Return the manifest of a folder.
 
     Raises:
-        OSError: there is none.
-        ValueError: it is damaged.
+        ValueError: there is none, or it is damaged.
     """
-    document: dict[str, Any] = json.loads((folder / BUILD_MANIFEST).read_bytes())
+    try:
+        document: dict[str, Any] = json.loads(read_file(folder / BUILD_MANIFEST))
+    except (UnreadableFileError, RecursionError) as error:
+        raise ValueError(str(error)) from error
     return document
 
 

@@ -12,9 +12,12 @@ from typing import Final
 from composer.confidential import may_show_lines
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.input_limits import (
+    LINES_OF_DEFINITION,
+    MAX_BYTES_OF_DEFINITIONS,
     MAX_DEFINITION_BYTES,
-    MAX_PACKAGE_BYTES,
+    MAX_LINES_OF_DEFINITIONS,
     UnreadableFileError,
+    format_size,
     read_file,
 )
 from composer.interfaces.definitions.definition_parser import (
@@ -91,29 +94,50 @@ class PackageDefinitions:
 
 
 @dataclass(slots=True)
+class ReadingBudget:
+    """How much is left to be read, of all packages together."""
+
+    bytes: int = MAX_BYTES_OF_DEFINITIONS
+    lines: int = MAX_LINES_OF_DEFINITIONS
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether nothing more is read."""
+        return min(self.bytes, self.lines) < 0
+
+    def spend(self, text: str) -> None:
+        """Count a definition."""
+        self.bytes -= len(text)
+        self.lines -= LINES_OF_DEFINITION + text.count('\n')
+
+
+@dataclass(slots=True)
 class _Reading:
     """What was read so far of a package."""
 
     package: str
+    budget: ReadingBudget
     sources: dict[str, str] = field(default_factory=dict)
     interfaces: dict[str, InterfaceDescription] = field(default_factory=dict)
     references: list[TypeReference] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
-    bytes_left: int = MAX_PACKAGE_BYTES
 
 
-def load_definitions(package: str, folder: Path) -> PackageDefinitions:
+def load_definitions(
+    package: str, folder: Path, budget: ReadingBudget | None = None
+) -> PackageDefinitions:
     """Read all definitions of a package.
 
     Args:
         package: its name.
         folder: the folder with `msg/`, `srv/` or `action/`; an installed package has them in
             `share/<package>`.
+        budget: what is left, if it is one of several packages.
 
     Raises:
         ParserMissingError: `rosidl_adapter` is not installed.
     """
-    reading = _Reading(package)
+    reading = _Reading(package, budget or ReadingBudget())
     if not load_parser().is_valid_package_name(package):
         message = f'{package!r} is not the name of a package'
         advice = 'expected small letters, digits and single underscores, beginning with a letter'
@@ -124,6 +148,8 @@ def load_definitions(package: str, folder: Path) -> PackageDefinitions:
         advice = 'expected files such as msg/Name.msg, srv/Name.srv or action/Name.action'
         reading.diagnostics.append(_about_file(folder, 'no-definitions', message, advice))
     for path in paths:
+        if reading.budget.is_spent:
+            break
         _read_file(reading, path)
     return PackageDefinitions(
         package,
@@ -152,6 +178,9 @@ def _read_file(reading: _Reading, path: Path) -> None:
     kind, name = path.parent.name, path.stem
     before = len(reading.diagnostics)
     text = _read_text(reading, path)
+    if text is None:
+        reading.sources[f'{kind}/{path.name}'] = ''
+        return
     source = SourceFile(str(path), tuple(text.splitlines()))
     reading.sources[f'{kind}/{path.name}'] = text
     _check_name(reading, path)
@@ -168,21 +197,28 @@ def _read_file(reading: _Reading, path: Path) -> None:
         _describe(reading, full_name, sections)
 
 
-def _read_text(reading: _Reading, path: Path) -> str:
+def _read_text(reading: _Reading, path: Path) -> str | None:
     try:
-        data = read_file(path, min(MAX_DEFINITION_BYTES, reading.bytes_left))
+        data = read_file(path, MAX_DEFINITION_BYTES)
     except UnreadableFileError as error:
         reading.diagnostics.append(_about_file(path, 'unreadable', str(error)))
-        return ''
-    reading.bytes_left -= len(data)
+        return None
+    text = data.decode(errors='replace')
+    reading.budget.spend(text)
+    if reading.budget.is_spent:
+        message = (
+            f'the definitions of all packages have more than {MAX_LINES_OF_DEFINITIONS:,} lines, '
+            f'or {format_size(MAX_BYTES_OF_DEFINITIONS)}: this and the others are not read'
+        )
+        reading.diagnostics.append(_about_file(path, 'unreadable', message))
+        return None
     try:
-        return data.decode()
+        data.decode()
     except UnicodeDecodeError as error:
-        text = data.decode(errors='replace')
         line = len(data[: error.start + 1].splitlines())
         place = Span(SourceFile(str(path), tuple(text.splitlines())), line, 1, 0)
         reading.diagnostics.append(diagnostic_at(place, 'not-utf-8', 'expected UTF-8 text'))
-        return text
+    return text
 
 
 def _check_name(reading: _Reading, path: Path) -> None:

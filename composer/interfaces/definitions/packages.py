@@ -9,6 +9,7 @@ from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.package_folder import (
     PackageDefinitions,
+    ReadingBudget,
     TypeReference,
     load_definitions,
 )
@@ -56,7 +57,12 @@ def load_packages(
         ParserMissingError: `rosidl_adapter` is not installed.
         DefinitionsError: they have errors, alone or together.
     """
-    packages = [load_definitions(package, folder) for package, folder in folders.items()]
+    budget = ReadingBudget()
+    packages = []
+    for package, folder in folders.items():
+        packages.append(load_definitions(package, folder, budget))
+        if budget.is_spent:
+            raise DefinitionsError([each for one in packages for each in one.diagnostics])
     diagnostics = check_definitions(packages, catalogue)
     if diagnostics:
         raise DefinitionsError(diagnostics)

@@ -139,6 +139,9 @@ def locate_file(text: str, place: Span) -> Path:
     Raises:
         PathError: There is no such file.
     """
+    if '\0' in text:
+        message = 'no file has a null character in its name'
+        raise PathError(message)
     path = resolve_path(text, place.source.folder)
     if not _is_there(path):
         message = f"there is no file '{shown_path(path)}'"

@@ -66,7 +66,9 @@ class Includer:
         self._inclusions = 0
         # Entries that were merged, once for each file around them.
         self._merged = 0
+        # Of the files alone, and with all that they include.
         self._values = 0
+        self._merged_values = 0
         # Entries and includes that were read although they are left out.
         self._left_out = 0
 
@@ -103,7 +105,7 @@ class Includer:
                 part.leave_out_all()
             merger.add(Inclusion(part, entry, entry.find_namespace()))
             brought = 1 + sum(len(part.entries.get(each, ())) for each in SECTIONS)
-            self._values += len(part.positions.values)
+            self._merged_values += len(part.positions.values)
             if aside:
                 self._left_out += brought
             else:
@@ -116,16 +118,16 @@ class Includer:
         counts['include'] = self._inclusions
         section = max(counts, key=lambda each: counts[each])
         most_entries = _MOST_MERGED * max(self._limit, MAX_ENTRIES)
-        most_values = _MOST_MERGED * MAX_VALUES
+        help_text: str | None = "raise 'max_nodes' at the top of the file if that is intended"
         if counts[section] > self._limit:
             message = f'{section} has more than {self._limit:,} entries in all files together'
         elif self._merged > most_entries:
             message = f'includes in includes bring more than {most_entries:,} entries'
-        elif self._values > most_values:
-            message = f'the includes bring more than {most_values:,} keys and values'
+        elif self._values > MAX_VALUES or self._merged_values > _MOST_MERGED * MAX_VALUES:
+            message = f'the includes bring more than {MAX_VALUES:,} keys and values'
+            help_text = None
         else:
             return
-        help_text = "raise 'max_nodes' at the top of the file if that is intended"
         finding = diagnostic_at(entry.span, 'too-many-entries', message, help=help_text)
         raise _TooLargeError([finding])
 
@@ -156,6 +158,9 @@ class Includer:
         self._load_file(part, partial(values_from_include, place=entry))
         if part.data is None:
             raise _TooLargeError(_found_in(part, entry))
+        self._values += len(part.positions.values)
+        if self._values > MAX_VALUES:
+            self._check_size(entry)
         if not is_left_out:
             part.diagnostics += self._find_unset(part)
         # An included file may ask for more; one that asks for nothing changes nothing.

@@ -16,8 +16,10 @@ from composer.runtime.behaviours.stacks import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from types import CodeType, CoroutineType
+
+_MOST_LAST_CALLS = 5
 
 
 class Progress:
@@ -177,3 +179,22 @@ class RunningCalls:
 
     def _update_listeners(self) -> None:
         self.has_listeners = bool(self._waiters or self._end_listeners)
+
+
+def describe_last_calls(running: Iterable[tuple[str, RunningCalls]]) -> str:
+    """Return the calls that began last, a line for each: those that run, or have ended.
+
+    Args:
+        running: The keys of the nodes, and their calls.
+    """
+    found = []
+    for node, calls in running:
+        begun = [(call.owner, call.begun_ns) for call in calls.calls()]
+        if calls.last is not None:
+            begun.append(calls.last)
+        found += [(begun_ns, node, str(owner)) for owner, begun_ns in begun]
+    now_ns = monotonic_ns()
+    return '\n'.join(
+        f"  node '{node}': {owner}, {(now_ns - begun_ns) * 1e-9:.3f} s ago"
+        for begun_ns, node, owner in sorted(found, reverse=True)[:_MOST_LAST_CALLS]
+    )

@@ -23,6 +23,7 @@ from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
+from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
@@ -45,12 +46,13 @@ class ActionClient:
         kind, name = 'action client', spec.name
         self._node = node
         self._name = node.resolve_action_name(spec.action)
+        self._logger = EscapingLogger(node.ros.get_logger())
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
         self._requests = Requests(
             node.waits,
             self._client.server_is_ready,
-            WaitNotice(node.ros.get_logger().info, f"action server '{self._name}'"),
+            WaitNotice(self._logger.info, f"action server '{self._name}'"),
             self._unavailable,
             self._unanswered,
         )
@@ -96,9 +98,7 @@ class ActionClient:
         goal.feedback_queue.put(None)
         if future.done() and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
-                self._node.behaviour_node.logger.warning(
-                    f"the goal of '{self._name}' was {goal.status}"
-                )
+                self._logger.warning(f"the goal of '{self._name}' was {goal.status}")
             self._behaviours.put('result', response.result)
 
 

@@ -48,6 +48,8 @@ class HangLimit:
         self._quiet_until = float('-inf')
         self._skipped: set[int] = set()
         self._reported: dict[int, int] = {}
+        # When a call was last seen to wait for what is not there yet: from then on it counts.
+        self._absent_ns: dict[int, int] = {}
 
     def is_exceeded_by(self, call: RunningCall) -> bool:
         """Return whether a call has been running for too long."""
@@ -62,11 +64,14 @@ class HangLimit:
                 self._report_end(token, 'went on', call.since_ns)
             return
         now_ns = monotonic_ns()
-        ran_sec = (now_ns - call.since_ns) * 1e-9
-        if self.after_sec is None or ran_sec < self.after_sec:
-            return
         if any(code in CODES_OF_ABSENCE for code in call.codes()):
             # What it waits for is logged instead.
+            present = {key: ns for key, ns in self._absent_ns.items() if key in running.entries}
+            self._absent_ns = {**present, token: now_ns}
+            return
+        since_ns = max(call.since_ns, self._absent_ns.get(token, 0))
+        ran_sec = (now_ns - since_ns) * 1e-9
+        if self.after_sec is None or ran_sec < self.after_sec:
             return
         if now_ns * 1e-9 < self._quiet_until:
             self._skipped.add(token)
@@ -75,7 +80,7 @@ class HangLimit:
         others = f' ({len(self._skipped)} others before it did so too)' if self._skipped else ''
         self._skipped.clear()
         self._quiet_until = now_ns * 1e-9 + self._quiet.next_delay_sec()
-        self._reported[token] = call.since_ns
+        self._reported[token] = since_ns
         self._warn(
             f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
             f'it is at\n{call.format_stack()}'

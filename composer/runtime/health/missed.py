@@ -63,8 +63,8 @@ class MissedTicks:
     """Counts the late and skipped ticks of a timer.
 
     A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its
-    time. A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 5 ms
-    unless that was set: beside it, timers with short periods are late indeed.
+    time. A thread that computes lets go of the interpreter once in `sys.getswitchinterval()`, 1 ms
+    while the executor spins: beside it, timers with periods below 10 ms are late indeed.
     """
 
     def __init__(self) -> None:

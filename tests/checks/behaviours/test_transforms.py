@@ -178,6 +178,6 @@ def test_fields_of_items_of_arrays_are_known():
 def test_a_module_of_the_same_name_is_none_of_ours(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'behaviours').mkdir()
-    code = 'def transform(node, message, fields):\n    return fields\n'
+    code = 'def transform(node, message, fields):\n    return None\n'
     (tmp_path / 'behaviours' / 'topics.py').write_text(code)
     assert findings('x: y +') == []

@@ -104,7 +104,6 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
         ('publishers', '/clock', 'rosgraph_msgs/msg/Clock'),
         ('publishers', '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'),
         ('subscriptions', '/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray'),
-        ('subscriptions', '/tf', 'tf2_msgs/msg/TFMessage'),
         ('subscriptions', '/elsewhere/_action/status', 'action_msgs/msg/GoalStatusArray'),
         ('subscriptions', '/act/_action/feedback', None),
         ('subscriptions', '/elsewhere/_action/feedback', 'any/msg/Type'),

@@ -255,7 +255,7 @@ def test_errors_of_callbacks_that_are_no_behaviours_are_counted(compose, peer):
     """Those that a peer causes, as with a type of parameters that does not exist."""
     child = compose('{version: 1, nodes: {n: {parameters: {p: 1}}}}')
     wrong = Parameter(name='p', value=ParameterValue(type=99))
-    client = peer.node.create_client(SetParameters, '/n/set_parameters')
+    client = peer.run(peer.node.create_client, SetParameters, '/n/set_parameters')
     assert client.wait_for_service(DEADLINE_SEC)
     for _ in range(100):
         client.call_async(SetParameters.Request(parameters=[wrong]))

@@ -145,7 +145,7 @@ def test_subscriptions_services_and_parameters_may_raise_anything(compose, peer,
     wait_for(lambda: publisher.get_subscription_count() == len(ERRORS), 'all subscriptions')
     publisher.publish(Int32())
     for name in ERRORS:
-        client = peer.node.create_client(Trigger, f'ask_{name}')
+        client = peer.run(peer.node.create_client, Trigger, f'ask_{name}')
         assert client.wait_for_service(30)
         client.call_async(Trigger.Request())
     change = Parameter(name='speed', value=ParameterValue(type=2, integer_value=2))

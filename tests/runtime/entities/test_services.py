@@ -128,7 +128,7 @@ def test_private_remapped_and_absolute_names_are_served(child, shared_peer, name
 
 
 def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
-    client = shared_peer.node.create_client(BasicTypes, '/robot/echo')
+    client = shared_peer.run(shared_peer.node.create_client, BasicTypes, '/robot/echo')
     assert client.wait_for_service(30)
     # Ends are found in the order in which they were made: who answers this knows the client.
     shared_peer.call(Trigger, '/robot/message')
@@ -140,7 +140,7 @@ def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
 
     answers = [(future.result().int64_value, future.result().string_value) for future in futures]
     assert answers == [(number, str(number) * 2) for number in range(8)]
-    shared_peer.node.destroy_client(client)
+    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
 def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
     child, shared_peer, wait_for, name, summary, function
 ):
-    client = shared_peer.node.create_client(Trigger, f'/robot/{name}')
+    client = shared_peer.run(shared_peer.node.create_client, Trigger, f'/robot/{name}')
     assert client.wait_for_service(30)
     future = client.call_async(Trigger.Request())
     line = child.wait_for_line(f"service '{name}'")
@@ -165,12 +165,14 @@ def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
     assert summary in line
     assert function in child.output
     assert not future.done()
-    shared_peer.node.destroy_client(client)
+    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
 def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for):
     profile = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
-    client = shared_peer.node.create_client(Trigger, '/robot/best_effort', qos_profile=profile)
+    client = shared_peer.run(
+        shared_peer.node.create_client, Trigger, '/robot/best_effort', qos_profile=profile
+    )
     assert client.wait_for_service(30)
 
     def readers():
@@ -182,7 +184,7 @@ def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for
     # An end may be found before the name of its node.
     theirs = wait_for(readers, 'the end of the server')
     assert [info.qos_profile.reliability for info in theirs] == [ReliabilityPolicy.BEST_EFFORT]
-    shared_peer.node.destroy_client(client)
+    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
 def test_a_service_runs_never_beside_the_nodes_other_behaviours(compose, peer):
@@ -211,7 +213,7 @@ def test_requests_of_a_reentrant_service_run_beside_each_other(compose, peer, wa
               other: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
     """
     child = compose(text, CODE)
-    client = peer.node.create_client(Trigger, 'meet')
+    client = peer.run(peer.node.create_client, Trigger, 'meet')
     assert client.wait_for_service(30)
     # Ends are found in the order in which they were made: who answers this knows the client.
     peer.call(Trigger, 'other')

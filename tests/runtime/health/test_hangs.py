@@ -242,7 +242,7 @@ def test_a_service_that_hangs_is_reported(compose, peer):
     child = compose(text, CODE)
     child.wait_until_ready()
     for name in behaviours:
-        client = peer.node.create_client(Trigger, name)
+        client = peer.run(peer.node.create_client, Trigger, name)
         assert client.wait_for_service(30)
         client.call_async(Trigger.Request())
     reports = {

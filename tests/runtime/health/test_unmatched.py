@@ -33,8 +33,8 @@ BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 def test_ends_with_other_qos_are_named_with_what_to_do_about_it(compose, peer):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
-    peer.node.create_publisher(String, '/scan', BEST_EFFORT)
-    peer.node.create_subscription(String, '/words', print, 10)
+    peer.run(peer.node.create_publisher, String, '/scan', BEST_EFFORT)
+    peer.run(peer.node.create_subscription, String, '/words', print, 10)
 
     child.wait_for_line(
         "[WARN] [robot.ears]: subscription 'scan' (system.yaml:7) gets nothing from '/peer': "
@@ -52,13 +52,13 @@ def test_each_end_is_told_of_once_and_those_that_fit_are_heard(compose, peer):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
     for _ in range(3):
-        peer.node.create_publisher(String, '/scan', BEST_EFFORT)
+        peer.run(peer.node.create_publisher, String, '/scan', BEST_EFFORT)
     child.wait_for_line("gets nothing from '/peer'")
     publisher = peer.advertise(String, '/scan')
     publisher.publish(String(data='hello'))
     child.wait_for_line('heard hello')
     latched = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    peer.node.create_subscription(String, '/words', print, latched)
+    peer.run(peer.node.create_subscription, String, '/words', print, latched)
     child.wait_for_line("sends nothing to '/peer'")
     assert child.stop() == 0
 
@@ -90,7 +90,7 @@ def test_two_nodes_that_meet_by_a_rule_of_the_command_line_are_both_told(compose
 def test_an_end_of_another_type_is_named_with_both_types(compose, peer):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
-    peer.node.create_publisher(Int32, '/scan', 10)
+    peer.run(peer.node.create_publisher, Int32, '/scan', 10)
 
     child.wait_for_line(
         "[WARN] [robot.ears]: subscription 'scan' (system.yaml:7) gets nothing from '/peer': "
@@ -114,10 +114,13 @@ def test_all_policies_at_fault_are_named_and_no_others(compose, peer):
     child = compose(text, CODE)
     child.wait_until_ready()
     lease = Duration(seconds=2)
-    peer.node.create_publisher(
-        String, '/words', QoSProfile(depth=1, deadline=lease, liveliness_lease_duration=lease)
+    peer.run(
+        peer.node.create_publisher,
+        String,
+        '/words',
+        QoSProfile(depth=1, deadline=lease, liveliness_lease_duration=lease),
     )
-    peer.node.create_publisher(String, '/late', BEST_EFFORT)
+    peer.run(peer.node.create_publisher, String, '/late', BEST_EFFORT)
 
     child.wait_for_line(
         "subscription 'strict' (system.yaml:6) gets nothing from '/peer': deadline: 2 s is "
