@@ -12,7 +12,7 @@ from composer.inference.evaluation.function_calls import kind_of
 from composer.inference.message_types import MessageTypes
 from composer.inference.node_facts import Log, NodeFacts
 from composer.inference.project_modules import ProjectModules, is_of_project
-from composer.inference.reading import Reading, unknown_reading
+from composer.inference.reading import Reading, missing_reading, unknown_reading
 from composer.inference.scopes import own_nodes
 from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
@@ -103,8 +103,7 @@ class BehaviourReader:
     def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:
         module = self._finder.find(binding.behaviour.module)
         if not isinstance(module, ModuleSource):
-            # Another check reports it.
-            return Reading()
+            return missing_reading()
         if not is_of_project(module):
             return unknown_reading()
         self._modules.find(binding.behaviour.module)
@@ -122,6 +121,7 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
     evaluator = Evaluator(run)
     behaviour = binding.behaviour
     if not run.modules.has_name(module, behaviour.function):
+        run.reading = missing_reading()
         return
     function = _function_of(evaluator, evaluator.top_value(module, behaviour.function))
     if function is None:

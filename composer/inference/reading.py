@@ -154,3 +154,8 @@ def unknown_reading() -> Reading:
     reading = Reading()
     reading.open_all()
     return reading
+
+
+def missing_reading() -> Reading:
+    """Return the reading of a behaviour that does not exist, which another check reports."""
+    return Reading(open_kinds=set(USED_NOUNS), is_state_open=True, is_own_state_open=True)
