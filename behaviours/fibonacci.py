@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from composer import GoalRejectedError
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def compute(
-    node: Node, goal: Fibonacci.Goal, period: float = 1.0
+    node: Node, goal: Fibonacci.Goal, period: Annotated[float, '>= 0'] = 1.0
 ) -> Generator[list[int], None, list[int]]:
     """Compute the sequence, with each step as feedback.
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,11 +68,19 @@ def count(node: Node, _message: Any, topic: str) -> None:
 
 
 def watch(
-    node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
+    node: Node,
+    topic: str,
+    minimum_rate: Annotated[float, '>= 0'] = 0.0,
+    maximum_age: Annotated[float, '> 0'] = inf,
 ) -> Iterator[bool | None]:
     """Yield at each tick whether a topic is healthy, and log when that changes.
 
     ```yaml
+    subscriptions:
+      scan:
+        type: sensor_msgs/msg/LaserScan
+        behaviour: behaviours.monitor:count
+        with: {topic: scan}
     timers:
       watch_scan:
         period: 1.0
@@ -90,13 +98,21 @@ def watch(
 
 
 def diagnose(
-    node: Node, topic: str, minimum_rate: float = 0.0, maximum_age: float = inf
+    node: Node,
+    topic: str,
+    minimum_rate: Annotated[float, '>= 0'] = 0.0,
+    maximum_age: Annotated[float, '> 0'] = inf,
 ) -> Iterator[dict[str, Any] | None]:
     """Yield the health of a topic as diagnostics; otherwise as `watch`.
 
     ```yaml
     publishers:
       diagnostics: {type: diagnostic_msgs/msg/DiagnosticArray, topic: /diagnostics}
+    subscriptions:
+      scan:
+        type: sensor_msgs/msg/LaserScan
+        behaviour: behaviours.monitor:count
+        with: {topic: scan}
     timers:
       watch_scan:
         period: 1.0

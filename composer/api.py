@@ -28,14 +28,17 @@ def check(path: str | Path) -> list[Diagnostic]:
 
     The file is checked in each combination that it names under `check:`.
     """
+    from composer.checks.absent_packages import AbsentPackages
     from composer.checks.checker import check_system
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.pipeline import load_combinations
     from composer.reports.report import CheckedFile, Report, name_combinations
 
-    catalogue = InterfaceCatalogue()
+    catalogue, absent = InterfaceCatalogue(), AbsentPackages()
     files = [
-        CheckedFile(str(path), tuple(check_system(system, catalogue)), combination=name)
+        CheckedFile(
+            str(path), tuple(absent.leave_out(check_system(system, catalogue))), combination=name
+        )
         for name, system in load_combinations(Path(path))
     ]
     found = Report(tuple(name_combinations(files))).findings

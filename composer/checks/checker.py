@@ -7,7 +7,9 @@ from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.compared_arguments import check_compared_arguments
 from composer.checks.behaviours.missing_modules import check_missing_modules
+from composer.checks.behaviours.monitors import check_monitors
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
@@ -29,6 +31,7 @@ from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first
 from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -58,7 +61,9 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_parameters,
     check_behaviour_sources,
     check_missing_modules,
+    check_compared_arguments,
     check_transforms,
+    check_monitors,
     check_processes,
     check_process_parameters,
     check_annotations,
@@ -128,7 +133,7 @@ def check_in_context(
     heard = apply_ignore_comments(
         once.values(), system.positions.source, None if system.diagnostics else unchecked
     )
-    return _first_of(sorted(heard, key=lambda finding: finding.sort_key))
+    return _first_of(say_once(sorted(heard, key=lambda finding: finding.sort_key), system))
 
 
 def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:

@@ -6,11 +6,11 @@ value does not suit its declaration.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import list_packages
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import PathError, list_neighbours, resolve_path
@@ -19,7 +19,7 @@ from composer.names import find_namespace_problem, find_node_name_problem, join_
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
 from composer.ros_parameters.overrides import find_overrides
-from composer.spelling import suggest
+from composer.spelling import count_edits, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -76,7 +76,6 @@ class _Library:
         self.files: dict[str, ParameterFile] = {}
         self.findings: list[Diagnostic] = []
         self._context = context
-        self._knows_packages = bool(list_packages())
 
     def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
         """Read the files of a node or process, and yield those that exist."""
@@ -85,10 +84,9 @@ class _Library:
             try:
                 path = str(resolve_path(text, Path()))
             except PathError as error:
-                if self._knows_packages:
-                    self.findings.append(
-                        self._context.at_value(at, 'unknown-package', str(error), help=error.help)
-                    )
+                self.findings.append(
+                    self._context.at_value(at, 'uninstalled-package', str(error), help=error.help)
+                )
                 continue
             if path not in self.files:
                 self.files[path] = read_parameter_file(Path(path))
@@ -99,7 +97,7 @@ class _Library:
                     at,
                     each.rule,
                     f'{path}: {each.message}',
-                    help=each.help or _help_for_missing(Path(path)),
+                    help=_help_for_missing(Path(path)) or each.help,
                 )
                 for each in unreadable
             ]
@@ -108,7 +106,7 @@ class _Library:
 
 
 def _help_for_missing(path: Path) -> str | None:
-    return suggest(path.name, list_neighbours(path))
+    return suggest(path.name, list_neighbours(path), 'there are')
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
@@ -153,14 +151,32 @@ _DECIDING = ('namespace', 'parameter_files')
 
 def _check_names(file: ParameterFile, users: list[_User]) -> Iterator[Diagnostic]:
     names = [user.full_name for user in users if user.full_name]
+    may_have_others = any(user.node is None for user in users)
+    patterns = [pattern for pattern, _ in file.patterns]
+    unused = [name for name in names if not any(matches_pattern(each, name) for each in patterns)]
     for pattern, span in file.patterns:
         if not any(matches_pattern(pattern, name) for name in names):
+            if may_have_others and not _is_misspelt(pattern, names, unused):
+                continue
             yield diagnostic_at(
                 span,
                 'unmatched-node-name',
                 f"'{pattern}' matches no node that uses this file, so ROS ignores it",
                 help=suggest(pattern, names, 'it is used by'),
             )
+
+
+def _is_misspelt(pattern: str, names: list[str], unused: list[str]) -> bool:
+    """Return whether a name means one of these, and not another node of their processes.
+
+    Nobody knows which nodes a process has; they may be called alike, as `camera` and `camera2`.
+    """
+    pattern = f'/{pattern.removeprefix("/")}'
+    if find_nearest(pattern, unused):
+        return True
+    near = find_nearest(pattern, names)
+    are_numbered = near and re.sub(r'\d', '', pattern) == re.sub(r'\d', '', near)
+    return near is not None and not are_numbered and count_edits(pattern, near) == 1
 
 
 def _check_entries(

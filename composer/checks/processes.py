@@ -7,9 +7,9 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import list_executables, list_packages
+from composer.ament import explain_missing_package, list_executables, list_packages
 from composer.checks.names import IS_EMPTY, check_rules
-from composer.language.paths import is_in_package
+from composer.language.paths import PathError, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
 from composer.programs import base_environment, find_program_problem
 from composer.spelling import suggest
@@ -61,14 +61,14 @@ def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterato
 
 def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
     packages = list_packages()
-    if process.package is None or not packages:
+    if process.package is None:
         return
     if process.package not in packages:
         yield context.at_value(
             (*process.path, 'package'),
             'missing-package',
             f"no package '{process.package}' is installed",
-            help=suggest(process.package, packages, 'there are'),
+            help=explain_missing_package(process.package, packages),
         )
         return
     names = [path.name for path in list_executables(process.package)]
@@ -82,7 +82,15 @@ def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[D
 
 
 def _check_folder(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
-    if process.cwd is None or is_in_package(process.cwd) or Path(process.cwd).is_dir():
+    if process.cwd is None:
+        return
+    try:
+        folder = resolve_path(process.cwd, Path())
+    except PathError as error:
+        at, help_text = (*process.path, 'cwd'), error.help
+        yield context.at_value(at, 'uninstalled-package', str(error), help=help_text)
+        return
+    if folder.is_dir():
         return
     message = f"there is no folder '{process.cwd}' to run in"
     yield context.at_value((*process.path, 'cwd'), 'missing-folder', message)

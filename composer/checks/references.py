@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
+from composer.ament import explain_missing_package
+from composer.interfaces.descriptions import MessageDescription
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
+from composer.python_source.modules import ModuleSource
+from composer.python_source.return_values import passes_message_on
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -13,7 +17,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.interfaces.catalogue import InterfaceKind
-    from composer.language.specs import NodeSpec, QosSpec
+    from composer.language.specs import NodeSpec, PublisherSpec, QosSpec, SubscriptionSpec
     from composer.yaml_text.positions import DataPath
 
 
@@ -47,10 +51,9 @@ def _check_publisher(
 def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
     for subscription in node.subscriptions.values():
         publisher = node.publishers.get(subscription.publish or '')
-        relays = subscription.behaviour is None and not context.was_dropped(
-            (*subscription.path, 'behaviour')
-        )
-        if not relays or publisher is None or publisher.type == subscription.type:
+        if publisher is None or publisher.type == subscription.type:
+            continue
+        if not _passes_on(context, subscription, publisher):
             continue
         if all(context.has_real_type(end) for end in (subscription, publisher)):
             yield context.at_value(
@@ -60,6 +63,25 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
                 f'which publishes {publisher.type}',
                 help='give both the same type, or convert in a behaviour',
             )
+
+
+def _passes_on(
+    context: CheckContext, subscription: SubscriptionSpec, publisher: PublisherSpec
+) -> bool:
+    """Return whether messages are published as they were received."""
+    behaviour = subscription.behaviour
+    if behaviour is None:
+        return not context.was_dropped((*subscription.path, 'behaviour'))
+    module = context.modules.find(behaviour.module)
+    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
+    if source is None or source.definition is None or not passes_message_on(source.definition):
+        return False
+    # A message can be the only field of another one.
+    published = context.catalogue.describe(publisher.type)
+    if not isinstance(published, MessageDescription):
+        return False
+    fields = published.fields
+    return len(fields) != 1 or fields[0].type.nested != subscription.type
 
 
 def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
@@ -121,7 +143,9 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
             f"no interface package '{package}' is installed",
             part=package,
             first=True,
-            help=suggest(package, packages, otherwise='install it, or correct its name'),
+            help=explain_missing_package(
+                package, packages, ", or name the folder of its definitions under 'interfaces:'"
+            ),
         )
     known = context.catalogue.names(cast('InterfaceKind', kind), package)
     names = [full.rpartition('/')[2] for full in known]

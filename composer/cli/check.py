@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_system
 from composer.cli.argument_types import split_words
 from composer.cli.file_selection import (
@@ -47,6 +48,7 @@ class CheckOptions:
         is_quiet: Whether to print only findings.
         imports: Whether to import the behaviours.
         skip_other_files: Whether to skip named files that do not look like systems.
+        strict_packages: Whether packages that are not installed are errors without ROS 2, too.
         stdin_name: The path that findings in standard input are reported under.
     """
 
@@ -60,6 +62,7 @@ class CheckOptions:
     is_quiet: bool = False
     imports: bool = False
     skip_other_files: bool = False
+    strict_packages: bool = False
     stdin_name: str = '<stdin>'
 
 
@@ -93,17 +96,18 @@ def _refuse_contradictions(options: CheckOptions) -> None:
 def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     catalogue = InterfaceCatalogue()
     selection = _select(words, options)
+    absent = AbsentPackages(is_strict=options.strict_packages)
     imports = _import_check() if options.imports else None
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     for selected in selection.systems:
         checked = []
         for given, combination, system in _load(selected, options):
-            findings = check_system(system, catalogue, imports)
+            findings = absent.leave_out(check_system(system, catalogue, imports))
             kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
             nodes = len(system.spec.nodes) if system.spec else None
             checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
         files += name_combinations(checked)
-    unchecked = _list_unchecked(catalogue, imports)
+    unchecked = _list_unchecked(catalogue, imports, absent)
     return Report(tuple(files), unchecked, options.is_strict)
 
 
@@ -148,11 +152,15 @@ def _load(
     yield from ((given, name, system) for name, system in systems)
 
 
-def _list_unchecked(catalogue: InterfaceCatalogue, imports: ImportCheck | None) -> tuple[str, ...]:
+def _list_unchecked(
+    catalogue: InterfaceCatalogue, imports: ImportCheck | None, absent: AbsentPackages
+) -> tuple[str, ...]:
     """Return one line with what could not be checked without ROS 2, if anything."""
     unchecked = []
     if not catalogue.available:
         unchecked.append('interface types and the fields of messages')
+    if absent.note:
+        unchecked.append(absent.note)
     if imports and imports.missing_ros:
         unchecked.append(f'what imports ROS itself ({", ".join(sorted(imports.missing_ros))})')
     return (f'not checked without ROS 2: {"; ".join(unchecked)}',) if unchecked else ()

@@ -158,6 +158,11 @@ def up_command(
     help='Skip named files that are not systems, such as other YAML.',
 )
 @click.option(
+    '--strict-packages',
+    is_flag=True,
+    help='Without ROS 2: report packages that are not installed as errors, too.',
+)
+@click.option(
     '--stdin-filename',
     metavar='PATH',
     default='<stdin>',
@@ -176,6 +181,7 @@ def check_command(  # noqa: PLR0913 - one for each option
     imports: bool,
     quiet: bool,
     skip_other_files: bool,
+    strict_packages: bool,
     stdin_filename: str,
 ) -> int:
     """Check FILE for errors, without running anything.
@@ -198,6 +204,7 @@ def check_command(  # noqa: PLR0913 - one for each option
         is_quiet=quiet,
         imports=imports,
         skip_other_files=skip_other_files,
+        strict_packages=strict_packages,
         stdin_name=stdin_filename,
     )
     refuse_options(words)

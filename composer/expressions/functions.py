@@ -7,11 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import TemplateRuntimeError
 
-from composer.ament import find_share, list_packages
-from composer.spelling import suggest
+from composer.ament import explain_missing_package, find_share, list_packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+
+class PackageError(TemplateRuntimeError):
+    """A package is not installed.
+
+    Attributes:
+        help: What to do about it.
+    """
+
+    def __init__(self, package: str) -> None:
+        super().__init__(f"no package '{package}' is installed")
+        self.help = explain_missing_package(package, list_packages())
 
 
 def read_environment(name: str, default: str | None = None) -> str:
@@ -32,14 +43,11 @@ def find_package_share(package: str) -> str:
     """Return the share folder of a ROS package.
 
     Raises:
-        TemplateRuntimeError: It is not installed.
+        PackageError: It is not installed.
     """
     share = find_share(package)
     if share is None:
-        advice = suggest(package, list_packages())
-        hint = f'; {advice}' if advice else ''
-        message = f"no package '{package}' is installed{hint}"
-        raise TemplateRuntimeError(message)
+        raise PackageError(package)
     return str(share)
 
 

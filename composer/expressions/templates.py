@@ -25,6 +25,7 @@ from jinja2.exceptions import SecurityError
 from composer.confidential import hide, origin_of
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions.evaluation import evaluate_expression
+from composer.expressions.functions import PackageError
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
 from composer.input_limits import MAX_FINDINGS
@@ -214,11 +215,14 @@ class TemplateEvaluator:
                 f"'{name}' is not defined",
                 help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
             )
+        is_package = isinstance(error, PackageError)
+        rule = 'uninstalled-package' if is_package else 'bad-expression'
         if origin is None:
-            return diagnostic_at(span, 'bad-expression', _describe(error))
+            help_text = getattr(error, 'help', None) if is_package else None
+            return diagnostic_at(span, rule, _describe(error), help=help_text)
         # Its text may quote any part of the value.
         message = f'the expression raised {type(error).__name__} with a value from {origin}'
-        return diagnostic_at(span, 'bad-expression', message)
+        return diagnostic_at(span, rule, message)
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
         """Report that two keys of one mapping evaluate to the same."""

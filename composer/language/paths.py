@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.ament import find_share, list_packages
+from composer.ament import explain_missing_package, find_share, list_packages
 from composer.errors import ComposerError
-from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,6 +17,10 @@ _PACKAGE = 'package://'
 
 
 class PathError(ComposerError):
+    """A path leads nowhere."""
+
+
+class PackagePathError(PathError):
     """A path leads into a package that is not installed."""
 
 
@@ -30,7 +33,7 @@ def resolve_path(text: str, folder: Path) -> Path:
     """Return the path that a text means in a file of `folder`.
 
     Raises:
-        PathError: The package of `package://name/path` is not installed.
+        PackagePathError: The package of `package://name/path` is not installed.
     """
     if not is_in_package(text):
         return folder / text
@@ -38,7 +41,8 @@ def resolve_path(text: str, folder: Path) -> Path:
     share = find_share(package)
     if share is None:
         message = f"no package '{package}' is installed"
-        raise PathError(message, help=suggest(package, list_packages()))
+        help_text = explain_missing_package(package, list_packages())
+        raise PackagePathError(message, help=help_text)
     return share / rest
 
 

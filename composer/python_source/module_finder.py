@@ -26,10 +26,12 @@ class MissingModule:
     Attributes:
         missing: The part of its name that was not found, as in `behaviours.greter`.
         nearest: The module that may have been meant.
+        hidden_by: The `__init__.py` without which Python would find it in another folder.
     """
 
     missing: str
     nearest: str | None
+    hidden_by: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,8 @@ class ModuleFinder:
         if not located.missing:
             return None
         *done, part = located.missing.split('.')
-        return MissingModule(located.missing, self._nearest(part, done, located.folders))
+        nearest = self._nearest(part, done, located.folders)
+        return MissingModule(located.missing, nearest, self._find_hiding(done, part))
 
     def is_package(self, name: str) -> bool:
         """Return whether a name is that of a package with an `__init__.py`."""
@@ -93,9 +96,10 @@ class ModuleFinder:
         return located.file is not None and located.file.name == '__init__.py'
 
     def is_of_project(self, name: str) -> bool:
-        """Return whether the package of a module is found before the installed ones."""
-        file, folders = _locate(name.partition('.')[0], self._project)
-        return file is not None or bool(folders)
+        """Return whether a module, or the package that it is in, is not an installed one."""
+        file, folders = _locate(name.partition('.')[0], self._roots)
+        found = [*([file] if file else []), *folders[:1]]
+        return any(each.parent in self._project for each in found)
 
     def _find(self, name: str) -> ModuleSource | MissingModule:
         missing = self.find_missing(name)
@@ -121,6 +125,13 @@ class ModuleFinder:
                 return _Location(None, '.'.join(done), folders)
             folders = inner
         return _Location(file, '', folders)
+
+    def _find_hiding(self, done: list[str], part: str) -> Path | None:
+        """Return the `__init__.py` without which a module would be found in another folder."""
+        file = self._locate('.'.join(done)).file if done else None
+        inside = Path(*done, f'{part}.py')
+        is_elsewhere = file is not None and any(_is_there(root / inside) for root in self._roots)
+        return file if is_elsewhere else None
 
     def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
         for folder in folders:

@@ -19,7 +19,7 @@ from composer.input_limits import (
     UnreadableFileError,
     read_file,
 )
-from composer.python_source.local_names import stored_names
+from composer.python_source.local_names import nested_names, stored_names
 from composer.python_source.syntax import (
     BLOCKS,
     FunctionNode,
@@ -54,9 +54,11 @@ class FunctionSource:
 
     Attributes:
         definition: Its syntax tree; `None` if only running the module could tell what it is.
+        class_definition: The syntax tree of a class, which can be called as well.
     """
 
     definition: FunctionNode | None = None
+    class_definition: ast.ClassDef | None = None
 
     @cached_property
     def kind(self) -> FunctionKind | None:
@@ -66,6 +68,8 @@ class FunctionSource:
     @cached_property
     def signature(self) -> inspect.Signature | None:
         """Its parameters, if they are known."""
+        if self.class_definition:
+            return _read_constructor(self.class_definition)
         return _read_signature(self.definition.args) if self.definition else None
 
 
@@ -206,7 +210,7 @@ class _ModuleReader:
             known = None if statement.decorator_list else statement
             self._bind(statement.name, FunctionSource(known))
         elif isinstance(statement, ast.ClassDef):
-            self._bind(statement.name, FunctionSource())
+            self._bind(statement.name, FunctionSource(class_definition=statement))
         elif isinstance(statement, ast.Import | ast.ImportFrom):
             self._read_import(statement)
         elif isinstance(statement, ast.Assign | ast.AnnAssign):
@@ -289,6 +293,24 @@ def _own_nodes(function: FunctionNode) -> list[ast.AST]:
         if not isinstance(node, _OWN_SCOPE):
             pending.extend(ast.iter_child_nodes(node))
     return found
+
+
+def _read_constructor(definition: ast.ClassDef) -> inspect.Signature | None:
+    """Return the parameters of a plain class, `None` if others may decide about them."""
+    if definition.bases or definition.keywords or definition.decorator_list:
+        return None
+    names = {name.id for name in stored_names(ast.walk(definition))}
+    inner = nested_names(ast.walk(definition))
+    if '__new__' in names | inner or '__init__' in names:
+        return None
+    functions = (each for each in definition.body if isinstance(each, ast.FunctionDef))
+    makers = [each for each in functions if each.name == '__init__']
+    if not makers:
+        return None if '__init__' in inner else inspect.Signature()
+    if len(makers) > 1 or makers[0].decorator_list:
+        return None
+    signature = _read_signature(makers[0].args)
+    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 def _read_signature(arguments: ast.arguments) -> inspect.Signature:

@@ -1,9 +1,11 @@
-"""Find out whether a function always returns a value."""
+"""Find out whether a function always returns a value, or the message that it is given."""
 
 from __future__ import annotations
 
 import ast
 from typing import TYPE_CHECKING
+
+from composer.python_source.local_names import stored_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,6 +42,23 @@ def always_answers(function: FunctionNode) -> bool:
     sure = set() if message in stored else {message}
     answers = [statement.value for statement in _returns(function)]
     return _ends(function.body) and all(_is_value(answer, sure) for answer in answers)
+
+
+def passes_message_on(function: FunctionNode) -> bool:
+    """Return whether a function returns its second parameter, a message, as it is."""
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    if len(arguments) <= 1:
+        return False
+    message = arguments[1].arg
+    if any(name.id == message for name in stored_names(ast.walk(function))):
+        return False
+    return any(_may_be(answer.value, message) for answer in _returns(function))
+
+
+def _may_be(answer: ast.expr | None, name: str) -> bool:
+    if isinstance(answer, ast.IfExp):
+        return _may_be(answer.body, name) or _may_be(answer.orelse, name)
+    return isinstance(answer, ast.Name) and answer.id == name
 
 
 def _returns(function: FunctionNode) -> Iterator[ast.Return]:

@@ -14,7 +14,7 @@ from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
 from composer.input_limits import MAX_FINDINGS
 from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
-from composer.ros_parameters.rcl_values import RULE, ValueReader
+from composer.ros_parameters.rcl_values import RULE, ValueReader, flatten_list
 from composer.spelling import suggest
 from composer.yaml_text.reader import decode_content, read_content
 from composer.yaml_text.tree import (
@@ -211,10 +211,14 @@ class _Reader:
                 self._opened += 1
                 self._read_parameters(value_node, pattern, place, keys, is_last=ends)
                 continue
-            value = self._values.read(value_node, key)
+            names, read_node = _without_mappings(value_node)
+            value = self._values.read(read_node, key)
             if value is None:
                 continue
-            items = value_node.items if isinstance(value_node, SequenceNode) else []
+            keys = (*keys, *names)
+            if names:
+                self._explain_mappings(value_node, '.'.join(keys))
+            items = read_node.items if isinstance(read_node, SequenceNode) else []
             entry = ParameterEntry(
                 pattern,
                 keys,
@@ -228,6 +232,16 @@ class _Reader:
             )
             self.entries.append(entry)
             self._opened = 0
+
+    def _explain_mappings(self, node: TreeNode, name: str) -> None:
+        place = next(each for each in getattr(node, 'items', ()) if isinstance(each, MappingNode))
+        finding = diagnostic_at(
+            place.span,
+            'misread-list',
+            f"ROS has no mappings in lists: it reads this as the list '{name}'",
+            help="give each item a name, as in 'list: {first: {key: value}}'",
+        )
+        self.findings.append(finding)
 
     def check_double_names(self) -> None:
         """Report names that have a value and, elsewhere, names below them."""
@@ -272,6 +286,15 @@ class _Reader:
         # Nobody sees more, and each takes its time.
         if len(self.findings) <= MAX_FINDINGS:
             self.findings.append(diagnostic_at(span, RULE, message, help=help_text))
+
+
+def _without_mappings(node: TreeNode) -> tuple[list[str], TreeNode]:
+    """Return what mappings in a list add to its name, and the list without them."""
+    has_mappings = isinstance(node, SequenceNode) and any(
+        isinstance(item, MappingNode) for item in node.items
+    )
+    flat = flatten_list(node) if isinstance(node, SequenceNode) and has_mappings else None
+    return flat or ([], node)
 
 
 def _join(prefix: str, key: str) -> str:

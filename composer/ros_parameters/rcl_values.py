@@ -8,6 +8,7 @@ Source: `get_value` and `parse_value` in rcl (`rcl_yaml_param_parser/src/parse.c
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -116,6 +117,30 @@ class ValueReader:
 
     def _report(self, span: Span, message: str, help_text: str | None = None) -> None:
         self._findings.append(diagnostic_at(span, RULE, message, help=help_text))
+
+
+def flatten_list(node: SequenceNode) -> tuple[list[str], SequenceNode] | None:
+    """Return a list with mappings as rcl reads it: names that it adds to the parameter's, items.
+
+    The parser takes the first key of each mapping for a part of the name, and the values for items
+    of the list; `None` if it refuses the list, or reads something that nobody can mean.
+    """
+    names: list[str] = []
+    items: list[TreeNode] = []
+    pending = [*reversed(node.items)]
+    while pending:
+        item = pending.pop()
+        if isinstance(item, ScalarNode):
+            items.append(item)
+        elif isinstance(item, MappingNode) and len(item.pairs) == 1:
+            ((key, value),) = item.pairs
+            if not isinstance(key, ScalarNode) or not key.text:
+                return None
+            names.append(key.text)
+            pending.append(value)
+        else:
+            return None
+    return names, replace(node, items=items)
 
 
 def _help_for_mixture(first: Any, other: Any) -> str | None:

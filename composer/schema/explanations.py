@@ -82,6 +82,9 @@ def _explain_const(error: ValidationError) -> Iterator[Violation]:
             f'version {show_value(error.instance)} is not supported, only version 1',
             path,
             path,
+            help='write 1 without quotes: a version is a number'
+            if error.instance == str(error.validator_value)
+            else None,
         )
         return
     yield Violation(
@@ -174,9 +177,9 @@ def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
         return False
     if inner.validator == 'const':
         return True
-    nested = inner.validator == 'oneOf' and all(
-        _is_mismatch(e, outer) for e in inner.context or ()
-    )
+    # Without a context, several of the alternatives hold.
+    context = inner.context if inner.validator == 'oneOf' else None
+    nested = bool(context) and all(_is_mismatch(e, outer) for e in context or ())
     return inner.validator == 'type' or nested
 
 

@@ -11,7 +11,7 @@ from composer.language.pipeline import load_system
 SYSTEM = """
 version: 1
 args: {simulation: %s}
-nodes: {}
+nodes: {other: {}}
 processes:
   driver: {when: "{{ not simulation }}", package: vendor_camera, executable: driver}
 """
@@ -50,7 +50,10 @@ def test_a_process_that_is_left_out_may_be_of_another_machine(
         ('{command: [./text], cwd: bin}', ["'bin/text' is not executable"]),
         ('{command: [/bin/none]}', ["there is no program '/bin/none'"]),
         ('{command: [sh], cwd: nib}', ["there is no folder 'nib' to run in"]),
-        ('{command: [own], cwd: package://none/bin, env: {PATH: bin}}', []),
+        (
+            '{command: [own], cwd: package://none/bin, env: {PATH: bin}}',
+            ["no package 'none' is installed"],
+        ),
         ('{command: [own], cwd: nib, when: false}', []),
         ('{command: ["{{ program }}"]}', []),
     ],

@@ -180,7 +180,8 @@ def test_a_later_file_that_loses_by_its_type_is_a_warning(check):
 def test_a_missing_file_is_an_error_where_it_is_named(check):
     (line,) = check(ARM)
     assert line == (
-        'system.yaml:6:23 unreadable-file: p.yaml: cannot read the file: No such file or directory'
+        'system.yaml:6:23 unreadable-file: p.yaml: cannot read the file: No such file or directory '
+        '→ there are: system.yaml'
     )
 
 
@@ -188,7 +189,7 @@ def test_a_missing_file_is_an_error_where_it_is_named(check):
 def test_an_unknown_package_is_an_error_where_it_is_named(check):
     nodes = ARM.replace('p.yaml', 'package://std_msg/p.yaml')
     assert check(nodes) == [
-        "system.yaml:6:23 unknown-package: no package 'std_msg' is installed "
+        "system.yaml:6:23 uninstalled-package: no package 'std_msg' is installed "
         "→ did you mean 'std_msgs'?"
     ]
 
@@ -229,3 +230,20 @@ def test_a_file_named_by_an_argument_without_a_default_is_not_missed(check):
 def test_a_misspelt_file_comes_with_the_nearest(check):
     (line,) = check(ARM, pp='/**: {ros__parameters: {speed: 1.0}}')
     assert line.endswith("No such file or directory → did you mean 'pp.yaml'?")
+
+
+@pytest.mark.parametrize(
+    ('names', 'wrong'),
+    [
+        (['arm', 'local_costmap'], []),  # a node that the process may have beside its own
+        (['arm', 'arm2'], []),
+        (['local_costmap'], []),
+        (['amr', 'local_costmap'], ['amr']),
+        (['arm', 'arrm'], ['arrm']),
+    ],
+)
+def test_a_process_may_have_nodes_that_nobody_knows(check, names, wrong):
+    process = '{command: [nav], name: arm, namespace: "", parameter_files: [p.yaml]}'
+    text = ''.join(f'{name}: {{ros__parameters: {{a: 1}}}}\n' for name in names)
+    found = check('  a: {}\n', more=f'processes: {{nav: {process}}}\n', p=text)
+    assert [line.split("'")[1] for line in found if 'unmatched' in line] == wrong

@@ -65,7 +65,8 @@ def test_names_in_mappings_are_names_of_parameters():
 
 
 def test_what_is_left_out_is_checked_too():
-    system = load_system_text((SYSTEM % 'f: null').replace('{command', '{when: false, command'))
+    left_out = (SYSTEM % 'f: null').replace('{command', '{when: false, command')
+    system = load_system_text(left_out + "  other: {command: ['true']}\n")
     assert [each.rule for each in check_system(system, InterfaceCatalogue())] == ['bad-parameter']
 
 

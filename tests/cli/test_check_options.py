@@ -282,12 +282,28 @@ def test_an_import_leaves_nothing_behind(imports):
 
 
 @pytest.mark.parametrize(
-    'code', ['raise SystemExit(7)', 'import no_such_module', 'raise RuntimeError', '1 / 0']
+    'code',
+    [
+        'raise SystemExit(7)',
+        'try: import no_such_module\nfinally: pass',
+        'raise RuntimeError',
+        '1 / 0',
+    ],
 )
 def test_an_import_that_fails_is_a_finding(imports, code):
     found, out, _ = imports('{on_start: driving:start}', f'{code}\n\ndef start(node): ...\n')
     assert found == 1
     assert "error[broken-behaviour]: importing 'driving' raised " in out
+
+
+def test_a_module_that_is_missing_is_told_once(run, imports):
+    node = '{on_start: driving:start, on_stop: driving:start}'
+    code = 'import json.decodr\n\ndef start(node): ...\n'
+    _, out, err = imports(node, code, '-q')
+    assert (out, err) == (run('rover.yaml', '-q')[1], '')
+    assert out.startswith(
+        "driving.py:1:8: error[missing-module]: there is no module 'json.decodr'"
+    )
 
 
 def test_an_error_is_not_found_twice(imports):

@@ -165,7 +165,7 @@ nodes:
             'bad-expression',
             "the environment variable 'NO_SUCH' is not set; give a default, as in env('NO_SUCH', 'none')",
         ),
-        ('bad-expression', "no package 'no_such_package' is installed"),
+        ('uninstalled-package', "no package 'no_such_package' is installed"),
     ]
 
 

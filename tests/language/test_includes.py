@@ -171,7 +171,7 @@ def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
         ),
         (
             '{file: "package://no_such/x.yaml"}',
-            ('missing-include', 'robot.yaml:3:16', "no package 'no_such' is installed"),
+            ('uninstalled-package', 'robot.yaml:3:16', "no package 'no_such' is installed"),
         ),
         (
             '{file: arm.yaml, args: {side: l, jonts: 3}}',

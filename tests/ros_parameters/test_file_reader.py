@@ -105,7 +105,9 @@ FAULTS = {
         '1:31 all items of a list have one type: this is an integer, the first is a bool'
     ),
     'a: {ros__parameters: {b: [[1]]}}': '1:27 a list of parameters cannot contain lists',
-    'a: {ros__parameters: {b: [{c: 1}]}}': '1:27 a list of parameters cannot contain mappings',
+    'a: {ros__parameters: {b: [{c: 1, d: 2}]}}': (
+        '1:27 a list of parameters cannot contain mappings'
+    ),
     'a: {ros__parameters: {b: {}}}': (
         "1:23 'b' is an empty mapping, and ROS misreads what follows it"
     ),

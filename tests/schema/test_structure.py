@@ -76,7 +76,7 @@ def test_a_right_file_has_no_findings():
                 'unsupported-version',
                 "version '1' is not supported, only version 1",
                 '1:10',
-                None,
+                'write 1 without quotes: a version is a number',
             ),
         ),
         (

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any
+import sys
+from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related
 from composer.language.bindings import Binding, node_bindings
+from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
+from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.python_source.modules import FunctionKind, ModuleSource
+
+# Modules of the standard library with functions that take anything, such as `print`.
+_TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'unittest')
 
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
@@ -88,12 +94,27 @@ def _check_source(
     context: CheckContext, binding: Binding, module: ModuleSource | MissingModule
 ) -> Iterator[Diagnostic]:
     behaviour = binding.behaviour
-    if isinstance(module, MissingModule):
+    if _is_of_python(context, behaviour.module):
+        yield context.at_value(
+            behaviour.path,
+            'uncallable-behaviour',
+            f"'{behaviour.name}' is of Python's standard library, and no behaviour: it cannot be "
+            f'called as {binding.call}',
+            help='write a function that calls it',
+        )
+    elif isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
     elif function := module.functions.get(behaviour.function):
         yield from check_behaviour_call(context, binding, function.kind, function.signature)
     elif not module.is_open:
         yield _explain_missing_function(context, binding, module)
+
+
+def _is_of_python(context: CheckContext, module: str) -> bool:
+    """Return whether a module is of the standard library, whose functions take no node."""
+    top = module.partition('.')[0]
+    is_of_python = top in sys.stdlib_module_names and top not in _TAKE_ANYTHING
+    return is_of_python and not context.modules.is_of_project(module)
 
 
 def _explain_missing_module(
@@ -102,13 +123,17 @@ def _explain_missing_module(
     behaviour = binding.behaviour
     path = behaviour.module.replace('.', '/')
     otherwise = f'create {path}.py in the project, or install the package that has it'
+    if module.hidden_by:
+        otherwise = (
+            f'remove {shown_path(module.hidden_by)}, which hides the other modules of this name'
+        )
     return context.at_value(
         behaviour.path,
         'unknown-behaviour',
         f"there is no module '{module.missing}'",
         part=behaviour.module,
         first=True,
-        help=did_you_mean(module.nearest, otherwise),
+        help=otherwise if module.hidden_by else did_you_mean(module.nearest, otherwise),
     )
 
 
@@ -129,12 +154,17 @@ def _explain_missing_function(
         'unknown-behaviour',
         f"{behaviour.module} has no function '{behaviour.function}'",
         part=behaviour.function,
-        help=suggest(behaviour.function, _public(module.functions), 'it has'),
+        help=_suggest_function(behaviour.function, module),
     )
 
 
-def _public(names: Mapping[str, object]) -> list[str]:
-    return [name for name in names if not name.startswith('_')]
+def _suggest_function(name: str, module: ModuleSource) -> str:
+    """Return the nearest name that a module can call, or its own functions."""
+    # Classes and constants have capitals, and what it imports is there for other ends.
+    callables = [each for each in module.functions if each[0] != '_' and not each[0].isupper()]
+    own = [each for each in callables if each not in module.imports]
+    near = find_nearest(name, callables)
+    return did_you_mean(near) or suggest('', own, 'it has', 'it has no functions') or ''
 
 
 def _check_signature(
@@ -176,33 +206,39 @@ def _check_signature(
 def _check_values(
     context: CheckContext, binding: Binding, signature: inspect.Signature
 ) -> Iterator[Diagnostic]:
-    """Check the values of arguments against annotations with built-in types."""
+    """Check the values of arguments against their annotations."""
     behaviour = binding.behaviour
-    for keyword, value in behaviour.arguments.items():
-        parameter = signature.parameters.get(keyword)
-        wanted = _annotated_types(parameter) if parameter else set()
-        if wanted and not any(_fits(value, each) for each in wanted):
+    annotations = {
+        keyword: _annotation_of(signature.parameters[keyword])
+        for keyword in behaviour.arguments
+        if keyword in signature.parameters
+    }
+    # A bound that is itself out of bounds is one mistake.
+    bounds = {
+        keyword: behaviour.arguments[keyword]
+        for keyword, annotation in annotations.items()
+        if not find_wanted_values(annotation, behaviour.arguments[keyword], {})
+    }
+    for keyword, annotation in annotations.items():
+        value = behaviour.arguments[keyword]
+        wanted = find_wanted_values(annotation, value, bounds)
+        if wanted:
+            shown = ' or '.join(sorted({each.text for each in wanted}))
             yield context.at_value(
                 (*behaviour.path[:-1], 'with', keyword),
                 'bad-argument',
-                f"{behaviour.name} takes {' or '.join(sorted(wanted))} as '{keyword}', "
-                f'and is given {_shown(value)}',
+                f"{behaviour.name} takes {shown} as '{keyword}', and is given {_shown(value)}",
+                help=suggest(value, [each.option for each in wanted]),
             )
 
 
-def _annotated_types(parameter: inspect.Parameter) -> set[str]:
-    """Return the built-in types of an annotation; none if it has other types."""
+def _annotation_of(parameter: inspect.Parameter) -> str:
     annotation = parameter.annotation
-    text = annotation if isinstance(annotation, str) else getattr(annotation, '__name__', '')
-    names = {name.strip() for name in text.strip('\'"').split('|')} - {'None'}
-    return names if names <= _SCALARS.keys() else set()
-
-
-def _fits(value: Any, wanted: str) -> bool:
-    if value is None or (wanted == 'int' and isinstance(value, float) and value.is_integer()):
-        return True
-    types = _SCALARS[wanted]
-    return isinstance(value, types) and (bool in types or not isinstance(value, bool))
+    if annotation is parameter.empty:
+        return ''
+    if isinstance(annotation, type) and not get_args(annotation):
+        return annotation.__name__
+    return str(annotation)
 
 
 def _shown(value: Any) -> str:
@@ -211,15 +247,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return 'a mapping' if isinstance(value, dict) else 'a list'
     return repr(value)
-
-
-# The types of YAML values that fit an annotation.
-_SCALARS: dict[str, tuple[type, ...]] = {
-    'bool': (bool,),
-    'float': (float, int),
-    'int': (int,),
-    'str': (str,),
-}
 
 
 def _positional_parameters(signature: inspect.Signature) -> list[str]:

@@ -7,6 +7,7 @@ and those with which a behaviour begins.
 from __future__ import annotations
 
 import ast
+import importlib.util
 import re
 import sys
 from dataclasses import dataclass, field
@@ -31,6 +32,8 @@ _Import = ast.Import | ast.ImportFrom
 _CHANGES_THE_SEARCH = re.compile(
     r'\bsys\.(path|modules|meta_path)\b|\bpath\.(append|extend|insert)\(|\baddsitedir\b|__path__'
 )
+# Each is read as a whole, and a small part of a large project is enough for a system.
+_MOST_MODULES = 50
 # Statements after which a function goes on in any case.
 _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
@@ -70,9 +73,14 @@ class _Walk:
         pending = [name]
         while pending:
             each = pending.pop()
-            if each in self._visited or not self.context.modules.is_of_project(each):
+            if each in self._visited:
                 continue
             self._visited.add(each)
+            is_followed = (
+                len(self.modules) < _MOST_MODULES and each.partition('.')[0] != 'composer'
+            )
+            if not (is_followed and self.context.modules.is_of_project(each)):
+                continue
             pending += [each.rpartition('.')[0]] if '.' in each else []
             module = self.context.modules.find(each)
             if isinstance(module, ModuleSource) and module.path is not None:
@@ -115,7 +123,7 @@ class _Walk:
         if not self._check_module(home, importer, place):
             return []
         aliases = [alias for alias in statement.names if alias.name != '*']
-        if self.context.modules.is_of_project(home):
+        if self._is_of_project(home) and not self._is_built(home):
             for alias in aliases:
                 self._check_member(home, alias, importer)
         return [home, *(f'{home}.{alias.name}' for alias in aliases)]
@@ -123,7 +131,9 @@ class _Walk:
     def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
         """Check that a module exists; return whether it does."""
         modules = self.context.modules
-        if name in sys.modules or name in sys.stdlib_module_names or modules.has(name):
+        if self._is_built(name) or name in sys.modules or name in sys.stdlib_module_names:
+            return True
+        if modules.has(name):
             return True
         missing = modules.find_missing(name)
         if missing is not None and self._is_certain(missing.missing):
@@ -136,16 +146,24 @@ class _Walk:
         """Return whether a module is missing wherever the system can run."""
         top, _, inner = missing.partition('.')
         modules = self.context.modules
-        if inner and modules.is_of_project(top):
+        if inner and self._is_of_project(top):
             return True
         if inner:
             # Packages that are installed may make their modules themselves.
             is_of_python = top in sys.stdlib_module_names
             return is_of_python and modules.is_package(missing.rpartition('.')[0])
-        if top in self.context.spec.interfaces or top in self.context.catalogue.packages():
-            return False
         # A Python without ROS cannot run the system: another one has what it needs.
-        return modules.has('rclpy')
+        return bool(importlib.util.find_spec('rclpy'))
+
+    def _is_of_project(self, name: str) -> bool:
+        # Where Composer is developed, it is one itself.
+        is_composer = name.partition('.')[0] == 'composer'
+        return not is_composer and self.context.modules.is_of_project(name)
+
+    def _is_built(self, name: str) -> bool:
+        """Return whether a module is of an interface package, which may be built only later."""
+        top = name.partition('.')[0]
+        return top in self.context.spec.interfaces or top in self.context.catalogue.packages()
 
     def _check_member(self, home: str, alias: ast.alias, importer: _Importer) -> None:
         """Check a name that is imported from a module or package of the project."""

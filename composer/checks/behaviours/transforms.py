@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.interfaces.descriptions import MessageDescription
+from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
+from composer.interfaces.payload_checks import check_payload
 from composer.python_source.module_finder import MissingModule
 
 if TYPE_CHECKING:
@@ -27,14 +28,14 @@ def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
             behaviour = subscription.behaviour
             if behaviour and (behaviour.module, behaviour.function) == (_MODULE, _FUNCTION):
                 fields = behaviour.arguments.get('fields')
-                if isinstance(fields, dict) and _is_ours(context):
+                if isinstance(fields, dict) and is_shipped(context, _MODULE):
                     yield from _check_fields(context, node, subscription, fields)
 
 
-def _is_ours(context: CheckContext) -> bool:
-    """Return whether the module is the one that comes with Composer, not another of its name."""
-    module = context.modules.find(_MODULE)
-    own = Path(__file__).parents[3].joinpath(*_MODULE.split('.')).with_suffix('.py')
+def is_shipped(context: CheckContext, name: str) -> bool:
+    """Return whether a module is the one that comes with Composer, not another of its name."""
+    module = context.modules.find(name)
+    own = Path(__file__).parents[3].joinpath(*name.split('.')).with_suffix('.py')
     path = None if isinstance(module, MissingModule) else module.path
     return path is not None and path.resolve() == own.resolve()
 
@@ -50,10 +51,12 @@ def _check_fields(
     made = _describe(context, publisher.type) if publisher else None
     for name, expression in fields.items():
         path = (*subscription.path, 'with', 'fields', name)
-        if made:
-            yield from _check_name(context, made, name, path)
+        findings = list(_check_name(context, made, name, path)) if made else []
         if heard:
-            yield from _check_expression(context, heard, str(expression), path)
+            findings += _check_expression(context, heard, str(expression), path)
+        if heard and made and not findings:
+            findings += _check_type(context, made, heard, str(expression), path)
+        yield from findings
 
 
 def _describe(context: CheckContext, type_name: str) -> MessageDescription | None:
@@ -92,3 +95,45 @@ def _check_expression(
         yield context.at_value(
             path, finding.rule, finding.message, part=finding.part, help=finding.help
         )
+
+
+def _check_type(
+    context: CheckContext,
+    made: MessageDescription,
+    heard: MessageDescription,
+    expression: str,
+    path: DataPath,
+) -> Iterator[Diagnostic]:
+    """Check that the value of an expression, as far as it is known, fits its field."""
+    from composer.checks.behaviours.message_expressions import value_of_expression
+
+    value = value_of_expression(expression, heard, context.catalogue)
+    *outer, last = str(path[-1]).split('.')
+    owner: MessageDescription | None = made
+    for part in outer:
+        nested = owner.field(part) if owner else None
+        owner = _describe(context, nested.type.nested or '') if nested else None
+    field = owner.field(last) if owner else None
+    if value is None or owner is None or field is None:
+        return
+    wrong = f'{owner.name}: {last}: expected {field.type}, got {value.noun}'
+    if value.message is not None:
+        if not _may_take(context, field.type, value.message):
+            yield context.at_value(path, 'field-type', wrong)
+        return
+    for finding in check_payload(owner, {last: value.sample}, context.catalogue):
+        if value.is_constant:
+            yield context.at_value(path, finding.rule, finding.message)
+        elif finding.rule == 'field-type':
+            # How long a list is, nobody knows.
+            yield context.at_value(path, finding.rule, wrong)
+            return
+
+
+def _may_take(context: CheckContext, wanted: FieldType, message: str) -> bool:
+    """Return whether a field may take a message."""
+    if wanted.nested is None or wanted.array is not None:
+        return False
+    description = _describe(context, wanted.nested)
+    # One with a single field takes what this takes.
+    return wanted.nested == message or description is None or len(description.fields) == 1

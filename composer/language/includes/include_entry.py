@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.paths import PathError, is_in_package, list_neighbours, resolve_path
+from composer.language.paths import (
+    PackagePathError,
+    PathError,
+    is_in_package,
+    list_neighbours,
+    resolve_path,
+)
 from composer.names import find_namespace_problem
 from composer.spelling import suggest
 
@@ -78,7 +84,9 @@ class IncludeEntry:
             # only when it is used.
             may_be_absent = is_in_package(self.file) or self.is_open((*self.at, 'file'))
             if not (self.is_left_out and may_be_absent):
-                self.report('missing-include', str(error), error.help)
+                is_package = isinstance(error, PackagePathError)
+                rule = 'uninstalled-package' if is_package else 'missing-include'
+                self.report(rule, str(error), error.help)
         return None
 
     def find_namespace(self) -> str:

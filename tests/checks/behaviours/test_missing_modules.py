@@ -1,10 +1,9 @@
 """Imports of what there is not are found where they stand, and no others."""
 
+import importlib.util
 from pathlib import Path
 
 import pytest
-
-from composer.python_source.module_finder import ModuleFinder
 
 RULE = 'missing-module'
 NODES = '  n: {on_start: parts:go}\n'
@@ -16,12 +15,13 @@ def project(tmp_path, monkeypatch):
     """Write a package with modules, and what makes this a Python that can run the system."""
     monkeypatch.chdir(tmp_path)
     files = {
-        'rclpy/__init__.py': '',
+        'ros/rclpy/__init__.py': '',
         'package/__init__.py': 'from . import inner\nfrom .inner import turn as twist\n',
         'package/inner.py': 'def turn(node): ...\nname = 1\n',
         'space/one.py': 'from .other import turn\n',
         'space/other.py': 'def turn(node): ...\n',
         'space/deep/__init__.py': 'from .. import one\n',
+        'declared/msg/Own.msg': 'int8 x\n',
         'open.py': 'def __getattr__(name): ...\ndef turn(node): ...\n',
         'broken_chain.py': 'import package.innner\n',
         'guarded.py': 'try:\n    import not_there\nexcept ImportError: ...\n',
@@ -29,6 +29,7 @@ def project(tmp_path, monkeypatch):
     for name, text in files.items():
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path / 'ros')
 
 
 @pytest.mark.usefixtures('project')
@@ -57,7 +58,7 @@ def project(tmp_path, monkeypatch):
     ],
 )
 def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
-    before = 'interfaces: {declared: .}\n'
+    before = 'interfaces: {declared: declared}\n'
     assert check(NODES, code + GO, before=before, rule=RULE) == []
 
 
@@ -101,7 +102,7 @@ def test_what_a_behaviour_imports_first_is_looked_at(check):
 
 @pytest.mark.usefixtures('project')
 def test_installed_packages_may_be_missing_where_there_is_no_ros(check, monkeypatch):
-    has = ModuleFinder.has
-    monkeypatch.setattr(ModuleFinder, 'has', lambda own, name: name != 'rclpy' and has(own, name))
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name != 'rclpy' and find(name))
     code = 'import not_there\nfrom package import iner' + GO
     assert check(NODES, code, rule=RULE) == ["package has no 'iner'"]

@@ -92,6 +92,50 @@ def findings(fields, heard='nav_msgs/msg/Odometry'):
             'expected name or number',
             None,
         ),
+        (
+            'twist.linear.x: child_frame_id',
+            'field-type',
+            'child_frame_id',
+            'geometry_msgs/msg/Vector3: x: expected float64, got string',
+            None,
+        ),
+        (
+            'header.frame_id: header.stamp.sec',
+            'field-type',
+            'header.stamp.sec',
+            'std_msgs/msg/Header: frame_id: expected string, got int32',
+            None,
+        ),
+        (
+            'header.stamp.sec: pose.pose.position.x * 2',
+            'field-type',
+            'pose.pose.position.x * 2',
+            'builtin_interfaces/msg/Time: sec: expected int32, got float',
+            None,
+        ),
+        (
+            'twist.linear.x: pose.covariance',
+            'field-type',
+            'pose.covariance',
+            'geometry_msgs/msg/Vector3: x: expected float64, got float64[36]',
+            None,
+        ),
+        (
+            'twist.linear: pose.pose.orientation',
+            'field-type',
+            'pose.pose.orientation',
+            'geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, got '
+            'geometry_msgs/msg/Quaternion',
+            None,
+        ),
+        (
+            'header.stamp.nanosec: 5000000000',
+            'field-range',
+            '5000000000',
+            'builtin_interfaces/msg/Time: nanosec: expected uint32 (0 to 4294967295), got int '
+            '5000000000',
+            None,
+        ),
     ],
 )
 def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
@@ -109,6 +153,14 @@ def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
         'twist.linear.x: 1 if nothing is defined else 2',
         'header.frame_id: child_frame_id.upper()',
         'twist.linear.x: message.SOME_CONSTANT',
+        'twist.linear.x: header.stamp.sec + 0.5',
+        'twist.linear.x: header.stamp.sec / 2',
+        'twist.linear.x: "{1: 2.0}[1]"',
+        'twist.linear: twist.twist.angular',
+        'header.stamp: header.stamp',
+        'header.stamp.sec: pose.pose.position.x | int',
+        'header.stamp.sec: header.stamp.nanosec * 1000',
+        'header.frame_id: header.frame_id ~ header.stamp.sec',
     ],
 )
 def test_what_may_work_has_no_finding(fields):

@@ -9,7 +9,8 @@ import std_msgs.msg
 import std_msgs.msg as messages
 import geometry_msgs
 from composer import Node
-from elsewhere import Strange
+if TYPE_CHECKING:
+    from elsewhere import Strange
 from std_msgs import msg
 from std_msgs.msg import Float64, Int32, String
 from std_msgs.msg import String as Text

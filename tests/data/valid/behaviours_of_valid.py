@@ -5,6 +5,9 @@ from json import dumps
 
 
 class Counter:
+    def __init__(self, node=None):
+        self.node = node
+
     def __call__(self, node):
         return 1
 
@@ -35,6 +38,10 @@ def anything(*args, **kwargs):
 
 def hear(node, message, repeat=1):
     return message
+
+
+def spell(node, message):
+    return str(message.data)
 
 
 async def hear_later(node, message):

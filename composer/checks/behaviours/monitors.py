@@ -1,0 +1,50 @@
+"""Check that what `behaviours.monitor`, which comes with Composer, watches is counted as well."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.checks.behaviours.transforms import is_shipped
+from composer.language.bindings import node_bindings
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.specs import NodeSpec
+
+_MODULE = 'behaviours.monitor'
+_WATCHING = ('watch', 'diagnose')
+
+
+def check_monitors(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that for each topic that is watched, the same node counts messages."""
+    for node in context.spec.nodes.values():
+        is_whole = not any(path[:2] == node.path for path in context.system.dropped)
+        behaviours = [binding.behaviour for binding in node_bindings(node)]
+        if is_whole and any(each.module == _MODULE for each in behaviours):
+            yield from _check_node(context, node)
+
+
+def _check_node(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
+    behaviours = [binding.behaviour for binding in node_bindings(node)]
+    if not is_shipped(context, _MODULE) or any(each.module != _MODULE for each in behaviours):
+        # Others may call its functions themselves.
+        return
+    topics = [each.arguments.get('topic') for each in behaviours if each.function == 'count']
+    for behaviour in behaviours:
+        topic = behaviour.arguments.get('topic')
+        if behaviour.function in _WATCHING and topic is not None and topic not in topics:
+            yield context.at_value(
+                (*behaviour.path[:-1], 'with', 'topic'),
+                'bad-argument',
+                f"nothing in node '{node.name}' counts the messages of '{topic}'",
+                help=suggest(
+                    topic,
+                    topics,
+                    'it counts',
+                    f"bind '{_MODULE}:count' to a subscription, with the same 'topic'",
+                ),
+            )

@@ -1,0 +1,148 @@
+"""Compare values of a file with annotations of parameters.
+
+These are `bool`, `int`, `float`, `str`, `Literal['fast', 'slow']`, `Annotated[float, '> 0']`, and
+unions of them. What a bound compares with is a number, or the name of another argument.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+# The types of YAML values that fit an annotation.
+_SCALARS: dict[str, tuple[type, ...]] = {
+    'bool': (bool,),
+    'float': (float, int),
+    'int': (int,),
+    'str': (str,),
+}
+_BOUND = re.compile(r'(>=|<=|>|<)\s*(?:(-?\d+(?:\.\d+)?)|([A-Za-z_]\w*))')
+_COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
+    '<': operator.lt,
+    '<=': operator.le,
+    '>': operator.gt,
+    '>=': operator.ge,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class WantedValue:
+    """One of the kinds of value that an annotation allows.
+
+    Attributes:
+        text: It in words.
+        fits: Whether the value in question is one of these.
+        option: The only value of this kind, if it is a text.
+    """
+
+    text: str
+    fits: bool
+    option: str | None = None
+
+
+def find_wanted_values(annotation: str, value: Any, given: Mapping[str, Any]) -> list[WantedValue]:
+    """Return what an annotation wants if a value does not fit it; nothing if it does, or may.
+
+    Args:
+        value: As YAML has it; `None` fits all.
+        given: All arguments by name, for bounds that name one.
+    """
+    if value is None:
+        return []
+    try:
+        wanted = list(_read(_parse(annotation), value, given))
+    except (_UnknownAnnotationError, SyntaxError, ValueError, RecursionError):
+        return []
+    return [] if any(each.fits for each in wanted) else wanted
+
+
+class _UnknownAnnotationError(Exception):
+    """An annotation that says nothing about values of a file."""
+
+
+def _parse(text: str) -> ast.expr:
+    return ast.parse(text.strip(), mode='eval').body
+
+
+def _read(expression: ast.expr, value: Any, given: Mapping[str, Any]) -> Iterator[WantedValue]:
+    match expression:
+        case ast.Constant(value=None):
+            return
+        case ast.Constant(value=str(text)):
+            yield from _read(_parse(text), value, given)
+        case ast.BinOp(op=ast.BitOr()):
+            yield from _read(expression.left, value, given)
+            yield from _read(expression.right, value, given)
+        case ast.Name(id=name) if name in _SCALARS:
+            yield WantedValue(name, _is_scalar(value, name))
+        case ast.Subscript(value=form, slice=inner):
+            items = inner.elts if isinstance(inner, ast.Tuple) else [inner]
+            yield from _read_form(_last_name(form), items, value, given)
+        case _:
+            raise _UnknownAnnotationError
+
+
+def _read_form(
+    name: str, items: list[ast.expr], value: Any, given: Mapping[str, Any]
+) -> Iterator[WantedValue]:
+    if name == 'Literal':
+        for item in items:
+            option = ast.literal_eval(item)
+            yield WantedValue(repr(option), _is_same(value, option), option)
+    elif name in ('Union', 'Optional'):
+        for item in items:
+            yield from _read(item, value, given)
+    elif name == 'Annotated':
+        bounds = list(_read_bounds(items[1:], given))
+        for wanted in _read(items[0], value, given):
+            holds = not wanted.fits or all(holds(value) for _, holds in bounds)
+            text = ' '.join([wanted.text, ' and '.join(text for text, _ in bounds)]).strip()
+            yield WantedValue(text, wanted.fits and holds)
+    else:
+        raise _UnknownAnnotationError
+
+
+def _read_bounds(
+    items: list[ast.expr], given: Mapping[str, Any]
+) -> Iterator[tuple[str, Callable[[Any], bool]]]:
+    for item in items:
+        text = item.value if isinstance(item, ast.Constant) else None
+        found = _BOUND.fullmatch(text.strip()) if isinstance(text, str) else None
+        if found is None:
+            continue
+        sign, number, name = found.groups()
+        limit: Any = float(number) if number else given.get(name)
+        if _is_number(limit):
+            shown = number or f"'{name}' ({limit})"
+            yield f'{sign} {shown}', _comparison(sign, limit)
+
+
+def _comparison(sign: str, limit: float) -> Callable[[Any], bool]:
+    return lambda value: not _is_number(value) or _COMPARISONS[sign](value, limit)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_scalar(value: Any, wanted: str) -> bool:
+    if wanted == 'int' and isinstance(value, float) and value.is_integer():
+        return True
+    types = _SCALARS[wanted]
+    return isinstance(value, types) and (bool in types or not isinstance(value, bool))
+
+
+def _is_same(value: Any, option: Any) -> bool:
+    return bool(value == option) and isinstance(value, bool) == isinstance(option, bool)
+
+
+def _last_name(expression: ast.expr) -> str:
+    if isinstance(expression, ast.Attribute):
+        return expression.attr
+    return expression.id if isinstance(expression, ast.Name) else ''
