@@ -29,6 +29,7 @@ ROOMS = (
     ),
     *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
     *('python_source', 'checks', 'reports', 'drawing', 'executor', 'processes', 'runtime'),
+    'stubs',
     *('cli', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

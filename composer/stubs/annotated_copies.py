@@ -105,9 +105,9 @@ class Annotator:
                 yield from _annotate(
                     each, wanted, lines, is_node=bool(received and received.nodes)
                 )
-        if use.bindings and not use.is_called and use.definition.returns is None:
-            if wanted := self._returned(use):
-                yield from _annotate_return(use.definition, wanted, lines)
+        is_free = use.bindings and not use.is_called and use.definition.returns is None
+        if is_free and (wanted := self._returned(use)):
+            yield from _annotate_return(use.definition, wanted, lines)
 
     def _annotation(self, received: Received) -> str | None:
         if received.is_open or bool(received.nodes) == bool(received.messages):

@@ -72,12 +72,13 @@ def write_interfaces(
 
 
 def _describe_event(service: ServiceDescription) -> MessageDescription:
-    parts = (
-        FieldDescription(name, FieldType('message', part.name, None, 'bounded', 1))
-        for name, part in (('request', service.request), ('response', service.response))
+    parts = {'request': service.request.name, 'response': service.response.name}
+    fields = (
+        FieldDescription(name, FieldType('message', part, None, 'bounded', 1))
+        for name, part in parts.items()
     )
     return MessageDescription(
-        f'{service.name}_Event', (FieldDescription('info', _EVENT_INFO), *parts)
+        f'{service.name}_Event', (FieldDescription('info', _EVENT_INFO), *fields)
     )
 
 
@@ -120,7 +121,8 @@ def _write_unknown(name: str, imports: StubImports) -> Iterator[str]:
 
 def _write_message(message: MessageDescription, imports: StubImports) -> Iterator[str]:
     fields = [field for field in message.fields if is_writable(field.name)]
-    names = frozenset(each.name for each in (*fields, *message.constants))
+    constants = [constant.name for constant in message.constants]
+    names = frozenset([*constants, *(field.name for field in fields)])
     types = FieldTypes(imports, names)
     text, anything = types.word('str'), imports.take('typing', 'Any')
     yield from ('', f'class {_last(message.name)}:')

@@ -61,7 +61,7 @@ def find_project_modules(context: CheckContext) -> dict[str, ProjectModule]:
     pending = list(dict.fromkeys(reversed(names)))
     while pending and len(found) < _MOST_MODULES:
         name = pending.pop()
-        if name in found or not name:
+        if name in found or not name or name.partition('.')[0] == 'composer':
             continue
         module = _read(context, name, roots)
         if module is not None:

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.python_source.local_names import stored_names
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from composer.stubs.annotated_copies import AnnotatedCopy
     from composer.stubs.type_checkers import TypeReport
@@ -101,6 +104,7 @@ class RelevantReports:
             self._is_about_stubs(report)
             and self._is_of_interface(report)
             and _is_shown(report, found)
+            and not self._is_reused(report)
             and not any(id(node) in self._guarded for node in found)
             and not self._is_asked_for(report, found)
         )
@@ -112,11 +116,29 @@ class RelevantReports:
         called = _CALLED.search(report.message) if 'rgument' in report.message else None
         return called is None or called[1] in _METHODS or called[1] in self.classes
 
+    def _is_reused(self, report: TypeReport) -> bool:
+        """Return whether a variable is assigned whose name stands for several things."""
+        if report.code != 'assignment':
+            return False
+        values = (
+            node.value
+            for node in ast.walk(self.copy.module.tree)
+            if isinstance(node, ast.Assign) and node.lineno == report.line
+        )
+        return any(isinstance(value, ast.Name) and self._stored[value.id] > 1 for value in values)
+
+    @cached_property
+    def _stored(self) -> Counter[str]:
+        names = stored_names(ast.walk(self.copy.module.tree))
+        return Counter(name.id for name in names)
+
     def _is_asked_for(self, report: TypeReport, found: list[ast.AST]) -> bool:
         attribute = _ATTRIBUTE.search(report.message)
         if attribute is None:
             shown = (node.slice for node in found if isinstance(node, ast.Subscript))
-            return any(isinstance(each, ast.Constant) and each.value in self._asked for each in shown)
+            return any(
+                isinstance(each, ast.Constant) and each.value in self._asked for each in shown
+            )
         return attribute[1].startswith('_') or attribute[1] in self._asked
 
     @cached_property
@@ -145,10 +167,10 @@ class RelevantReports:
         places: dict[tuple[int, int], list[ast.AST]] = {}
         lines = self.copy.module.source.lines
         for node in ast.walk(self.copy.module.tree):
-            line = getattr(node, 'lineno', None)
-            if line is not None:
-                start = len(lines[line - 1].encode()[: node.col_offset].decode(errors='replace'))
-                places.setdefault((line, start + 1), []).append(node)
+            if isinstance(node, ast.expr | ast.stmt):
+                text = lines[node.lineno - 1].encode()[: node.col_offset]
+                start = len(text.decode(errors='replace')) + 1
+                places.setdefault((node.lineno, start), []).append(node)
         return places
 
     def _is_about_stubs(self, report: TypeReport) -> bool:
@@ -208,7 +230,12 @@ def _is_shown(report: TypeReport, found: list[ast.AST]) -> bool:
     """
     text = ' '.join([report.message, *report.notes])
     if 'dict[' in text or 'Collection[' in text:
-        return any(isinstance(node, ast.Dict) and _is_plain(node) for node in found)
+        mappings = [node for node in found if isinstance(node, ast.Dict)]
+        calls = [node for node in found if isinstance(node, ast.Call)]
+        if calls and 'overload' in text:
+            mappings = [each for each in calls[0].args[1:2] if isinstance(each, ast.Dict)]
+            mappings = mappings if _has_literal_name(calls) else []
+        return any(map(_is_plain, mappings))
     if report.code == 'return-value' and re.search(r'got "[^"]*\b(Any|object)\b', text):
         return False
     if report.code in ('call-overload', 'reportCallIssue') and 'overload' in text:
@@ -220,7 +247,7 @@ def _is_shown(report: TypeReport, found: list[ast.AST]) -> bool:
     return True
 
 
-def _has_literal_name(found: list[ast.AST]) -> bool:
+def _has_literal_name(found: Iterable[ast.AST]) -> bool:
     for node in found:
         name: ast.expr | None = None
         if isinstance(node, ast.Call):

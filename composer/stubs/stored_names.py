@@ -21,9 +21,9 @@ def find_stored_names(tree: ast.Module) -> frozenset[str] | None:
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
             names.add(node.attr)
-        elif isinstance(node, ast.Attribute | ast.Name) and _name_of(node) in _OPEN:
-            return None
-        elif isinstance(node, ast.Name) and node.id == 'setattr' and id(node) not in called:
+        elif isinstance(node, ast.Attribute | ast.Name) and (
+            _name_of(node) in _OPEN or (_name_of(node) == 'setattr' and id(node) not in called)
+        ):
             return None
         elif isinstance(node, ast.Call) and _name_of(node.func) == 'setattr':
             name = node.args[1] if len(node.args) > 1 else None

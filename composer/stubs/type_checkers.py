@@ -131,7 +131,7 @@ def _run_mypy(
     )
     files = sorted(str(path) for path in folder.rglob('*.py'))
     arguments = ['--config-file', str(settings), '--no-color-output', *files]
-    text = _run([*checker.command, *arguments], folder, (0, 1))
+    text = _run(checker, arguments, folder)
     return list(_read_mypy(text, folder))
 
 
@@ -179,7 +179,7 @@ def _run_pyright(
         'useLibraryCodeForTypes': False,
     }
     settings.write_text(json.dumps(options), encoding='utf-8')
-    text = _run([*checker.command, '--outputjson', '-p', str(settings)], folder, (0, 1))
+    text = _run(checker, ['--outputjson', '-p', str(settings)], folder)
     try:
         found = json.loads(text)['generalDiagnostics']
     except (ValueError, KeyError) as error:
@@ -204,26 +204,24 @@ def _read_pyright(found: dict[str, Any]) -> TypeReport:
     )
 
 
-def _run(command: Sequence[str], folder: Path, fine: tuple[int, ...]) -> str:
-    environment = {**os.environ, 'MYPY_FORCE_COLOR': '0', 'NO_COLOR': '1'}
-    environment.pop('MYPYPATH', None)
+def _run(checker: TypeChecker, arguments: Sequence[str], folder: Path) -> str:
+    """Return what a type checker prints; with errors in the modules, it exits with 1."""
+    environment = {name: value for name, value in os.environ.items() if name != 'MYPYPATH'}
     try:
-        done = subprocess.run(
-            command,
+        done = subprocess.run(  # noqa: S603 - it is the user who names it
+            [*checker.command, *arguments],
             cwd=folder,
-            env=environment,
+            env={**environment, 'NO_COLOR': '1'},
             capture_output=True,
             text=True,
             timeout=_TIMEOUT_SEC,
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        message = f'{command[0]} does not work: {error}'
+        message = f'{checker.name} does not work: {error}'
         raise TypeCheckerError(message) from error
-    if done.returncode not in fine:
+    if done.returncode not in (0, 1):
         said = (done.stderr or done.stdout).strip()[-500:]
-        message = (
-            f'{Path(command[-1]).name if len(command) < 2 else " ".join(command[:3])}: {said}'
-        )
+        message = f'{checker.name} does not work: {said}'
         raise TypeCheckerError(message, help='update it, or use another type checker')
     return done.stdout

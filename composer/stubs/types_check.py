@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import SourceFile, Span, diagnostic_at
+from composer.interfaces.build.build_cache import find_cache
 from composer.stubs.annotated_copies import AnnotatedCopy, Annotator
 from composer.stubs.field_types import SUPPORT
 from composer.stubs.node_shapes import NodeShape, merge_shapes
@@ -47,8 +48,8 @@ class TypesCheck:
 
     checker: TypeChecker
 
-    def __call__(self, context: CheckContext, _found: list[Diagnostic]) -> Iterator[Diagnostic]:
-        """Yield what the type checker finds in the behaviours of a system.
+    def __call__(self, context: CheckContext, found: list[Diagnostic]) -> Iterator[Diagnostic]:
+        """Yield what the type checker finds where the other checks find nothing.
 
         Raises:
             TypeCheckerError: It does not work.
@@ -66,15 +67,25 @@ class TypesCheck:
             files['composer/__init__.pyi'] = read_template('composer.pyi')
             _write(stubs, files)
             _write(copies, {path: copy.text for path, copy in written.items()})
-            reports = run_type_checker(self.checker, copies, (copies, stubs), _find_cache())
+            reports = run_type_checker(
+                self.checker, copies, (copies, stubs), find_cache().parent / 'types'
+            )
         names = _class_names(files) - _changed_classes(modules)
         if any('declare_parameter' in line for line in _lines(modules)):
             names = frozenset(name for name in names if not name.endswith('Parameters'))
+        told = {
+            span.place
+            for each in found
+            for span in (each.span, *(related.span for related in each.related))
+            if span
+        }
         packages = frozenset(path.partition('/')[0] for path in files)
         for path, copy in written.items():
             own = [report for report in reports if report.path == copies / path]
             relevant = RelevantReports(copy, names, packages)
-            yield from (_finding(copy, report) for report in relevant.select(own))
+            for finding in (_finding(copy, report) for report in relevant.select(own)):
+                if finding.span and finding.span.place not in told:
+                    yield finding
 
 
 @dataclass(slots=True)
@@ -159,9 +170,3 @@ def _temporary_folder() -> Iterator[Path]:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def _find_cache() -> Path:
-    home = os.environ.get('XDG_CACHE_HOME', '')
-    base = Path(home) if home.startswith('/') else Path.home() / '.cache'
-    return base / 'composer' / 'types'
