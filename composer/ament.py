@@ -8,8 +8,10 @@ Source: https://github.com/ament/ament_cmake/blob/master/ament_cmake_core/doc/re
 from __future__ import annotations
 
 import os
+import re
 import sys
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +27,7 @@ INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
 _ALIKE = frozenset(('can_msgs', 'gps_msgs', 'map_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs'))
 # More than that is another word.
 _MOST_EDITS = 2
+_REMAPS_ACTIONS = (9, 2, 8)
 # The file in the prefix of a package that Composer built for a system, which installs nothing.
 BUILD_MANIFEST = 'composer_build.json'
 
@@ -100,3 +103,18 @@ def list_executables(package: str) -> list[Path]:
     if folder is None or not folder.is_dir():
         return []
     return sorted(path for path in folder.iterdir() if path.is_file() and os.access(path, os.X_OK))
+
+
+@cache
+def remaps_actions() -> bool | None:
+    """Return whether the installed ROS remaps the names of actions; `None` without ROS.
+
+    Source: rcl_action does since 9.2.8 (https://github.com/ros2/rcl/pull/1170).
+    """
+    share = find_share('rcl_action')
+    try:
+        text = (share / 'package.xml').read_text(encoding='utf-8') if share else ''
+    except OSError:
+        return None
+    found = re.search(r'<version>(\d+)\.(\d+)\.(\d+)</version>', text)
+    return tuple(map(int, found.groups())) >= _REMAPS_ACTIONS if found else None

@@ -25,6 +25,8 @@ MAX_VALUES = 300_000
 # Levels of data, aliases and merges; the walks over the data are safe from deep recursion by it.
 MAX_DEPTH = 100
 # Files that include each other, one in the other.
+# Each is a check of the whole system.
+MAX_COMBINATIONS = 100
 MAX_INCLUDE_DEPTH = 30
 # The entries of each of nodes, include and processes, unless a file says more.
 MAX_ENTRIES = 10_000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from contextlib import suppress
 from functools import lru_cache
@@ -34,6 +33,14 @@ def base_environment(variables: Mapping[str, str]) -> dict[str, str]:
     return environment
 
 
+def is_on_path(program: str, search_path: str | None = None) -> bool:
+    """Return whether a program is on a search path, by default on that of Composer."""
+    # It takes long to import, and most systems have no processes.
+    import shutil
+
+    return shutil.which(program, path=search_path) is not None
+
+
 def find_program_problem(
     program: str, folder: Path, environment: Mapping[str, str]
 ) -> tuple[str, str | None] | None:
@@ -46,7 +53,7 @@ def find_program_problem(
     """
     if '/' not in program:
         search_path = environment.get('PATH', os.defpath)
-        if shutil.which(program, path=search_path) is not None:
+        if is_on_path(program, search_path):
             return None
         help_text = did_you_mean(_find_near(program, search_path))
         return f"there is no program '{program}' on the PATH", help_text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ from composer.ament import explain_missing_package, list_executables, list_packa
 from composer.checks.names import IS_EMPTY, check_rules
 from composer.language.paths import PathError, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
-from composer.programs import base_environment, find_program_problem
+from composer.programs import base_environment, find_program_problem, is_on_path
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -107,7 +106,7 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
         return
     variables = {**os.environ, **context.spec.environment}
     environment = {**base_environment(variables), **process.env}
-    if program.startswith(_OF_ROS) and shutil.which(_OF_ROS[0]) is None:
+    if program.startswith(_OF_ROS) and not is_on_path(_OF_ROS[0]):
         return
     problem = find_program_problem(program, folder, environment)
     if problem:

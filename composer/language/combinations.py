@@ -6,10 +6,12 @@ They stand under `check:` in the system itself, or in a file of their own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from composer.confidential import may_show_lines
 from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.input_limits import MAX_COMBINATIONS
 from composer.language.arguments import ArgumentValues, find_value_problem, sample_values
 from composer.language.includes.include_entry import locate_file, shown_path
 from composer.language.layers import merge_documents
@@ -67,13 +69,21 @@ def with_matrix(system: Document, matrix: Document) -> Document:
 
 
 def read_combinations(system: Document) -> list[Combination]:
-    """Return the combinations of a system; what the schema refuses is left out."""
+    """Return the combinations of a system; what the schema refuses is left out.
+
+    That there are too many is added to its findings.
+    """
     named = (system.data or {}).get(SECTION)
     if not isinstance(named, dict):
         return []
+    if len(named) > MAX_COMBINATIONS:
+        first = next(islice(named, MAX_COMBINATIONS, None))
+        message = f'only the first {MAX_COMBINATIONS} combinations are checked'
+        span = system.positions.key((SECTION, first))
+        system.diagnostics.append(diagnostic_at(span, 'too-many-entries', message))
     return [
         Combination(name, entry, system.positions)
-        for name, entry in named.items()
+        for name, entry in islice(named.items(), MAX_COMBINATIONS)
         if isinstance(entry, dict)
     ]
 

@@ -15,12 +15,6 @@ from typing import TYPE_CHECKING
 from composer import confidential
 from composer.diagnostics import Diagnostic
 from composer.language.arguments import sample_values, values_from_words
-from composer.language.combinations import (
-    apply_combination,
-    read_combinations,
-    values_from_combination,
-    with_matrix,
-)
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
 from composer.language.includes.includer import Includer
@@ -84,18 +78,26 @@ def load_combinations(
     own = [path, *layers, *([matrix] if matrix else [])]
     confidential.begin(own)
     document = _read([path, *layers], text)
-    if matrix is not None:
-        document = with_matrix(document, read_document(matrix))
-    combinations = read_combinations(document)
-    if not combinations:
+    if matrix is None and 'check' not in (document.data or {}):
         yield None, _load(document, path, sample_values)
-    for combination in combinations:
+        return
+    # Most files name no combinations.
+    from composer.language import combinations
+
+    if matrix is not None:
+        document = combinations.with_matrix(document, read_document(matrix))
+    named = combinations.read_combinations(document)
+    if not named:
+        yield None, _load(document, path, sample_values)
+    for each in named:
         confidential.begin(own)
         findings: list[Diagnostic] = []
-        give_values = partial(values_from_combination, combination=combination, findings=findings)
-        system = _load(apply_combination(document, combination), path, give_values)
+        give_values = partial(
+            combinations.values_from_combination, combination=each, findings=findings
+        )
+        system = _load(combinations.apply_combination(document, each), path, give_values)
         system.diagnostics += findings
-        yield combination.name, system
+        yield each.name, system
 
 
 def load_system_text(

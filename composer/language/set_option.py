@@ -104,6 +104,9 @@ def _resolve(text: str, data: dict[str, Any]) -> DataPath:
     """
     path: list[str] = []
     inside: Any = data
+    if not text:
+        message = 'the path is empty'
+        raise SettingError(message, help='write it as in executor.threads')
     rest = text
     while rest:
         if not isinstance(inside, dict):

@@ -69,6 +69,7 @@ class ModuleFinder:
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
         self._listed: dict[Path, list[str]] = {}
+        self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
 
     def find(self, name: str) -> ModuleSource | MissingModule:
@@ -97,9 +98,12 @@ class ModuleFinder:
 
     def is_of_project(self, name: str) -> bool:
         """Return whether a module, or the package that it is in, is not an installed one."""
-        file, folders = _locate(name.partition('.')[0], self._roots)
-        found = [*([file] if file else []), *folders[:1]]
-        return any(each.parent in self._project for each in found)
+        top = name.partition('.')[0]
+        if top not in self._is_own:
+            file, folders = _locate(top, self._roots)
+            found = [*([file] if file else []), *folders[:1]]
+            self._is_own[top] = any(each.parent in self._project for each in found)
+        return self._is_own[top]
 
     def _find(self, name: str) -> ModuleSource | MissingModule:
         missing = self.find_missing(name)

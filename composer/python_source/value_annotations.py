@@ -10,6 +10,7 @@ import ast
 import operator
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class _UnknownAnnotationError(Exception):
     """An annotation that says nothing about values of a file."""
 
 
+@lru_cache(maxsize=1024)
 def _parse(text: str) -> ast.expr:
     return ast.parse(text.strip(), mode='eval').body
 

@@ -11,6 +11,7 @@ from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from composer.ament import remaps_actions
 from composer.errors import StartError
 from composer.names import expand_name, remap_name
 from composer.runtime.behaviours.waits import WaitNotice
@@ -214,6 +215,8 @@ def _log_of_process(spec: ProcessSpec, text: str) -> None:
 def _resolve_of_process(spec: ProcessSpec, condition: ConditionSpec) -> str:
     name, namespace = spec.node_name or spec.name, spec.namespace or '/'
     full = expand_name(condition.name, name, namespace)
+    if condition.kind == 'action' and remaps_actions():
+        return remap_name(full, spec.remap, name, namespace, 'rostopic')
     if condition.kind not in ('topic', 'service'):
         return full
     return remap_name(full, spec.remap, name, namespace, f'ros{condition.kind}')

@@ -179,6 +179,8 @@ def test_a_comment_that_silences_something_in_one_combination_is_used(run):
         ('{layers: [sit.yaml]}', "1:14: error[bad-combination]: there is no file 'sit.yaml'"),
         ('{layers: [/etc/passwd]}', "1:14: error[bad-combination]: '/etc/passwd' lies outside of"),
         ('{set: {nodes.x.y: 1}}', "1:11: error[bad-combination]: there is no 'x' in nodes"),
+        ('{set: {"": 1}}', '1:11: error[bad-combination]: the path is empty'),
+        ('{layers: ["\\0"]}', '1:14: error[bad-combination]: there is no file'),
         ('{set: {version: 2}}', '1:20: error[unsupported-version]: '),
     ],
 )
@@ -186,6 +188,16 @@ def test_an_error_in_a_matrix_has_its_place(run, combination, finding):
     code, out, _ = run('base.yaml', '--matrix', 'm.yaml', m=f'a: {combination}\n')
     assert code == 1
     assert f'm.yaml:{finding}' in out
+
+
+def test_of_too_many_combinations_the_first_are_checked(run):
+    text = ''.join(f'c{number}: {{args: {{robot: cart}}}}\n' for number in range(120))
+    code, out, err = run('base.yaml', '--matrix', 'm.yaml', m=text)
+    assert code == 1
+    assert out.startswith(
+        'm.yaml:101:1: error[too-many-entries]: only the first 100 combinations are checked\n'
+    )
+    assert err == '1 error in 1 file, 100 combinations checked\n'
 
 
 @pytest.mark.parametrize('text', ['', '- a', 'a: ['])

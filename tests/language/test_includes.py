@@ -170,6 +170,10 @@ def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
             ('missing-include', 'robot.yaml:3:16', "there is no file 'amr.yaml'"),
         ),
         (
+            r'{file: "\0"}',
+            ('missing-include', 'robot.yaml:3:16', r"there is no file '\x00'"),
+        ),
+        (
             '{file: "package://no_such/x.yaml"}',
             ('uninstalled-package', 'robot.yaml:3:16', "no package 'no_such' is installed"),
         ),

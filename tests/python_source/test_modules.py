@@ -260,7 +260,8 @@ def test_namespace_packages_lie_side_by_side(tmp_path):
 def test_a_regular_package_hides_the_portions_behind_it(tmp_path):
     make(tmp_path, 'one/shared/__init__.py', 'two/shared/b.py')
     finder = ModuleFinder([tmp_path / 'one', tmp_path / 'two'])
-    assert finder.find('shared.b') == MissingModule('shared.b', None)
+    package = tmp_path / 'one/shared/__init__.py'
+    assert finder.find('shared.b') == MissingModule('shared.b', None, package)
 
 
 def test_a_users_behaviours_lie_beside_the_shipped_ones(tmp_path):

@@ -14,6 +14,8 @@ from composer.rules import RULES_FOLDER, list_rule_names, load_rule
 from composer.rules.examples import load_example
 
 WITHOUT = {
+    # Only a ROS that remaps no actions shows it.
+    'ignored-remap',
     # It is about the command line, not about a file.
     'nothing-to-check',
     # It takes several files at once.

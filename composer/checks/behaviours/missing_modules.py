@@ -17,23 +17,27 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
-from composer.spelling import did_you_mean, find_nearest
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
 
 _RULE = 'missing-module'
 _Import = ast.Import | ast.ImportFrom
+_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 # A module with one of these may find modules, or make some, where nobody knows.
 _CHANGES_THE_SEARCH = re.compile(
     r'\bsys\.(path|modules|meta_path)\b|\bpath\.(append|extend|insert)\(|\baddsitedir\b|__path__'
 )
 # Each is read as a whole, and a small part of a large project is enough for a system.
 _MOST_MODULES = 50
+# A search asks the file system many times.
+_MOST_SEARCHES = 300
 # Statements after which a function goes on in any case.
 _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
@@ -67,6 +71,7 @@ class _Walk:
     findings: list[Diagnostic] = field(default_factory=list)
     modules: list[ModuleSource] = field(default_factory=list)
     _visited: set[str] = field(default_factory=set)
+    _searches: int = 0
 
     def visit(self, name: str, binding: Binding) -> None:
         """Check the imports of a module of the project, and of the packages that it is in."""
@@ -109,6 +114,8 @@ class _Walk:
 
     def _check(self, statement: _Import, importer: _Importer) -> list[str]:
         """Check an import; return the modules that it imports."""
+        if self._searches > _MOST_SEARCHES:
+            return []
         if isinstance(statement, ast.Import):
             for alias in statement.names:
                 self._check_module(alias.name, importer, _place_of_name(alias, importer.source))
@@ -122,18 +129,30 @@ class _Walk:
             return []
         if not self._check_module(home, importer, place):
             return []
-        aliases = [alias for alias in statement.names if alias.name != '*']
-        if self._is_of_project(home) and not self._is_built(home):
-            for alias in aliases:
+        aliases = [each for each in statement.names[:_MOST_SEARCHES] if each.name != '*']
+        for alias in aliases:
+            if self._is_of_interfaces(home):
+                self._check_type(home, alias, importer)
+            elif self._is_of_project(home):
                 self._check_member(home, alias, importer)
+            elif home in sys.modules and _is_of_python(home):
+                self._check_attribute(home, alias, importer)
         return [home, *(f'{home}.{alias.name}' for alias in aliases)]
 
     def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
         """Check that a module exists; return whether it does."""
         modules = self.context.modules
-        if self._is_built(name) or name in sys.modules or name in sys.stdlib_module_names:
+        if name in sys.modules or name in sys.stdlib_module_names:
             return True
+        self._searches += 1
         if modules.has(name):
+            return True
+        if self._is_of_interfaces(name):
+            # What is declared may be built only later.
+            kind = name.split('.')[1] if '.' in name else ''
+            if kind and kind not in _KINDS:
+                help_text = did_you_mean(find_nearest(kind, _KINDS))
+                self._report(f"there is no module '{name}'", help_text, importer, place)
             return True
         missing = modules.find_missing(name)
         if missing is not None and self._is_certain(missing.missing):
@@ -150,8 +169,7 @@ class _Walk:
             return True
         if inner:
             # Packages that are installed may make their modules themselves.
-            is_of_python = top in sys.stdlib_module_names
-            return is_of_python and modules.is_package(missing.rpartition('.')[0])
+            return _is_of_python(top) and modules.is_package(missing.rpartition('.')[0])
         # A Python without ROS cannot run the system: another one has what it needs.
         return bool(importlib.util.find_spec('rclpy'))
 
@@ -160,10 +178,34 @@ class _Walk:
         is_composer = name.partition('.')[0] == 'composer'
         return not is_composer and self.context.modules.is_of_project(name)
 
-    def _is_built(self, name: str) -> bool:
-        """Return whether a module is of an interface package, which may be built only later."""
+    def _is_of_interfaces(self, name: str) -> bool:
         top = name.partition('.')[0]
         return top in self.context.spec.interfaces or top in self.context.catalogue.packages()
+
+    def _check_type(self, home: str, alias: ast.alias, importer: _Importer) -> None:
+        """Check a message, service or action, or a part of one, that is imported."""
+        package, _, kind = home.partition('.')
+        known = self.context.catalogue.packages()
+        if kind not in _KINDS or not alias.name[:1].isupper() or package not in known:
+            return
+        names = self.context.catalogue.names(kind, package)
+        types = {each.rpartition('/')[2] for each in names}
+        # The parts of services and actions are called `SetBool_Request` and the like.
+        if alias.name.partition('_')[0] not in types:
+            message, help_text = f"{home} has no '{alias.name}'", suggest(alias.name, types)
+            self._report(message, help_text, importer, _place_of_name(alias, importer.source))
+
+    def _check_attribute(self, home: str, alias: ast.alias, importer: _Importer) -> None:
+        """Check a name that is imported from a module of Python that is loaded already."""
+        module = sys.modules[home]
+        if not hasattr(module, alias.name) and not self.context.modules.has(
+            f'{home}.{alias.name}'
+        ):
+            # Another version of Python may have it.
+            nearest = find_nearest(alias.name, dir(module))
+            if nearest:
+                message, help_text = f"{home} has no '{alias.name}'", did_you_mean(nearest)
+                self._report(message, help_text, importer, _place_of_name(alias, importer.source))
 
     def _check_member(self, home: str, alias: ast.alias, importer: _Importer) -> None:
         """Check a name that is imported from a module or package of the project."""
@@ -190,6 +232,10 @@ class _Walk:
         where = f"'{behaviour.name}' cannot be imported without it"
         related = [self.context.related_value(behaviour.path, where)]
         self.findings.append(diagnostic_at(place, _RULE, message, help=help_text, related=related))
+
+
+def _is_of_python(name: str) -> bool:
+    return name.partition('.')[0] in sys.stdlib_module_names
 
 
 def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:

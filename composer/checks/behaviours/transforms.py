@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,9 +36,14 @@ def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
 def is_shipped(context: CheckContext, name: str) -> bool:
     """Return whether a module is the one that comes with Composer, not another of its name."""
     module = context.modules.find(name)
-    own = Path(__file__).parents[3].joinpath(*name.split('.')).with_suffix('.py')
     path = None if isinstance(module, MissingModule) else module.path
-    return path is not None and path.resolve() == own.resolve()
+    return path is not None and _is_shipped(path, name)
+
+
+@cache
+def _is_shipped(path: Path, name: str) -> bool:
+    own = Path(__file__).parents[3].joinpath(*name.split('.')).with_suffix('.py')
+    return path.resolve() == own.resolve()
 
 
 def _check_fields(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.ament import remaps_actions
 from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
 from composer.language.specs import NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 # An end that may exist: its channel, whether it provides, and its type, `None` for any.
 PossibleEnd: TypeAlias = tuple[ChannelKind, bool, str | None]
 
-_SCHEMES = {'topic': 'rostopic', 'service': 'rosservice'}
+# The schemes of the rules for a name; actions, if at all, are remapped as topics are.
+_SCHEMES = {'topic': 'rostopic', 'service': 'rosservice', 'action': 'rostopic'}
 # What ROS itself and its tools publish or hear (`rosout`, the time source, tf2, diagnostics).
 TOPICS_OF_ROS = {
     '/clock': 'rosgraph_msgs/msg/Clock',
@@ -219,7 +221,7 @@ def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str
     """Return the full name of a topic, service or action of a node or process."""
     namespace = node.namespace or '/'
     full = expand_name(name, node.name, namespace)
-    if not node.remap or kind not in _SCHEMES:
+    if not node.remap or (kind == 'action' and not remaps_actions()):
         return full
     return remap_name(full, node.remap, node.name, namespace, _SCHEMES[kind])
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from composer.ament import remaps_actions
 from composer.checks.connections.topology import full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.language.specs import REENTRANT
@@ -153,7 +154,7 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             span = context.system.positions.key(path)
             bare = source.rpartition('://')[2]
             name = expand_name(bare, node.name, node.namespace)
-            if name in names:
+            if name in names or (name in actions and remaps_actions() is not False):
                 matching.add(span)
             elif name in actions:
                 found[span] = _explain_action(context, path, actions[name], name)
@@ -170,11 +171,10 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
 def _explain_action(
     context: CheckContext, path: DataPath, entity: ActionSpec | ActionClientSpec, name: str
 ) -> Diagnostic:
-    # rcl remaps topics and services, and an action has five: `/dock/_action/send_goal` and so on.
     return context.at_key(
         path,
-        'bad-remap',
-        f"ROS does not remap actions, such as '{name}', and ignores the rule",
+        'ignored-remap',
+        f"this ROS remaps no actions, such as '{name}', and ignores the rule",
         help=f"give '{entity.name}' its name with 'action:' instead",
     )
 

@@ -122,6 +122,8 @@ class IncludeEntry:
 
 def shown_path(path: Path) -> str:
     """Return a path as findings show it: relative to the working folder if it is inside it."""
+    if '\0' in str(path):
+        return str(path)  # no path at all, and `realpath` raises
     real = os.path.realpath(path)
     try:
         return str(Path(real).relative_to(Path.cwd()))

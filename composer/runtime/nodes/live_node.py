@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
+from composer.ament import remaps_actions
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
@@ -117,7 +118,9 @@ class LiveNode:
         return self._groups[key]
 
     def resolve_action_name(self, name: str) -> str:
-        """Return the full name of an action, whose name itself ROS does not remap."""
+        """Return the full name of an action, which newer versions of ROS remap as a topic."""
+        if remaps_actions():
+            return str(self.ros.resolve_topic_name(name))
         return expand_name(name, self.ros.get_name(), self.ros.get_namespace())
 
     def place(self, path: DataPath) -> str:

@@ -46,6 +46,8 @@ def project(tmp_path, monkeypatch):
         'from space import one, deep\nimport space.deep',
         'from open import trun',
         'import guarded',
+        'from time import tomorrow_or_never',
+        'from os import path, environ\nfrom collections import abc, deque',
         'try:\n    import not_there\nexcept ImportError:\n    not_there = None',
         'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import not_there',
         'from contextlib import suppress\nwith suppress(ImportError):\n    import not_there',
@@ -71,6 +73,8 @@ def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
         ('from not_there import this', "there is no module 'not_there'"),
         ('import json.decode', "there is no module 'json.decode'"),
         ('from concurrent.future import wait', "there is no module 'concurrent.future'"),
+        ('from time import slep', "time has no 'slep'"),
+        ('from os.path import jion', "os.path has no 'jion'"),
         ('from package.iner import turn', "there is no module 'package.iner'"),
         ('from package.inner import trun', "package.inner has no 'trun'"),
         ('from package import iner', "package has no 'iner'"),
@@ -98,6 +102,30 @@ def test_what_a_behaviour_imports_first_is_looked_at(check):
     """
     assert check(NODES, code) == [(5, RULE)]
     assert check('  n: {on_stop: parts:o}\n', code + '    def o(node): ...', rule=RULE) == []
+
+
+@pytest.mark.ros
+@pytest.mark.usefixtures('project')
+@pytest.mark.parametrize(
+    ('code', 'message'),
+    [
+        ('from std_msgs.msg import String\nimport std_msgs.msg as messages', None),
+        ('from std_msgs import msg', None),
+        ('from std_msgs.msg._string import String', None),
+        ('from std_srvs.srv import SetBool, SetBool_Request', None),
+        ('from declared.msg import Own', None),
+        ('from std_msgs.msg import Strin', "std_msgs.msg has no 'Strin'"),
+        ('from std_msgs.srv import String', "std_msgs.srv has no 'String'"),
+        ('from std_msgs.mgs import String', "there is no module 'std_msgs.mgs'"),
+        ('import std_msgs.mgs', "there is no module 'std_msgs.mgs'"),
+        ('from st_msgs.msg import String', "there is no module 'st_msgs'"),
+        ('from declared.msg import Onw', "declared.msg has no 'Onw'"),
+    ],
+)
+def test_types_are_imported_from_where_they_are(check, code, message):
+    before = 'interfaces: {declared: declared}\n'
+    found = check(NODES, code + GO, before=before, rule=RULE)
+    assert found == ([message] if message else [])
 
 
 @pytest.mark.usefixtures('project')

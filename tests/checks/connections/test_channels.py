@@ -2,6 +2,8 @@
 
 import pytest
 
+from composer.checks.connections import topology
+
 TALK = 'timers: {a: {period: 1, publish: out, message: hello}}'
 HEAR = 'behaviour: parts:hear'
 CODE = """
@@ -56,16 +58,20 @@ def test_names_that_do_not_meet_are_warned_of_at_both_ends(check, talker, listen
     assert found == ['no-subscription', 'no-publisher']
 
 
-def test_actions_are_not_remapped_by_name(check):
+@pytest.mark.parametrize('remaps', [False, True])
+def test_actions_are_remapped_by_newer_versions_of_ros(check, monkeypatch, remaps):
+    monkeypatch.setattr(topology, 'remaps_actions', lambda: remaps)
     nodes = """
   server:
     remap: {do: done}
     actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
   client:
-    action_clients: {do: test_msgs/action/Fibonacci}
+    action_clients: {do: {type: test_msgs/action/Fibonacci, action: DO}}
     on_start: parts:send
 """
-    assert check(nodes, CODE, installed=False) == [(4, 'bad-remap')]
+    right, wrong = ('done', 'do') if remaps else ('do', 'done')
+    assert check(nodes.replace('DO', right), CODE, rule='no-server', installed=False) == []
+    assert len(check(nodes.replace('DO', wrong), CODE, rule='no-server', installed=False)) == 1
 
 
 def test_what_ros_itself_serves_needs_no_other_end(check):

@@ -1,7 +1,13 @@
 """Names that are all but those of something in the system."""
 
+import subprocess
+import sys
+from textwrap import dedent
+
 import pytest
 
+from composer.ament import remaps_actions
+from composer.checks.connections import typos
 from composer.checks.connections.typos import find_typo
 
 RULE = 'likely-misspelling'
@@ -110,7 +116,9 @@ processes:
     assert check(nodes.replace('NAME', right), code, installed=False) == []
 
 
-def test_ros_does_not_remap_an_action(check):
+@pytest.mark.parametrize(('remaps', 'is_ignored'), [(False, True), (True, False), (None, False)])
+def test_an_older_ros_does_not_remap_an_action(check, monkeypatch, remaps, is_ignored):
+    monkeypatch.setattr(typos, 'remaps_actions', lambda: remaps)
     nodes = """
   server:
     remap: {do: done, heard: said}
@@ -118,10 +126,28 @@ def test_ros_does_not_remap_an_action(check):
     subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:do}}
 """
     code = 'def do(node, it): ...'
-    assert check(nodes, code, rule='bad-remap', installed=False) == [
-        "ROS does not remap actions, such as '/do', and ignores the rule"
-    ]
-    assert check(nodes.replace('do: done', 'do/_action/status: x'), code, installed=False) == []
+    message = "this ROS remaps no actions, such as '/do', and ignores the rule"
+    rule = 'ignored-remap'
+    assert check(nodes, code, rule=rule, installed=False) == [message] * is_ignored
+    parts = nodes.replace('do: done', 'do/_action/status: x')
+    assert check(parts, code, rule=rule, installed=False) == []
+
+
+@pytest.mark.ros
+def test_the_installed_ros_remaps_actions_as_its_version_says(domain_id):
+    code = """
+        import rclpy
+        from rclpy.action import ActionServer
+        from test_msgs.action import Fibonacci
+        rclpy.init(args=['--ros-args', '-r', 'do:=done'])
+        node = rclpy.create_node('n')
+        server = ActionServer(node, Fibonacci, 'do', lambda goal: None)
+        print([name for name, _ in node.get_service_names_and_types() if '/_action/' in name][0])
+        rclpy.shutdown()
+    """
+    command = [sys.executable, '-c', dedent(code)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.startswith('/done/' if remaps_actions() else '/do/')
 
 
 def test_a_remapping_rule_is_for_no_misspelt_name(check):
