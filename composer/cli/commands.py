@@ -239,7 +239,7 @@ def explain_command(rule: str | None) -> int:
 @click.option('--matrix', is_flag=True, help='Print the schema of the files of check --matrix.')
 def schema_command(*, path_only: bool, matrix: bool) -> int:
     """Print the JSON Schema of system files, for editors."""
-    from composer.cli.schema import print_schema
+    from composer.cli.editors import print_schema
 
     refuse_together({'--path': path_only, '--matrix': matrix})
     return print_schema(path_only=path_only, matrix=matrix)
@@ -344,9 +344,9 @@ def stubs_command(files: tuple[Path, ...], output: Path) -> int:
     Annotate a behaviour with the class of its node, as in `node: Governor` after
     `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
     """
-    from composer.cli.stubs import write
+    from composer.cli.editors import write_stubs
 
-    return write(files, output)
+    return write_stubs(files, output)
 
 
 @cli.command('new')

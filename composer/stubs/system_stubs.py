@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HEADER = '# Written by `composer stubs`: changes are lost the next time.'
 
 
-def write_stubs(context: CheckContext) -> dict[str, str]:
+def stubs_of(context: CheckContext) -> dict[str, str]:
     """Return the stubs of a system, by their paths in the folder of stubs."""
     modules = find_project_modules(context)
     module = module_of(context)

@@ -11,7 +11,7 @@ from composer.checks.checker import create_context
 from composer.cli import main as cli
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.stubs.system_stubs import read_template, write_stubs
+from composer.stubs.system_stubs import read_template, stubs_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SYSTEMS = sorted((ROOT / 'configs').glob('*.yaml'))
@@ -73,9 +73,8 @@ Twist(linaer=Vector3())  # error
 """
 
 
-def stubs_of(path):
-    context = create_context(load_system(path), InterfaceCatalogue())
-    return write_stubs(context)
+def stubs_in(path):
+    return stubs_of(create_context(load_system(path), InterfaceCatalogue()))
 
 
 def write(folder, files):
@@ -88,7 +87,7 @@ def test_mypy_finds_no_error_in_the_stubs_of_all_shipped_systems_and_those_of_us
     # In place of the package itself, which mypy takes a minute to read.
     files = {'composer/__init__.pyi': read_template('composer.pyi')}
     for path in [*SYSTEMS, ROOT / 'tests' / 'data' / 'typed' / 'system.yaml']:
-        for name, text in stubs_of(path).items():
+        for name, text in stubs_in(path).items():
             ast.parse(text, name)
             files[name] = text
     write(tmp_path / 'typings', files)
@@ -109,13 +108,13 @@ def test_mypy_finds_no_error_in_the_stubs_of_all_shipped_systems_and_those_of_us
 
 
 def test_nodes_that_declare_the_same_have_one_class():
-    text = stubs_of(ROOT / 'configs' / 'robot.yaml')['composer_stubs/robot.pyi']
+    text = stubs_in(ROOT / 'configs' / 'robot.yaml')['composer_stubs/robot.pyi']
     assert 'class FrontLeftWheel(_Node):' in text
     assert 'FrontRightWheel = FrontLeftWheel' in text
 
 
 def test_constants_fields_and_parts_of_interfaces_are_there():
-    files = stubs_of(ROOT / 'configs' / 'fibonacci_server.yaml')
+    files = stubs_in(ROOT / 'configs' / 'fibonacci_server.yaml')
     status = files['action_msgs/msg/__init__.pyi']
     assert '    STATUS_SUCCEEDED: _ClassVar[int]' in status
     action = next(text for name, text in files.items() if name.endswith('/action/__init__.pyi'))

@@ -26,7 +26,9 @@ def obey(node, message):
     return f'{speed}'
 
 
-def look(_node, scan): scan.ranges = [1.0, 2]; scan.range_maximum = max(scan.ranges)  # error
+def look(_node, scan):
+    scan.ranges = [1.0, 2]
+    scan.range_maximum = max(scan.ranges)  # error
 
 
 def light(node, *, on):

@@ -1,7 +1,8 @@
-"""`composer stubs`: write typed stubs of systems."""
+"""`composer schema` and `composer stubs`: what editors and type checkers need."""
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import click
@@ -12,7 +13,8 @@ from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.stubs.system_stubs import module_of, write_stubs
+from composer.schema import schema_path
+from composer.stubs.system_stubs import module_of, stubs_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +25,20 @@ class ConflictingSystemsError(ComposerError):
     """Two files would have their nodes in one module."""
 
 
-def write(paths: Sequence[Path], folder: Path) -> int:
+def print_schema(*, path_only: bool, matrix: bool) -> int:
+    """Print the schema of systems or of matrix files, or the path of the first."""
+    path = schema_path()
+    if matrix:
+        schema = json.loads(path.read_text(encoding='utf-8'))
+        definitions = {name: schema['$defs'][name] for name in ('combinations', 'combination')}
+        part = {'$schema': schema['$schema'], '$ref': '#/$defs/combinations'}
+        click.echo(json.dumps(part | {'$defs': definitions}, indent=2))
+        return ExitCode.DONE
+    click.echo(path if path_only else path.read_text(encoding='utf-8'), nl=path_only)
+    return ExitCode.DONE
+
+
+def write_stubs(paths: Sequence[Path], folder: Path) -> int:
     """Write the stubs of files into a folder; return the exit code.
 
     Raises:
@@ -44,7 +59,7 @@ def write(paths: Sequence[Path], folder: Path) -> int:
             message = f"{modules[module]} and {path} would both be 'composer_stubs.{module}'"
             raise ConflictingSystemsError(message, help='write them into two folders')
         modules[module] = path
-        files |= write_stubs(context)
+        files |= stubs_of(context)
     for name, text in files.items():
         place = folder / name
         try:
