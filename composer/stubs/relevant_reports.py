@@ -70,7 +70,7 @@ _KEPT = frozenset(
 )
 # What is said of values of which too little is known, or that monkeypatching makes.
 _GUESSES = re.compile(
-    r'^Unsupported target|^Incompatible import|^"?type\[|EllipsisType|object is not iterable'
+    r'^Unsupported target|^Incompatible import|EllipsisType|object is not iterable'
 )
 
 

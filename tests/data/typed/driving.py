@@ -1,6 +1,9 @@
 """Behaviours with errors that a type checker finds: each line that ends in `# error` has one."""
 
+import contextlib
+
 import helping
+from sensor_msgs.msg import LaserScan
 
 
 def tick(node):
@@ -26,8 +29,8 @@ def obey(node, message):
     return f'{speed}'
 
 
-def look(_node, scan):
-    scan.ranges = [1.0, 2]
+def look(_node, scan, longest=LaserScan.LONGEST):  # error
+    scan.ranges = [1.0, longest]
     scan.range_maximum = max(scan.ranges)  # error
 
 
@@ -39,10 +42,8 @@ def light(node, *, on):
 
 def reset(node, request):
     request = request or None
-    try:
+    with contextlib.suppress(AttributeError):
         node.publsh('status', '')
-    except AttributeError:
-        pass
     if hasattr(node.state, 'unheard'):
         node.state.unheard()
     return {'success': True}
