@@ -18,8 +18,10 @@ _OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
 # The classes of a system narrow what `composer.Node` allows.
 _SETTINGS = (
     '# mypy: disable-error-code="misc, override, overload-overlap, overload-cannot-match"',
+    '# mypy: disable-error-code="assignment, empty-body, no-overload-impl"',
     '# pyright: reportIncompatibleMethodOverride=false, reportIncompatibleVariableOverride=false',
     '# pyright: reportOverlappingOverload=false, reportInconsistentOverload=false',
+    '# pyright: reportNoOverloadImplementation=false',
 )
 
 

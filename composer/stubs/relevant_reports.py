@@ -23,11 +23,10 @@ if TYPE_CHECKING:
 
 _QUOTED = re.compile(r'"([^"]+)"')
 _WORD = re.compile(r'\w+')
-_CALLED = re.compile(r'(?:to|parameter "\w+" (?:of type .* )?in function) "(\w+)"')
+_CALLED = re.compile(r'(?:to|in function) "(\w+)"')
 _ATTRIBUTE = re.compile(r'attribute "(\w+)"')
-_METHODS = frozenset(
-    {'publish', 'call', 'call_async', 'send_goal', '__init__', 'set_parameters', 'get_parameters'}
-)
+_OF_NODES = frozenset({'publish', 'call', 'call_async', 'send_goal'})
+_METHODS = _OF_NODES | {'__init__', 'set_parameters', 'get_parameters'}
 # What asks for an attribute that may not be there, or makes it.
 _ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 # What a missing name raises, and what these errors are.
@@ -129,8 +128,12 @@ class RelevantReports:
 
     @cached_property
     def _stored(self) -> Counter[str]:
-        names = stored_names(ast.walk(self.copy.module.tree))
-        return Counter(name.id for name in names)
+        """How often each name is stored; twice if it is unpacked, as its type is a guess then."""
+        nodes = list(ast.walk(self.copy.module.tree))
+        unpacked = [
+            item for node in nodes if isinstance(node, ast.Tuple | ast.List) for item in node.elts
+        ]
+        return Counter(name.id for name in stored_names([*nodes, *unpacked]))
 
     def _is_asked_for(self, report: TypeReport, found: list[ast.AST]) -> bool:
         attribute = _ATTRIBUTE.search(report.message)
@@ -176,7 +179,9 @@ class RelevantReports:
     def _is_about_stubs(self, report: TypeReport) -> bool:
         text = ' '.join([report.message, *report.notes[:3]])
         words = {word for quoted in _QUOTED.findall(text) for word in _WORD.findall(quoted)}
-        return bool(words & (self.classes | self.packages))
+        called = _CALLED.search(report.message)
+        is_of_node = called is not None and called[1] in _OF_NODES
+        return is_of_node or bool(words & (self.classes | self.packages))
 
 
 _PLAIN = (ast.Constant, ast.JoinedStr, ast.UnaryOp, ast.BinOp, ast.Compare, ast.Attribute)

@@ -30,7 +30,8 @@ def stubs_of(context: CheckContext) -> dict[str, str]:
     module = module_of(context)
     classes = name_classes(shapes_of(context, modules))
     files = dict(write_messages(context, modules))
-    files[f'{SUPPORT}/{module}.pyi'] = text_of(write_nodes(f'{SUPPORT}.{module}', classes))
+    # No `.pyi`: pyright warns of a stub without a module, and here there is none.
+    files[f'{SUPPORT}/{module}.py'] = text_of(write_nodes(f'{SUPPORT}.{module}', classes))
     return files
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import tempfile
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from composer.diagnostics import SourceFile, Span, diagnostic_at
 from composer.interfaces.build.build_cache import find_cache
+from composer.spelling import did_you_mean, find_nearest
 from composer.stubs.annotated_copies import AnnotatedCopy, Annotator
 from composer.stubs.field_types import SUPPORT
 from composer.stubs.node_shapes import NodeShape, merge_shapes
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
     from composer.stubs.project_modules import ProjectModule
     from composer.stubs.type_checkers import TypeReport
 
+_LITERAL = re.compile(r"Literal\['([^']*)'\]")
+_TEXT = re.compile(r"""'([^']*)'|"([^"]*)\"""")
 # A behaviour of more nodes than these has a class that is named after the first ones.
 _MOST_NAMED = 3
 
@@ -149,7 +153,17 @@ def _finding(copy: AnnotatedCopy, report: TypeReport) -> Diagnostic:
     column = copy.original_column(report.line, report.column)
     end = copy.original_column(report.line, report.end)
     span = Span(source, report.line, column, max(end - column, 1))
-    return diagnostic_at(span, 'type-error', report.message)
+    return diagnostic_at(span, 'type-error', report.message, help=_nearest(span, report))
+
+
+def _nearest(span: Span, report: TypeReport) -> str | None:
+    """Return the declared name that a wrong one in the code may mean."""
+    names = _LITERAL.findall(' '.join([report.message, *report.notes]))
+    written = [a or b for a, b in _TEXT.findall(span.text)]
+    declared = set(names) - set(written)
+    if not written or written[0] in names[1:]:
+        return None
+    return did_you_mean(find_nearest(written[0], declared))
 
 
 def _source_of(copy: AnnotatedCopy) -> SourceFile:

@@ -93,7 +93,7 @@ def test_mypy_finds_no_error_in_the_stubs_of_all_shipped_systems_and_those_of_us
     write(tmp_path / 'typings', files)
     (tmp_path / 'uses.py').write_text(USES)
     (tmp_path / 'mypy.ini').write_text(SETTINGS)
-    everything = [str(path) for path in (tmp_path / 'typings').rglob('*.pyi')]
+    everything = [str(path) for path in (tmp_path / 'typings').rglob('*.py*')]
     result = subprocess.run(
         [sys.executable, '-m', 'mypy', 'uses.py', *everything, '--explicit-package-bases'],
         cwd=tmp_path,
@@ -108,7 +108,7 @@ def test_mypy_finds_no_error_in_the_stubs_of_all_shipped_systems_and_those_of_us
 
 
 def test_nodes_that_declare_the_same_have_one_class():
-    text = stubs_in(ROOT / 'configs' / 'robot.yaml')['composer_stubs/robot.pyi']
+    text = stubs_in(ROOT / 'configs' / 'robot.yaml')['composer_stubs/robot.py']
     assert 'class FrontLeftWheel(_Node):' in text
     assert 'FrontRightWheel = FrontLeftWheel' in text
 
@@ -133,7 +133,7 @@ def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):
     (tmp_path / 'my-robot.yaml').write_text('version: 1\nnodes: {rover: {on_start: go:go}}\n')
     assert cli.run(['stubs', 'my-robot.yaml']) == 0
     assert capsys.readouterr().out == 'typings: composer_stubs.my_robot\n'
-    text = (tmp_path / 'typings' / 'composer_stubs' / 'my_robot.pyi').read_text()
+    text = (tmp_path / 'typings' / 'composer_stubs' / 'my_robot.py').read_text()
     assert 'class Rover(_Node):' in text
     assert cli.run(['stubs', 'my-robot.yaml', 'my-robot.yaml']) == 1
     assert "would both be 'composer_stubs.my_robot'" in capsys.readouterr().err
