@@ -38,6 +38,7 @@ ROOMS = (
         'processes',
         'runtime',
     ),
+    'stubs',
     *('cli', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

@@ -41,7 +41,7 @@ from composer.language.pipeline import load_system
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
 FurtherCheck: TypeAlias = 'Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]]'
+FurtherChecks: TypeAlias = 'Mapping[Need, FurtherCheck]'
 SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
 
 NODE_RULES: tuple[CheckRule, ...] = (
@@ -88,6 +89,8 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
 )
 # One more than is shown, as a sign that there are more.
 _ENOUGH = MAX_FINDINGS + 1
+# What only some runs look at.
+_OPTIONAL: frozenset[Need] = frozenset({'import', 'types'})
 _MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
 
 
@@ -101,18 +104,19 @@ def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> Check
 
 
 def check_system(
-    system: LoadedSystem, catalogue: InterfaceCatalogue, further: FurtherCheck | None = None
+    system: LoadedSystem, catalogue: InterfaceCatalogue, further: FurtherChecks | None = None
 ) -> list[Diagnostic]:
     """Return the findings in a system, by their places in the file.
 
     Args:
-        further: A check to apply after the others; it gets their findings.
+        further: Checks to apply after the others, by what they need; each gets the findings so
+            far.
     """
     return check_in_context(system, create_context(system, catalogue), further)
 
 
 def check_in_context(
-    system: LoadedSystem, context: CheckContext | None, further: FurtherCheck | None = None
+    system: LoadedSystem, context: CheckContext | None, further: FurtherChecks | None = None
 ) -> list[Diagnostic]:
     """Return the findings in a system as `check_system` does, for a context that exists.
 
@@ -121,7 +125,7 @@ def check_in_context(
     """
     found: list[Diagnostic] = []
     declared: Sequence[Diagnostic] = ()
-    unchecked: set[Need] = set() if further else {'import'}
+    unchecked: set[Need] = set(_OPTIONAL - (further or {}).keys())
     comments = IgnoreComments(system.positions.source)
     if context:
         declared = context.interfaces.findings
@@ -129,8 +133,9 @@ def check_in_context(
         found += _apply_rules(context, comments)
     if context and further:
         samples = _by_line(system.sampled)
-        more = further(context, found)
-        found += [each for each in more if not _hangs_on_samples(each, samples)]
+        for check in further.values():
+            more = check(context, found)
+            found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias, or a file included twice, is wrong once.
     every = [*system.diagnostics, *declared, *found]
     once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}

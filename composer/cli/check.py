@@ -30,8 +30,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from composer.checks.checker import FurtherCheck
     from composer.cli.import_check import ImportCheck
     from composer.language.loaded_system import LoadedSystem
+    from composer.rules import Need
+    from composer.stubs.types_check import TypesCheck
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,8 @@ class CheckOptions:
         expected: If not empty, the check passes only if exactly these rules fire.
         is_quiet: Whether to print only findings.
         imports: Whether to import the behaviours.
+        types: Whether to run a type checker over the behaviours.
+        type_checker: Its name; `None` for one that is installed.
         skip_other_files: Whether to skip named files that do not look like systems.
         strict_packages: Whether packages that are not installed are errors without ROS 2, too.
         stdin_name: The path that findings in standard input are reported under.
@@ -62,6 +67,8 @@ class CheckOptions:
     expected: tuple[str, ...] = ()
     is_quiet: bool = False
     imports: bool = False
+    types: bool = False
+    type_checker: str | None = None
     skip_other_files: bool = False
     strict_packages: bool = False
     stdin_name: str = '<stdin>'
@@ -77,7 +84,7 @@ def check(words: Sequence[str], options: CheckOptions) -> int:
     Raises:
         UsageError: A rule is both ignored and expected, arguments or `--set` do not fit the
             file, or are given together with a matrix.
-        ComposerError: The report cannot be written.
+        ComposerError: The report cannot be written, or there is no type checker.
     """
     _refuse_contradictions(options)
     # What is read lives until the end: to look for garbage as often as usual takes a fifth more.
@@ -101,11 +108,14 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     selection = _select(words, options)
     absent = AbsentPackages(is_strict=options.strict_packages)
     imports = _import_check() if options.imports else None
+    further: dict[Need, FurtherCheck] = {'import': imports} if imports else {}
+    if options.types:
+        further['types'] = _types_check(options.type_checker)
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     for selected in selection.systems:
         checked = []
         for given, combination, system in _load(selected, options):
-            findings = absent.leave_out(check_system(system, catalogue, imports))
+            findings = absent.leave_out(check_system(system, catalogue, further))
             kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
             nodes = len(system.spec.nodes) if system.spec else None
             checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
@@ -118,6 +128,13 @@ def _import_check() -> ImportCheck:
     from composer.cli.import_check import ImportCheck
 
     return ImportCheck()
+
+
+def _types_check(name: str | None) -> TypesCheck:
+    from composer.stubs.type_checkers import find_type_checker
+    from composer.stubs.types_check import TypesCheck
+
+    return TypesCheck(find_type_checker(name))
 
 
 def _select(words: Sequence[str], options: CheckOptions) -> Selection:

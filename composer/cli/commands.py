@@ -24,6 +24,8 @@ from composer.errors import ExitCode
 from composer.reports import FORMATS
 from composer.terminal import escape
 
+# What `check --types` can be followed by.
+TYPE_CHECKERS = ('mypy', 'pyright')
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
 
@@ -151,6 +153,12 @@ def up_command(
     is_flag=True,
     help='Import the behaviours and check the functions, too. Runs the code of their modules.',
 )
+@click.option(
+    '--types',
+    is_flag=True,
+    help='Run a type checker over the behaviours, too: one that is installed, or the one that is '
+    'named, as in --types pyright (mypy or pyright).',
+)
 @click.option('--quiet', '-q', is_flag=True, help='Print only errors and warnings.')
 @click.option(
     '--skip-other-files',
@@ -179,6 +187,7 @@ def check_command(  # noqa: PLR0913 - one for each option
     ignored: tuple[str, ...],
     expected: tuple[str, ...],
     imports: bool,
+    types: bool,
     quiet: bool,
     skip_other_files: bool,
     strict_packages: bool,
@@ -193,6 +202,9 @@ def check_command(  # noqa: PLR0913 - one for each option
     """
     from composer.cli.check import CheckOptions, check
 
+    # The name of a type checker is a word of its own: the option works without.
+    type_checker = next((word for word in words if types and word in TYPE_CHECKERS), None)
+    words = tuple(word for word in words if word != type_checker)
     options = CheckOptions(
         format=format_name,
         output=output,
@@ -203,6 +215,8 @@ def check_command(  # noqa: PLR0913 - one for each option
         expected=expected,
         is_quiet=quiet,
         imports=imports,
+        types=types,
+        type_checker=type_checker,
         skip_other_files=skip_other_files,
         strict_packages=strict_packages,
         stdin_name=stdin_filename,
@@ -225,7 +239,7 @@ def explain_command(rule: str | None) -> int:
 @click.option('--matrix', is_flag=True, help='Print the schema of the files of check --matrix.')
 def schema_command(*, path_only: bool, matrix: bool) -> int:
     """Print the JSON Schema of system files, for editors."""
-    from composer.cli.schema import print_schema
+    from composer.cli.editors import print_schema
 
     refuse_together({'--path': path_only, '--matrix': matrix})
     return print_schema(path_only=path_only, matrix=matrix)
@@ -312,6 +326,27 @@ def graph_command(
 
     paths, arguments = split_words(words)
     return graph(paths, arguments, set_values, format_name=format_name, output=output)
+
+
+@cli.command('stubs')
+@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path('typings'),
+    show_default=True,
+    metavar='DIR',
+    help='The folder to write them to.',
+)
+def stubs_command(files: tuple[Path, ...], output: Path) -> int:
+    """Write typed stubs of the messages and nodes of FILES, for type checkers and editors.
+
+    Annotate a behaviour with the class of its node, as in `node: Governor` after
+    `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
+    """
+    from composer.cli.editors import write_stubs
+
+    return write_stubs(files, output)
 
 
 @cli.command('new')

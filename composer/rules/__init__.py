@@ -19,7 +19,7 @@ from typing import Any, Literal, TypeAlias
 
 RULES_FOLDER = Path(__file__).parent
 
-Need: TypeAlias = Literal['interfaces', 'import']
+Need: TypeAlias = Literal['interfaces', 'import', 'types']
 
 
 class Severity(Enum):

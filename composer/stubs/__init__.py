@@ -1,0 +1,1 @@
+"""Typed stubs of a system's messages and nodes, and type checkers that use them."""

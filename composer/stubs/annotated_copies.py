@@ -1,0 +1,181 @@
+"""Copies of a project's modules in which functions say what they are given and return.
+
+The copies have the lines of the originals; in a line that has an annotation more, columns are
+mapped back. What the annotations need is imported after the last line.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from composer.python_source.modules import FunctionKind, FunctionSource
+from composer.stubs.field_types import StubImports
+from composer.stubs.received_values import changed_names, payload_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+    from composer.python_source.syntax import FunctionNode
+    from composer.stubs.project_modules import ProjectModule
+    from composer.stubs.received_values import FunctionKey, FunctionUse, Received
+
+# The annotations that say less than the class of the node.
+_GENERAL = frozenset({'Node', 'composer.Node', 'Any', 'typing.Any', 'object'})
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class _Edit:
+    """A change in one line: characters from `start` to `end`, counted from 0, become `text`."""
+
+    line: int
+    start: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class AnnotatedCopy:
+    """A module with annotations.
+
+    Attributes:
+        module: The original.
+        text: The source of the copy.
+    """
+
+    module: ProjectModule
+    text: str
+    _edits: tuple[_Edit, ...]
+
+    def original_column(self, line: int, column: int) -> int:
+        """Return the column, from 1, in the original, of one in the copy."""
+        for edit in reversed(self._edits):
+            if edit.line != line:
+                continue
+            grown = sum(
+                len(each.text) - (each.end - each.start)
+                for each in self._edits
+                if each.line == line and each < edit
+            )
+            begin = edit.start + grown + 1
+            if column >= begin + len(edit.text):
+                column -= len(edit.text) - (edit.end - edit.start)
+            elif column >= begin:
+                column = begin
+        return column
+
+
+@dataclass(slots=True)
+class Annotator:
+    """Writes annotated copies.
+
+    Attributes:
+        functions: What is known of the functions, by module and name.
+        name_nodes: Returns the module and the class of nodes, by their keys.
+    """
+
+    functions: Mapping[FunctionKey, FunctionUse]
+    name_nodes: Callable[[Iterable[str]], tuple[str, str]]
+    _imports: StubImports = field(default_factory=lambda: StubImports(''))
+
+    def copy(self, module: ProjectModule) -> AnnotatedCopy:
+        """Return the copy of a module."""
+        self._imports = StubImports('')
+        lines = list(module.source.lines)
+        edits: list[_Edit] = []
+        for (name, _), use in self.functions.items():
+            if name == module.name:
+                edits += self._edit(use, lines)
+        for edit in sorted(edits, reverse=True):
+            line = lines[edit.line - 1]
+            lines[edit.line - 1] = line[: edit.start] + edit.text + line[edit.end :]
+        text = '\n'.join([*lines, *self._imports.lines(), ''])
+        return AnnotatedCopy(module, text, tuple(sorted(edits)))
+
+    def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
+        arguments = use.definition.args
+        changed = changed_names(use.definition)
+        for each in (*arguments.posonlyargs, *arguments.args):
+            received = use.received.get(each.arg)
+            wanted = self._annotation(received) if received else None
+            if wanted and each.arg not in changed:
+                yield from _annotate(
+                    each, wanted, lines, is_node=bool(received and received.nodes)
+                )
+        is_free = use.bindings and not use.is_called and use.definition.returns is None
+        if is_free and (wanted := self._returned(use)):
+            yield from _annotate_return(use.definition, wanted, lines)
+
+    def _annotation(self, received: Received) -> str | None:
+        if received.is_open or bool(received.nodes) == bool(received.messages):
+            return None
+        if received.nodes:
+            return self._imports.take(*self.name_nodes(received.nodes))
+        # A function that is given messages of several types tells them apart in its own ways.
+        return self._imports.message(*received.messages) if len(received.messages) == 1 else None
+
+    def _returned(self, use: FunctionUse) -> str | None:
+        kind = FunctionSource(use.definition).kind
+        returned = self._payload(use, 'returned')
+        if kind in (FunctionKind.PLAIN, FunctionKind.COROUTINE):
+            return returned
+        yielded = self._payload(use, 'yielded')
+        anything = self._imports.take('typing', 'Any')
+        if kind is FunctionKind.ASYNC_GENERATOR:
+            items = f'{yielded} | {returned}' if yielded and returned else anything
+            return f'{self._imports.take("typing", "AsyncGenerator")}[{items}, {anything}]'
+        generator = self._imports.take('typing', 'Generator')
+        # A timer's generator only ends: what it returns means nothing.
+        is_timer = any(binding.kind and binding.kind.is_timed for _, binding in use.bindings)
+        ended = anything if is_timer else returned or anything
+        return f'{generator}[{yielded or anything}, {anything}, {ended}]'
+
+    def _payload(self, use: FunctionUse, key: str) -> str | None:
+        """Return the type of a payload; `None` if anything may be returned somewhere."""
+        options: dict[str, None] = {}
+        for node, binding in use.bindings:
+            name = payload_of(node, binding, getattr(binding.key, key))
+            if name is None:
+                return None
+            options[self._imports.payload(name)] = None
+        return ' | '.join([*options, 'None'])
+
+
+def _annotate(
+    argument: ast.arg, wanted: str, lines: list[str], *, is_node: bool
+) -> Iterator[_Edit]:
+    line = argument.lineno
+    text = lines[line - 1]
+    if argument.annotation is None:
+        end = _characters(text, argument.col_offset) + len(argument.arg)
+        yield _Edit(line, end, end, f": '{wanted}'")
+        return
+    given = argument.annotation
+    written = given.value if isinstance(given, ast.Constant) else ast.unparse(given)
+    if is_node and written in _GENERAL and given.lineno == given.end_lineno:
+        start = _characters(lines[given.lineno - 1], given.col_offset)
+        end = _characters(lines[given.lineno - 1], given.end_col_offset or 0)
+        yield _Edit(given.lineno, start, end, f"'{wanted}'")
+
+
+def _annotate_return(function: FunctionNode, wanted: str, lines: list[str]) -> Iterator[_Edit]:
+    """Write the type of what a function returns after its parameters."""
+    source = '\n'.join(lines[function.lineno - 1 :])
+    depth = 0
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.OP and token.string in '([{':
+            depth += 1
+        elif token.type == tokenize.OP and token.string in ')]}':
+            depth -= 1
+            if depth == 0:
+                line = function.lineno + token.end[0] - 1
+                yield _Edit(line, token.end[1], token.end[1], f" -> '{wanted}'")
+                return
+
+
+def _characters(line: str, offset: int) -> int:
+    """Return how many characters the first bytes of a line are."""
+    return len(line.encode()[:offset].decode(errors='replace'))

@@ -1,0 +1,191 @@
+"""Interface packages as stubs: a class for each message, with its fields and constants.
+
+They describe what rosidl_generator_py generates: keyword-only constructors, a property for each
+field, constants of the class, and the parts of services and actions as inner names.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.interfaces.descriptions import (
+    ActionDescription,
+    FieldDescription,
+    FieldType,
+    MessageDescription,
+    ServiceDescription,
+)
+from composer.stubs.field_types import FieldTypes, StubImports, is_writable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from composer.interfaces.descriptions import ConstantDescription, InterfaceDescription
+
+_UUID = FieldDescription('goal_id', FieldType('message', 'unique_identifier_msgs/msg/UUID'))
+_TIME = FieldType('message', 'builtin_interfaces/msg/Time')
+_EVENT_INFO = FieldType('message', 'service_msgs/msg/ServiceEventInfo')
+# The parts of an action as `Action.Impl` names them.
+_IMPL = (
+    ('SendGoalService', '{}_SendGoal'),
+    ('GetResultService', '{}_GetResult'),
+    ('FeedbackMessage', '{}_FeedbackMessage'),
+)
+_COMMON_IMPL = (
+    ('CancelGoalService', 'action_msgs/srv/CancelGoal'),
+    ('GoalStatusMessage', 'action_msgs/msg/GoalStatusArray'),
+)
+
+
+def list_messages(interface: InterfaceDescription) -> Iterator[MessageDescription]:
+    """Yield all messages of an interface, with those that ROS adds to services and actions."""
+    if isinstance(interface, ServiceDescription):
+        yield from interface.parts
+        yield _describe_event(interface)
+    elif isinstance(interface, ActionDescription):
+        yield from interface.parts
+        for service in _inner_services(interface):
+            yield from list_messages(service)
+        feedback = FieldDescription('feedback', FieldType('message', interface.feedback.name))
+        yield MessageDescription(f'{interface.name}_FeedbackMessage', (_UUID, feedback))
+    else:
+        yield interface
+
+
+def write_interfaces(
+    module: str, interfaces: Mapping[str, InterfaceDescription | None]
+) -> Iterator[str]:
+    """Yield the lines of the stub of a module with interfaces, such as `std_msgs.msg`.
+
+    Args:
+        interfaces: By their full names; `None` for one of which nothing else is known.
+    """
+    imports = StubImports(module)
+    classes = [
+        line
+        for name, interface in interfaces.items()
+        for line in _write_interface(name, interface, imports)
+    ]
+    imports.take('typing', 'Any')
+    yield from imports.lines()
+    yield from classes
+
+
+def _describe_event(service: ServiceDescription) -> MessageDescription:
+    parts = {'request': service.request.name, 'response': service.response.name}
+    fields = (
+        FieldDescription(name, FieldType('message', part, None, 'bounded', 1))
+        for name, part in parts.items()
+    )
+    return MessageDescription(
+        f'{service.name}_Event', (FieldDescription('info', _EVENT_INFO), *fields)
+    )
+
+
+def _inner_services(action: ActionDescription) -> Iterator[ServiceDescription]:
+    goal = FieldDescription('goal', FieldType('message', action.goal.name))
+    result = FieldDescription('result', FieldType('message', action.result.name))
+    accepted = FieldDescription('accepted', FieldType('bool'))
+    status = FieldDescription('status', FieldType('int8'))
+    answers = {
+        'SendGoal': ((_UUID, goal), (accepted, FieldDescription('stamp', _TIME))),
+        'GetResult': ((_UUID,), (status, result)),
+    }
+    for name, (request, response) in answers.items():
+        full_name = f'{action.name}_{name}'
+        yield ServiceDescription(
+            full_name,
+            MessageDescription(f'{full_name}_Request', request),
+            MessageDescription(f'{full_name}_Response', response),
+        )
+
+
+def _write_interface(
+    name: str, interface: InterfaceDescription | None, imports: StubImports
+) -> Iterator[str]:
+    if interface is None:
+        yield from _write_unknown(name.rpartition('/')[2], imports)
+        return
+    for message in list_messages(interface):
+        yield from _write_message(message, imports)
+    if isinstance(interface, ServiceDescription):
+        yield from _write_service(interface.name)
+    elif isinstance(interface, ActionDescription):
+        yield from _write_action(interface, imports)
+
+
+def _write_unknown(name: str, imports: StubImports) -> Iterator[str]:
+    anything = imports.take('typing', 'Any')
+    yield from ('', f'{name}: {anything}')
+
+
+def _write_message(message: MessageDescription, imports: StubImports) -> Iterator[str]:
+    fields = [field for field in message.fields if is_writable(field.name)]
+    constants = [constant.name for constant in message.constants]
+    names = frozenset([*constants, *(field.name for field in fields)])
+    types = FieldTypes(imports, names)
+    text, anything = types.word('str'), imports.take('typing', 'Any')
+    yield from ('', f'class {_last(message.name)}:')
+    if message.comment:
+        yield f'    {_quote(message.comment)}'
+    yield from _write_constants(message.constants, types)
+    of_class = imports.take('typing', 'ClassVar')
+    yield f'    SLOT_TYPES: {of_class}[tuple[{anything}, ...]]'
+    yield '    def __init__('
+    yield '        self,'
+    yield '        *,'
+    yield from (f'        {field.name}: {types.write(field.type)} = ...,' for field in fields)
+    yield f'        check_fields: {types.word("bool")} | None = ...,'
+    yield '    ) -> None: ...'
+    for field in fields:
+        yield from _write_property(field, types)
+        if field.default is not None:
+            yield f'    {field.name.upper()}__DEFAULT: {of_class}[{types.read(field.type)}]'
+    yield '    @classmethod'
+    yield f'    def get_fields_and_field_types(cls) -> dict[{text}, {text}]: ...'
+
+
+def _write_constants(constants: Iterable[ConstantDescription], types: FieldTypes) -> Iterator[str]:
+    of_class = types.imports.take('typing', 'ClassVar')
+    for constant in constants:
+        if is_writable(constant.name):
+            yield f'    {constant.name}: {of_class}[{types.read(constant.type)}]'
+
+
+def _write_property(field: FieldDescription, types: FieldTypes) -> Iterator[str]:
+    comment = f'        {_quote(field.comment)}' if field.comment else ''
+    decorator = types.word('property')
+    yield f'    @{decorator}'
+    end = '' if comment else ' ...'
+    yield f'    def {field.name}(self) -> {types.read(field.type)}:{end}'
+    if comment:
+        yield comment
+    yield f'    @{field.name}.setter'
+    yield f'    def {field.name}(self, value: {types.write(field.type)}) -> None: ...'
+
+
+def _write_service(name: str) -> Iterator[str]:
+    last = _last(name)
+    yield from ('', f'class {last}:')
+    yield from (f'    {part} = {last}_{part}' for part in ('Request', 'Response', 'Event'))
+
+
+def _write_action(action: ActionDescription, imports: StubImports) -> Iterator[str]:
+    for service in _inner_services(action):
+        yield from _write_service(service.name)
+    last = _last(action.name)
+    yield from ('', f'class {last}:')
+    yield from (f'    {part} = {last}_{part}' for part in ('Goal', 'Result', 'Feedback'))
+    yield '    class Impl:'
+    yield from (f'        {name} = {form.format(last)}' for name, form in _IMPL)
+    yield from (f'        {name} = {imports.message(full)}' for name, full in _COMMON_IMPL)
+
+
+def _last(name: str) -> str:
+    return name.rpartition('/')[2]
+
+
+def _quote(comment: str) -> str:
+    """Return a comment as a docstring."""
+    text = ' '.join(comment.split())
+    return repr(text)

@@ -1,0 +1,145 @@
+"""The nodes of a system as classes, which know the names that each node declares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from composer.stubs.field_types import StubImports, is_writable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from composer.stubs.node_shapes import NodeShape
+
+_TIMEOUT = 'timeout: float | None = 5.0'
+# What a mapping has of its own: `node.parameters.keys` is no parameter.
+_OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
+# The classes of a system narrow what `composer.Node` allows.
+_SETTINGS = (
+    '# mypy: disable-error-code="misc, override, overload-overlap, overload-cannot-match"',
+    '# mypy: disable-error-code="assignment, empty-body, no-overload-impl"',
+    '# pyright: reportIncompatibleMethodOverride=false, reportIncompatibleVariableOverride=false',
+    '# pyright: reportOverlappingOverload=false, reportInconsistentOverload=false',
+    '# pyright: reportNoOverloadImplementation=false',
+)
+
+
+def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
+    """Yield the lines of a stub with nodes.
+
+    Args:
+        module: Its dotted name.
+        classes: The shape of each node, by the name of its class; equal shapes are one class.
+    """
+    imports = StubImports(module)
+    first: dict[NodeShape, str] = {}
+    lines: list[str] = []
+    for name, shape in classes.items():
+        if shape in first:
+            lines += ['', f'{name} = {first[shape]}']
+        else:
+            first[shape] = name
+            lines += _Writer(name, imports).node(shape)
+    yield from _SETTINGS
+    yield from imports.lines()
+    yield from lines
+
+
+@dataclass(frozen=True, slots=True)
+class _Writer:
+    """Writes the classes of one node."""
+
+    name: str
+    imports: StubImports
+
+    def node(self, shape: NodeShape) -> Iterator[str]:
+        yield from self._parameters(shape)
+        yield from self._state(shape)
+        yield from ('', f'class {self.name}({self.imports.take("composer", "Node")}):')
+        yield from self._property('parameters', f'{self.name}Parameters')
+        yield from self._property('state', f'{self.name}State')
+        yield from self._property('logger', self.imports.support('Logger'))
+        yield from self._overloaded(
+            self._publish(name, types) for name, types in shape.publishers
+        ) or [self._method('publish', 'Never', 'Never', '', 'None')]
+        for method in ('call', 'call_async'):
+            yield from self._overloaded(
+                self._call(method, name, types) for name, types in shape.service_clients
+            ) or [self._method(method, 'Never', 'Never', f', {_TIMEOUT}', 'None')]
+        yield from self._overloaded(
+            self._send_goal(name, types) for name, types in shape.action_clients
+        ) or [self._method('send_goal', 'Never', 'Never', f', {_TIMEOUT}', 'None')]
+
+    def _property(self, name: str, of_type: str) -> Iterator[str]:
+        yield '    @property'
+        yield f'    def {name}(self) -> {of_type}: ...'
+
+    def _parameters(self, shape: NodeShape) -> Iterator[str]:
+        anything = self.imports.take('typing', 'Any')
+        mapping = self.imports.take('typing', 'Mapping')
+        yield from ('', f'class {self.name}Parameters({mapping}[str, {anything}]):')
+        types = {name: ' | '.join(map(self._value, each)) for name, each in shape.parameters}
+        for name, of_type in types.items():
+            if is_writable(name) and name not in _OF_MAPPINGS and not name.startswith('__'):
+                yield from self._property(name, of_type)
+        yield from self._overloaded(
+            f'    def __getitem__(self, name: {self._literal(name)}, /) -> {of_type}: ...'
+            for name, of_type in types.items()
+        )
+
+    def _state(self, shape: NodeShape) -> Iterator[str]:
+        anything = self.imports.take('typing', 'Any')
+        # No `SimpleNamespace`, which has any name for type checkers.
+        yield from ('', f'class {self.name}State:')
+        yield f'    __dict__: dict[str, {anything}]'
+        yield from (f'    {each}: {anything}' for each in shape.state or () if is_writable(each))
+        # A behaviour may set what no other one does yet.
+        yield f'    def __setattr__(self, name: str, value: {anything}) -> None: ...'
+        if shape.state is None:
+            yield f'    def __getattr__(self, name: str) -> {anything}: ...'
+
+    def _publish(self, name: str, types: Sequence[str]) -> str:
+        return self._method('publish', self._literal(name), self._payloads(types), '', 'None')
+
+    def _call(self, method: str, name: str, types: Sequence[str]) -> str:
+        requests = self._payloads([f'{each}_Request' for each in types])
+        responses = [self.imports.message(f'{each}_Response') for each in types]
+        answer = responses[0] if len(responses) == 1 else self.imports.take('typing', 'Any')
+        rest = f' | None = None, {_TIMEOUT}'
+        return self._method(method, self._literal(name), requests, rest, answer)
+
+    def _send_goal(self, name: str, types: Sequence[str]) -> str:
+        goals = self._payloads([f'{each}_Goal' for each in types])
+        anything = self.imports.take('typing', 'Any')
+        parts = [anything, anything]
+        if len(types) == 1:
+            parts = [self.imports.message(f'{types[0]}_{part}') for part in ('Feedback', 'Result')]
+        answer = f'{self.imports.support("Goal")}[{", ".join(parts)}]'
+        rest = f' | None = None, {_TIMEOUT}'
+        return self._method('send_goal', self._literal(name), goals, rest, answer)
+
+    def _method(self, method: str, name: str, payload: str, rest: str, answer: str) -> str:
+        word = 'async def' if method.endswith('_async') else 'def'
+        if name == 'Never':
+            never = self.imports.take('typing', 'Never')
+            name, payload = never, f'{never} = ...'
+        return (
+            f'    {word} {method}(self, name: {name}, payload: {payload}{rest}) -> {answer}: ...'
+        )
+
+    def _overloaded(self, methods: Iterable[str]) -> list[str]:
+        several = list(methods)
+        if len(several) <= 1:
+            return several
+        decorator = f'    @{self.imports.take("typing", "overload")}'
+        return [line for method in several for line in (decorator, method)]
+
+    def _payloads(self, types: Sequence[str]) -> str:
+        return ' | '.join(map(self.imports.payload, types))
+
+    def _literal(self, name: str) -> str:
+        return f'{self.imports.take("typing", "Literal")}[{name!r}]'
+
+    def _value(self, of_type: str) -> str:
+        return self.imports.take('typing', 'Any') if of_type == 'Any' else of_type

@@ -1,0 +1,219 @@
+"""Which nodes and messages the functions of a project are given: by Composer, and by each other.
+
+A parameter counts as known only if everything that it is given is known.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+from composer.entity_kinds import PUBLISHED
+from composer.language.bindings import node_bindings
+from composer.python_source.local_names import list_arguments
+from composer.stubs.project_modules import all_nodes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.language.bindings import Binding
+    from composer.language.specs import NodeSpec
+    from composer.python_source.syntax import FunctionNode
+    from composer.stubs.project_modules import ProjectModule
+
+FunctionKey: TypeAlias = tuple[str, str]
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+# Longer chains of calls are not followed.
+_MOST_ROUNDS = 8
+
+
+@dataclass(slots=True)
+class Received:
+    """What a parameter is given.
+
+    Attributes:
+        nodes: The keys of nodes.
+        messages: The full names of messages.
+        is_open: Whether it may be given something else.
+    """
+
+    nodes: dict[str, None] = field(default_factory=dict)
+    messages: dict[str, None] = field(default_factory=dict)
+    is_open: bool = False
+
+    def add(self, other: Received) -> None:
+        """Take over what another parameter is given."""
+        self.nodes |= other.nodes
+        self.messages |= other.messages
+        self.is_open |= other.is_open
+
+    @property
+    def size(self) -> int:
+        """A number that grows with each addition."""
+        return len(self.nodes) + len(self.messages) + self.is_open
+
+
+@dataclass(slots=True)
+class FunctionUse:
+    """A function at the top level of a module, and what is known of its use.
+
+    Attributes:
+        received: By parameter.
+        bindings: The nodes and places that it is bound to.
+        is_called: Whether the project itself calls or passes it.
+    """
+
+    definition: FunctionNode
+    received: dict[str, Received] = field(default_factory=dict)
+    bindings: list[tuple[NodeSpec, Binding]] = field(default_factory=list)
+    is_called: bool = False
+
+    def names(self) -> list[str]:
+        """Return the names of the positional parameters."""
+        arguments = self.definition.args
+        return [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+
+    def give(self, name: str, received: Received) -> None:
+        """Note what a parameter is given."""
+        self.received.setdefault(name, Received()).add(received)
+
+
+def find_received_values(
+    context: CheckContext, modules: Mapping[str, ProjectModule]
+) -> dict[FunctionKey, FunctionUse]:
+    """Return the functions of a project that are given nodes or messages, by module and name."""
+    functions = {
+        (name, statement.name): FunctionUse(statement)
+        for name, module in modules.items()
+        for statement in module.tree.body
+        if isinstance(statement, _FUNCTIONS) and not statement.decorator_list
+    }
+    _give_bound(context, functions)
+    sizes = -1
+    for _ in range(_MOST_ROUNDS):
+        for module in modules.values():
+            _Calls(module, functions).follow()
+        grown = sum(each.size for use in functions.values() for each in use.received.values())
+        if grown == sizes:
+            break
+        sizes = grown
+    return functions
+
+
+def changed_names(function: FunctionNode) -> set[str]:
+    """Return the names that a function assigns, and the parameters of functions inside it."""
+    names: set[str] = set()
+    for node in ast.walk(function):
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            names.add(node.id)
+        elif isinstance(node, (*_FUNCTIONS, ast.Lambda)) and node is not function:
+            names |= {each.arg for each in list_arguments(node.args)}
+    return names
+
+
+def message_given(binding: Binding) -> str | None:
+    """Return the full name of the message that a behaviour is called with."""
+    return _part_of(binding, binding.key.given)
+
+
+def payload_of(node: NodeSpec, binding: Binding, part: str | None) -> str | None:
+    """Return the full name of the message that a returned or yielded payload becomes.
+
+    Args:
+        part: As in `BehaviourKey.returned`.
+    """
+    if part != PUBLISHED:
+        return _part_of(binding, part)
+    publisher = node.publishers.get(getattr(binding.entity, 'publish', None) or '')
+    return publisher.type if publisher else None
+
+
+def _part_of(binding: Binding, part: str | None) -> str | None:
+    of_type: str | None = getattr(binding.entity, 'type', None)
+    if part is None or of_type is None:
+        return None
+    return f'{of_type}_{part}' if part else of_type
+
+
+def _give_bound(context: CheckContext, functions: Mapping[FunctionKey, FunctionUse]) -> None:
+    for node in all_nodes(context):
+        for binding in node_bindings(node):
+            use = functions.get((binding.behaviour.module, binding.behaviour.function))
+            if use is None:
+                continue
+            use.bindings.append((node, binding))
+            given = message_given(binding)
+            messages = Received(messages={given: None}) if given else Received(is_open=True)
+            for name, received in zip(
+                use.names(), (Received(nodes={node.key: None}), messages), strict=False
+            ):
+                use.give(name, received)
+
+
+@dataclass(slots=True)
+class _Calls:
+    """Follows the calls in a module."""
+
+    module: ProjectModule
+    functions: Mapping[FunctionKey, FunctionUse]
+
+    def follow(self) -> None:
+        for statement in self.module.tree.body:
+            own = self.functions.get((self.module.name, getattr(statement, 'name', '')))
+            is_own = own is not None and own.definition is statement
+            known = self._known(own) if own and is_own else {}
+            called: set[int] = set()
+            for node in ast.walk(statement):
+                if isinstance(node, ast.Call) and (use := self._function(node.func)):
+                    called.add(id(node.func))
+                    use.is_called = True
+                    self._pass(node, use, known)
+            for node in ast.walk(statement):
+                if isinstance(node, ast.Name | ast.Attribute) and id(node) not in called:
+                    use = self._function(node)
+                    if use and isinstance(node.ctx, ast.Load):
+                        _open_all(use)
+
+    def _known(self, use: FunctionUse) -> dict[str, Received]:
+        """Return what the parameters of a function are, without those that it changes.
+
+        A parameter that nothing is known of yet is given nothing so far.
+        """
+        changed = changed_names(use.definition)
+        names = [name for name in use.names() if name not in changed]
+        return {name: use.received.get(name, Received()) for name in names}
+
+    def _function(self, expression: ast.expr) -> FunctionUse | None:
+        imports = self.module.source.imports
+        if isinstance(expression, ast.Name):
+            module, _, name = imports.get(expression.id, '').rpartition('.')
+            if module:
+                return self.functions.get((module, name))
+            return self.functions.get((self.module.name, expression.id))
+        if isinstance(expression, ast.Attribute) and isinstance(expression.value, ast.Name):
+            module = imports.get(expression.value.id, '')
+            return self.functions.get((module, expression.attr))
+        return None
+
+    def _pass(self, call: ast.Call, use: FunctionUse, known: Mapping[str, Received]) -> None:
+        names = use.names()
+        if any(isinstance(each, ast.Starred) for each in call.args):
+            _open_all(use)
+            return
+        given = dict(zip(names, call.args, strict=False))
+        for keyword in call.keywords:
+            if keyword.arg is None:
+                _open_all(use)
+                return
+            given[keyword.arg] = keyword.value
+        for name, value in given.items():
+            passed = known.get(value.id) if isinstance(value, ast.Name) else None
+            use.give(name, Received(is_open=True) if passed is None else passed)
+
+
+def _open_all(use: FunctionUse) -> None:
+    use.is_called = True
+    for name in use.names():
+        use.give(name, Received(is_open=True))

@@ -1,0 +1,147 @@
+"""The stubs of systems are valid, and say what the systems declare."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from composer.checks.checker import create_context
+from composer.cli import main as cli
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+from composer.stubs.system_stubs import read_template, stubs_of
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SYSTEMS = sorted((ROOT / 'configs').glob('*.yaml'))
+
+pytestmark = pytest.mark.ros
+
+SETTINGS = """\
+[mypy]
+mypy_path = typings
+strict = True
+no_site_packages = True
+ignore_missing_imports = True
+warn_unused_ignores = False
+"""
+USES = """\
+from typing import TYPE_CHECKING
+
+from geometry_msgs.msg import PoseWithCovariance, Twist, Vector3
+
+if TYPE_CHECKING:
+    from composer_stubs.payloads import geometry_msgs as payloads
+    from composer_stubs.system import LeftWheel, RightWheel, Rover
+
+
+def tick(node: 'Rover') -> 'payloads.Twist':
+    node.publish('status', 'on')
+    node.publish('cmd_vel', Twist(linear=Vector3(x=1)))
+    node.publish('cmd_vel', {'linear': {'x': node.parameters.speed}})
+    node.publish('statsu', 'on')  # error
+    node.publish('status', 1)  # error
+    node.call('light', True).message.upper()
+    node.call('light', True).messge  # error
+    node.call('lihgt')  # error
+    node.send_goal('drive')  # error
+    node.parameters['frame.id'].upper()
+    node.parameters['frame']  # error
+    node.parameters.sped  # error
+    node.state.count += 1
+    node.state.cuont  # error
+    node.logger.warnning('x')  # error
+    node.logger.info('x', once=True)
+    node.now().to_msg()
+    return {'linear': {'x': 1}}
+
+
+def turn(node: 'LeftWheel | RightWheel') -> None:
+    node.logger.info(node.name)
+    node.publish('status', '')  # error
+
+
+pose = PoseWithCovariance()
+pose.covariance = [0.0] * 36
+pose.covariance[0] = 1
+pose.covariance = 'none'  # error
+pose.pose.position.x = 1
+pose.pose.position.x = 'left'  # error
+pose.pose.positon  # error
+Twist(linaer=Vector3())  # error
+"""
+
+
+def stubs_in(path):
+    return stubs_of(create_context(load_system(path), InterfaceCatalogue()))
+
+
+def write(folder, files):
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def test_mypy_finds_no_error_in_the_stubs_of_all_shipped_systems_and_those_of_uses(tmp_path):
+    # In place of the package itself, which mypy takes a minute to read.
+    files = {'composer/__init__.pyi': read_template('composer.pyi')}
+    for path in [*SYSTEMS, ROOT / 'tests' / 'data' / 'typed' / 'system.yaml']:
+        for name, text in stubs_in(path).items():
+            ast.parse(text, name)
+            files[name] = text
+    write(tmp_path / 'typings', files)
+    (tmp_path / 'uses.py').write_text(USES)
+    (tmp_path / 'mypy.ini').write_text(SETTINGS)
+    everything = [str(path) for path in (tmp_path / 'typings').rglob('*.py*')]
+    result = subprocess.run(
+        [sys.executable, '-m', 'mypy', 'uses.py', *everything, '--explicit-package-bases'],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found = [line for line in result.stdout.splitlines() if ': error: ' in line]
+    wanted = {n for n, line in enumerate(USES.splitlines(), 1) if line.endswith('# error')}
+    assert {int(line.split(':')[1]) for line in found if line.startswith('uses.py')} == wanted
+    assert [line for line in found if not line.startswith('uses.py')] == []
+
+
+def test_nodes_that_declare_the_same_have_one_class():
+    text = stubs_in(ROOT / 'configs' / 'robot.yaml')['composer_stubs/robot.py']
+    assert 'class FrontLeftWheel(_Node):' in text
+    assert 'FrontRightWheel = FrontLeftWheel' in text
+
+
+def test_constants_fields_and_parts_of_interfaces_are_there():
+    files = stubs_in(ROOT / 'configs' / 'fibonacci_server.yaml')
+    status = files['action_msgs/msg/__init__.pyi']
+    assert '    STATUS_SUCCEEDED: _ClassVar[int]' in status
+    action = next(text for name, text in files.items() if name.endswith('/action/__init__.pyi'))
+    for line in (
+        '    Goal = Fibonacci_Goal',
+        '    class Impl:',
+        '    Feedback = Fibonacci_Feedback',
+    ):
+        assert line in action.splitlines()
+    service = files['action_msgs/srv/__init__.pyi']
+    assert '    Event = CancelGoal_Event' in service.splitlines()
+
+
+def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'my-robot.yaml').write_text('version: 1\nnodes: {rover: {on_start: go:go}}\n')
+    assert cli.run(['stubs', 'my-robot.yaml']) == 0
+    assert capsys.readouterr().out == 'typings: composer_stubs.my_robot\n'
+    text = (tmp_path / 'typings' / 'composer_stubs' / 'my_robot.py').read_text()
+    assert 'class Rover(_Node):' in text
+    assert cli.run(['stubs', 'my-robot.yaml', 'my-robot.yaml']) == 1
+    assert "would both be 'composer_stubs.my_robot'" in capsys.readouterr().err
+
+
+def test_a_system_with_errors_has_no_stubs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'robot.yaml').write_text('version: 1\nnods: {}\n')
+    assert cli.run(['stubs', 'robot.yaml']) == 1
+    assert 'error[unknown-key]' in capsys.readouterr().err
+    assert not (tmp_path / 'typings').exists()
