@@ -10,8 +10,8 @@ from composer.inference.current_run import Run, TooLongError
 from composer.inference.evaluation.evaluator import Evaluator
 from composer.inference.evaluation.function_calls import kind_of
 from composer.inference.message_types import MessageTypes
+from composer.inference.module_names import ProjectModules, is_of_project
 from composer.inference.node_facts import Log, NodeFacts
-from composer.inference.project_modules import ProjectModules, is_of_project
 from composer.inference.reading import Reading, missing_reading, unknown_reading
 from composer.inference.scopes import own_nodes
 from composer.inference.unread_code import Mentions, find_mentions

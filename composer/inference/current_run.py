@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.inference.message_types import MessageTypes
+    from composer.inference.module_names import ProjectModules
     from composer.inference.node_facts import NodeFacts
-    from composer.inference.project_modules import ProjectModules
     from composer.inference.values import Argument, Value
 
 # What one behaviour may take: statements and expressions, helpers included.
