@@ -90,7 +90,9 @@ def test_a_comment_in_a_text_is_none(check):
 def test_what_only_an_import_may_show_is_no_unused_comment_without_it(check):
     text = '    on_start: driving:start  # composer: ignore[bad-signature]\n'
     assert check(text) == []
-    assert [finding[1] for finding in check(text, further={'import': nothing_more})] == ['unused-ignore']
+    assert [finding[1] for finding in check(text, further={'import': nothing_more})] == [
+        'unused-ignore'
+    ]
 
 
 def test_what_only_interfaces_show_is_no_unused_comment_without_them(check):
