@@ -109,7 +109,7 @@ def _write_interface(
     for message in list_messages(interface):
         yield from _write_message(message, imports)
     if isinstance(interface, ServiceDescription):
-        yield from _write_service(interface.name)
+        yield from _write_service(interface.name, imports)
     elif isinstance(interface, ActionDescription):
         yield from _write_action(interface, imports)
 
@@ -164,21 +164,25 @@ def _write_property(field: FieldDescription, types: FieldTypes) -> Iterator[str]
     yield f'    def {field.name}(self, value: {types.write(field.type)}) -> None: ...'
 
 
-def _write_service(name: str) -> Iterator[str]:
-    last = _last(name)
+def _write_service(name: str, imports: StubImports) -> Iterator[str]:
+    last, alias = _last(name), imports.take('typing', 'TypeAlias')
     yield from ('', f'class {last}:')
-    yield from (f'    {part} = {last}_{part}' for part in ('Request', 'Response', 'Event'))
+    yield from (
+        f'    {part}: {alias} = {last}_{part}' for part in ('Request', 'Response', 'Event')
+    )
 
 
 def _write_action(action: ActionDescription, imports: StubImports) -> Iterator[str]:
     for service in _inner_services(action):
-        yield from _write_service(service.name)
-    last = _last(action.name)
+        yield from _write_service(service.name, imports)
+    last, alias = _last(action.name), imports.take('typing', 'TypeAlias')
     yield from ('', f'class {last}:')
-    yield from (f'    {part} = {last}_{part}' for part in ('Goal', 'Result', 'Feedback'))
+    yield from (f'    {part}: {alias} = {last}_{part}' for part in ('Goal', 'Result', 'Feedback'))
     yield '    class Impl:'
-    yield from (f'        {name} = {form.format(last)}' for name, form in _IMPL)
-    yield from (f'        {name} = {imports.message(full)}' for name, full in _COMMON_IMPL)
+    yield from (f'        {name}: {alias} = {form.format(last)}' for name, form in _IMPL)
+    yield from (
+        f'        {name}: {alias} = {imports.message(full)}' for name, full in _COMMON_IMPL
+    )
 
 
 def _last(name: str) -> str:

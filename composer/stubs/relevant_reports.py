@@ -111,7 +111,7 @@ class RelevantReports:
     def _is_of_interface(self, report: TypeReport) -> bool:
         """Return whether a call is one of a node or of a message's class."""
         if report.code == 'misc':
-            return 'await' in report.message
+            return 'await' in report.message or '"yield"' in report.message
         called = _CALLED.search(report.message) if 'rgument' in report.message else None
         return called is None or called[1] in _METHODS or called[1] in self.classes
 
@@ -240,6 +240,11 @@ def _is_shown(report: TypeReport, found: list[ast.AST]) -> bool:
         if calls and 'overload' in text:
             mappings = [each for each in calls[0].args[1:2] if isinstance(each, ast.Dict)]
             mappings = mappings if _has_literal_name(calls) else []
+        mappings += [
+            node.value
+            for node in found
+            if isinstance(node, ast.Yield) and isinstance(node.value, ast.Dict)
+        ]
         return any(map(_is_plain, mappings))
     if report.code == 'return-value' and re.search(r'got "[^"]*\b(Any|object)\b', text):
         return False
@@ -272,4 +277,6 @@ def _is_plain(value: ast.expr) -> bool:
         return keys and all(map(_is_plain, value.values))
     if isinstance(value, ast.List | ast.Tuple):
         return all(map(_is_plain, value.elts))
+    if isinstance(value, ast.IfExp):
+        return _is_plain(value.body) and _is_plain(value.orelse)
     return isinstance(value, _PLAIN)

@@ -119,13 +119,13 @@ def test_constants_fields_and_parts_of_interfaces_are_there():
     assert '    STATUS_SUCCEEDED: _ClassVar[int]' in status
     action = next(text for name, text in files.items() if name.endswith('/action/__init__.pyi'))
     for line in (
-        '    Goal = Fibonacci_Goal',
+        '    Goal: _TypeAlias = Fibonacci_Goal',
         '    class Impl:',
-        '    Feedback = Fibonacci_Feedback',
+        '    Feedback: _TypeAlias = Fibonacci_Feedback',
     ):
         assert line in action.splitlines()
     service = files['action_msgs/srv/__init__.pyi']
-    assert '    Event = CancelGoal_Event' in service.splitlines()
+    assert '    Event: _TypeAlias = CancelGoal_Event' in service.splitlines()
 
 
 def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):

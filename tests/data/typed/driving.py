@@ -4,6 +4,9 @@ import contextlib
 
 import helping
 from sensor_msgs.msg import LaserScan
+from std_srvs.srv import SetBool
+
+from composer import Node
 
 
 def tick(node):
@@ -38,6 +41,10 @@ def light(node, *, on):
     response = node.call('light', {'data': on})
     node.logger.info(response.messge)  # error
     node.call_async('light', True)  # error
+
+
+def switch(node: Node, request: SetBool.Request) -> SetBool.Response:
+    return SetBool.Response(success=request.dota)  # error
 
 
 def reset(node, request):
