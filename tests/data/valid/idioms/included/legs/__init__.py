@@ -1,0 +1,2 @@
+"""Legs and a body."""
+from . import body, leg

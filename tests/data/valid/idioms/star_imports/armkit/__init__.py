@@ -1,0 +1,4 @@
+from .kinematics import *
+from .callbacks import prepare
+
+__all__ = ['prepare', 'forward', 'LINKS']
