@@ -11,7 +11,7 @@ from composer.inference.evaluation.evaluator import Evaluator
 from composer.inference.evaluation.function_calls import kind_of
 from composer.inference.message_types import MessageTypes
 from composer.inference.module_names import ProjectModules, is_of_project
-from composer.inference.node_facts import Log, NodeFacts
+from composer.inference.node_facts import NodeFacts, Question
 from composer.inference.reading import Reading, missing_reading, unknown_reading
 from composer.inference.scopes import own_nodes
 from composer.inference.unread_code import Mentions, find_mentions
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from composer.language.specs import EndSpec, NodeSpec
     from composer.python_source.module_finder import ModuleFinder
     from composer.python_source.syntax import FunctionNode
+    from composer.yaml_text.positions import DataPath
 
 
 # What ends a loop; that a call may raise is no way to end one.
@@ -74,20 +75,33 @@ class BehaviourReader:
         self._modules = ProjectModules(modules)
         self._types = MessageTypes(catalogue)
         self._has_real_type = has_real_type
-        self._read: dict[object, list[tuple[Log, Reading]]] = {}
+        # By behaviour and what it is given: by questions, and by their answers.
+        self._read: dict[object, dict[tuple[Question, ...], dict[object, Reading]]] = {}
+        self._by_place: dict[DataPath, Reading] = {}
         self._mentions: dict[int, Mentions] = {}
 
     def read(self, node: NodeSpec, binding: Binding) -> Reading:
         """Return what a behaviour does with its node."""
-        facts = NodeFacts(node, self._has_real_type)
+        place = binding.behaviour.path
+        if place not in self._by_place:
+            reading = self._read_with(node, binding, tells_values=False)
+            if reading.needs_values:
+                reading = self._read_with(node, binding, tells_values=True)
+            self._by_place[place] = reading
+        return self._by_place[place]
+
+    def _read_with(self, node: NodeSpec, binding: Binding, *, tells_values: bool) -> Reading:
+        """Return a reading that other nodes share if they answer alike."""
+        facts = NodeFacts(node, self._has_real_type, tells_values)
         wire = wire_of(binding, facts)
-        key = (binding.behaviour.name, wire, _frozen(binding.behaviour.arguments))
-        known = self._read.setdefault(key, [])
-        for log, reading in known:
-            if facts.agrees_with(log):
+        key = (binding.behaviour.name, wire, tells_values, _frozen(binding.behaviour.arguments))
+        known = self._read.setdefault(key, {})
+        for questions, readings in known.items():
+            reading = readings.get(facts.answers(questions))
+            if reading is not None:
                 return reading
         reading = self._read_anew(binding, facts, wire)
-        known.append((facts.log, reading))
+        known.setdefault(tuple(facts.log), {})[tuple(facts.log.values())] = reading
         return reading
 
     def mentions(self, reading: Reading) -> Mentions:

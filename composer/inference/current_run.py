@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.diagnostics import Span
 from composer.inference.reading import NodeUse, Problem, Reading, StateUse
-from composer.inference.values import Place, is_chosen
+from composer.inference.values import Constant, Place, alternatives, is_chosen
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,6 +50,13 @@ class Run:
         self.dead_branches = 0
         self.is_silent = False
         self._steps = 0
+
+    def decide(self, value: Value) -> None:
+        """Note that a value decides on what is done, or with what."""
+        if is_chosen(value) and any(
+            not isinstance(each, Constant) for each in alternatives(value)
+        ):
+            self.reading.needs_values = True
 
     def step(self) -> None:
         """Count a step.

@@ -16,13 +16,12 @@ from composer.inference.values import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from typing import Any
 
     from composer.language.specs import EndSpec, NodeSpec
 
-# Questions and their answers.
-Log = dict[tuple[str, str], object]
+Question = tuple[str, str]
 _PYTHON_TYPES: dict[str, type] = {'bool': bool, 'integer': int, 'double': float, 'string': str}
 
 
@@ -34,11 +33,17 @@ class NodeFacts:
 
     Args:
         has_real_type: Whether the type of an entity is the one that is meant.
+        tells_values: Whether it tells the node's name and the values of parameters, in which
+            nodes differ most; else only what kind of value each is.
+
+    Attributes:
+        log: The questions that were asked, and their answers.
     """
 
     node: NodeSpec
     has_real_type: Callable[[EndSpec], bool]
-    log: Log = field(default_factory=dict)
+    tells_values: bool = True
+    log: dict[Question, object] = field(default_factory=dict)
 
     def type_of(self, section: str, name: str) -> str | None:
         """Return the type of an entity; `None` if there is none, or none that is known."""
@@ -52,9 +57,9 @@ class NodeFacts:
         """Return the name of the node."""
         return self._ask('name', '')  # type: ignore[return-value]
 
-    def agrees_with(self, log: Log) -> bool:
-        """Return whether this node answers as another one did."""
-        return all(self._answer(*question) == answer for question, answer in log.items())
+    def answers(self, questions: Iterable[Question]) -> tuple[object, ...]:
+        """Return what this node answers."""
+        return tuple(self._answer(*question) for question in questions)
 
     def _ask(self, topic: str, name: str) -> object:
         answer = self.log[topic, name] = self._answer(topic, name)
@@ -62,7 +67,8 @@ class NodeFacts:
 
     def _answer(self, topic: str, name: str) -> object:
         if topic == 'name':
-            return constant(self.node.name, is_chosen=BY_FILE)
+            own = constant(self.node.name, is_chosen=BY_FILE)
+            return own if self.tells_values else Scalar(str, BY_FILE)
         if topic == 'parameter':
             return self._answer_parameter(name)
         entity: Any = getattr(self.node, topic).get(name)
@@ -73,6 +79,7 @@ class NodeFacts:
         if parameter is None:
             return UNKNOWN
         if isinstance(parameter.value, bool | int | float | str):
-            return constant(parameter.value, is_chosen=BY_PARAMETER)
+            value = constant(parameter.value, is_chosen=BY_PARAMETER)
+            return value if self.tells_values else Scalar(value.kind, BY_PARAMETER)
         kind = _PYTHON_TYPES.get(parameter.type or '')
         return Scalar(kind, is_chosen=BY_PARAMETER) if kind else CHOSEN

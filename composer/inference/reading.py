@@ -111,6 +111,7 @@ class Reading:
         state_read: What it reads of `node.state`.
         state_set: The names that it sets there.
         is_state_open: Whether it may set others.
+        needs_values: Whether it hangs on the values of parameters, or on the node's name.
         mentioned: Texts that something unknown is given, and may use as names.
         modules: The modules that it needs.
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
@@ -129,6 +130,7 @@ class Reading:
     is_state_open: bool = False
     mentioned: set[str] = field(default_factory=set)
     modules: dict[int, ModuleSource] = field(default_factory=dict)
+    needs_values: bool = False
     own_state_read: list[StateUse] = field(default_factory=list)
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False

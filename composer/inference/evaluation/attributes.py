@@ -278,6 +278,7 @@ class Attributes(Part):
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []
+        run.decide(index)
         for each in alternatives(index):
             if isinstance(each, Constant) and isinstance(each.value, str):
                 run.use(

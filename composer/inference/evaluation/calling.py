@@ -52,6 +52,7 @@ class Calls(Part):
         function = self._evaluator.evaluate(node.func, scope)
         arguments = self._arguments(node, scope)
         place = Place(scope.module, node)
+        self._note_keys(function, arguments)
         if function == External('builtins.super') or function == External('builtins.locals'):
             return UNKNOWN
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
@@ -68,6 +69,14 @@ class Calls(Part):
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _note_keys(self, function: Value, arguments: Arguments) -> None:
+        """Note that arguments decide which attribute or entry of a table is meant."""
+        is_lookup = function == External('builtins.getattr') or (
+            isinstance(function, BoundMethod) and isinstance(function.owner, Mapping)
+        )
+        for argument in arguments.positional if is_lookup else ():
+            self._evaluator.run.decide(argument.value)
 
     def _arguments(self, node: ast.Call, scope: Scope) -> Arguments:
         positional: list[Argument] = []

@@ -165,6 +165,7 @@ class Evaluator:
 
         What the file decides on may be decided otherwise by the next file, or a parameter.
         """
+        self.run.decide(test)
         truth = truth_of(test)
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)

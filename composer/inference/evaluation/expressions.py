@@ -233,6 +233,7 @@ class Expressions(Part):
     def _subscript(self, node: ast.Subscript, scope: Scope) -> Value:
         owner = self.evaluate(node.value, scope)
         index = self.evaluate(node.slice, scope)
+        self._evaluator.run.decide(index)
         is_slice = isinstance(node.slice, _UNREAD)
         place = Place(scope.module, node.slice)
         return join(

@@ -58,6 +58,7 @@ class NodeCalls(Part):
         if payload is not None and isinstance(name.value, Alternatives):
             # Name and payload may have been chosen together.
             payload = Argument(join(alternatives(payload.value)), payload.place)
+        self._evaluator.run.decide(name.value)
         for each in alternatives(name.value):
             if not isinstance(each, Constant) or not isinstance(each.value, str):
                 self._evaluator.run.reading.open_kinds.add(kind)

@@ -249,6 +249,7 @@ class Statements(Part):
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         subject = self._evaluator.evaluate(node.subject, scope)
+        self._evaluator.run.decide(subject)
         ends: list[Names | None] = []
         before = scope.copy_names()
         for case in node.cases:
