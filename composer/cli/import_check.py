@@ -89,7 +89,9 @@ def _bindings(spec: SystemSpec) -> Iterator[Binding]:
 def _check_function(
     context: CheckContext, binding: Binding, function: Callable[..., Any]
 ) -> Iterator[Diagnostic]:
-    kind, signature = behaviours.kind_of(function), behaviours.signature_of(function)
+    # What a wrapper returns may be something else than what it wraps.
+    kind = None if hasattr(function, '__wrapped__') else behaviours.kind_of(function)
+    signature = behaviours.signature_of(function)
     yield from check_behaviour_call(context, binding, kind, signature)
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from composer.inference.current_run import Run, TooLongError
 from composer.inference.evaluation.evaluator import Evaluator
-from composer.inference.evaluation.function_calls import kind_of
 from composer.inference.message_types import MessageTypes
 from composer.inference.module_names import ProjectModules, is_of_project
 from composer.inference.node_facts import NodeFacts, Question
@@ -54,6 +53,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
+# What all behaviours of a system may take: a step is a statement or an expression.
+_MOST_STEPS = 200_000
 # What ends a loop; that a call may raise is no way to end one.
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
 
@@ -79,6 +80,7 @@ class BehaviourReader:
         self._read: dict[object, dict[tuple[Question, ...], dict[object, Reading]]] = {}
         self._by_place: dict[DataPath, Reading] = {}
         self._mentions: dict[int, Mentions] = {}
+        self._steps_left = _MOST_STEPS
 
     def read(self, node: NodeSpec, binding: Binding) -> Reading:
         """Return what a behaviour does with its node."""
@@ -121,11 +123,13 @@ class BehaviourReader:
         if not is_of_project(module):
             return unknown_reading()
         self._modules.find(binding.behaviour.module)
-        run = Run(facts, self._modules, self._types)
+        run = Run(facts, self._modules, self._types, self._steps_left)
         try:
             _follow(run, module, binding, wire)
         except (TooLongError, RecursionError):
             return unknown_reading()
+        finally:
+            self._steps_left -= run.steps
         run.reading.settle()
         return run.reading
 
@@ -194,7 +198,7 @@ def _of_file(value: object, place: Place) -> Value:
 
 
 def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire) -> None:
-    kind = kind_of(callee)
+    kind = evaluator.functions.kind_of(callee)
     is_generator = kind.is_generator
     returned = wire.ended if is_generator else wire.returned
     if kind is FunctionKind.ASYNC_GENERATOR and wire.ended:
@@ -223,7 +227,7 @@ def _is_stub(definition: FunctionNode | ast.Lambda) -> bool:
 
 def _check_end(evaluator: Evaluator, callee: Function, binding: Binding) -> None:
     """Check that a behaviour ends: until then nothing else of its group runs."""
-    kind, definition = kind_of(callee), callee.definition
+    kind, definition = evaluator.functions.kind_of(callee), callee.definition
     # Goals have threads of their own.
     is_of_action = binding.kind is not None and binding.kind.channel == 'action'
     if kind is not FunctionKind.PLAIN or is_of_action or isinstance(definition, ast.Lambda):

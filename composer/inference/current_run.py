@@ -29,6 +29,9 @@ class TooLongError(Exception):
 class Run:
     """A reading of one behaviour.
 
+    Args:
+        most_steps: How many steps it may take.
+
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
         guards: The number of statements around it that catch what a wrong name raises.
@@ -36,9 +39,12 @@ class Run:
         conditions: The number of conditions around it.
         dead_branches: The number of branches around it that the file never takes.
         is_silent: Whether the place is read once more later.
+        steps: How many steps it has taken.
     """
 
-    def __init__(self, facts: NodeFacts, modules: ProjectModules, types: MessageTypes) -> None:
+    def __init__(
+        self, facts: NodeFacts, modules: ProjectModules, types: MessageTypes, most_steps: int
+    ) -> None:
         self.facts = facts
         self.modules = modules
         self.types = types
@@ -49,7 +55,8 @@ class Run:
         self.conditions = 0
         self.dead_branches = 0
         self.is_silent = False
-        self._steps = 0
+        self.steps = 0
+        self._most_steps = min(most_steps, _MOST_STEPS)
 
     def decide(self, value: Value) -> None:
         """Note that a value decides on what is done, or with what."""
@@ -64,8 +71,8 @@ class Run:
         Raises:
             TooLongError: There were too many.
         """
-        self._steps += 1
-        if self._steps > _MOST_STEPS:
+        self.steps += 1
+        if self.steps > self._most_steps:
             raise TooLongError
 
     @contextmanager

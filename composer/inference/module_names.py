@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.inference.values import UNKNOWN, External, Value
-from composer.python_source.modules import ModuleSource
+from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.syntax import BLOCKS
 
 if TYPE_CHECKING:
@@ -112,6 +112,8 @@ class ProjectModules:
         self._under_way: set[tuple[int, str]] = set()
         # The functions that were read, by their syntax trees.
         self.followed: set[int] = set()
+        # What calls of functions return, by their syntax trees.
+        self.kinds: dict[int, FunctionKind] = {}
         # How often the code of a module stores an attribute of a name.
         self.attribute_stores: dict[tuple[int, str], int] = {}
 

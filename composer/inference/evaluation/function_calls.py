@@ -84,9 +84,20 @@ class Functions(Part):
             value = self._evaluator.calls.invoke(by, Arguments((Argument(value, place),)), place)
         return value
 
+    def kind_of(self, function: Function) -> FunctionKind:
+        """Return what a call of a function returns."""
+        definition = function.definition
+        if isinstance(definition, ast.Lambda):
+            return FunctionKind.PLAIN
+        kinds = self._evaluator.run.modules.kinds
+        if id(definition) not in kinds:
+            kinds[id(definition)] = FunctionSource(definition).kind or FunctionKind.PLAIN
+        found: FunctionKind = kinds[id(definition)]
+        return found
+
     def is_coroutine(self, function: Function) -> bool:
         """Return whether a call returns a coroutine, which runs when it is awaited."""
-        return kind_of(function) is FunctionKind.COROUTINE
+        return self.kind_of(function) is FunctionKind.COROUTINE
 
     def follow(self, function: Function, arguments: Arguments, *, waits: bool) -> Value:
         """Return what a call of a function may return, and read what it does."""
@@ -100,7 +111,7 @@ class Functions(Part):
         if not self.fits(function, arguments):
             return UNKNOWN
         scope = self.enter(function, arguments, waits=waits)
-        result = result_of(function, scope)
+        result = result_of(self.kind_of(function), scope)
         if key is not None:
             self._results[key] = result
         return result
@@ -220,17 +231,9 @@ class Functions(Part):
             )
 
 
-def kind_of(function: Function) -> FunctionKind:
-    """Return what a call of a function returns."""
-    if isinstance(function.definition, ast.Lambda):
-        return FunctionKind.PLAIN
-    return FunctionSource(function.definition).kind or FunctionKind.PLAIN
-
-
-def result_of(function: Function, scope: Scope) -> Value:
-    """Return what a call gave, from its scope at its end."""
+def result_of(kind: FunctionKind, scope: Scope) -> Value:
+    """Return what a call gave, from the scope of the function at its end."""
     returned = join([value for value, _ in scope.returned]) if scope.returned else NONE
-    kind = kind_of(function)
     if kind is FunctionKind.COROUTINE:
         return Awaitable(returned)
     if kind.is_generator:

@@ -49,11 +49,14 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
     return function  # type: ignore[no-any-return]
 
 
+_ANY = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+
+
 def kind_of(function: Callable[..., Any]) -> FunctionKind:
     """Return how a function runs; of an object with `__call__`, how that does."""
-    target: Any = function
+    target: Any = inspect.unwrap(function)
     while isinstance(target, partial):
-        target = target.func
+        target = inspect.unwrap(target.func)
     if not inspect.isroutine(target) and not inspect.isclass(target):
         target = type(target).__call__
     if inspect.isasyncgenfunction(target):
@@ -66,8 +69,10 @@ def kind_of(function: Callable[..., Any]) -> FunctionKind:
 def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
     """Return a function's signature; `None` for functions of C that have none."""
     try:
-        # What is called is the wrapper, which may take and return something else.
-        return inspect.signature(function, follow_wrapped=False)
+        own = inspect.signature(function, follow_wrapped=False)
+        # A wrapper that takes whatever comes passes it on.
+        passes_on = all(each.kind in _ANY for each in own.parameters.values())
+        return inspect.signature(function) if own.parameters and passes_on else own
     except (TypeError, ValueError):
         return None
 
