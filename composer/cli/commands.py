@@ -364,7 +364,7 @@ def new_command(name: str) -> int:
 @cli.group('interfaces', invoke_without_command=True, subcommand_metavar=_SUBCOMMAND)
 @click.pass_context
 def interfaces_group(context: click.Context) -> int:
-    """Build, find, list and show interface packages."""
+    """Build and list interface packages."""
     return _help_without_command(context)
 
 

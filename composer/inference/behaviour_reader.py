@@ -210,7 +210,8 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     for value, place in scope.yielded if is_generator else ():
         _check(evaluator, wire.yielded, value, place)
     for value, place in scope.returned:
-        _check(evaluator, returned, value, place)
+        with evaluator.run.condition(is_doubt=id(place.node) in scope.doubtful):
+            _check(evaluator, returned, value, place)
     nothing = all(is_none(value) for value, _ in scope.returned)
     nothing = nothing and not is_generator and not _is_stub(callee.definition)
     if wire.needs_payload and wire.returned and scope.returned and nothing:

@@ -141,10 +141,9 @@ class Run:
         Args:
             used_at: Where the value is used that `place` wrote.
         """
-        if self.guards or self.is_silent:
+        if self.guards or self.broad_guards or self.is_silent:
             return
-        is_sure = rule == 'unknown-attribute' or (help_text or '').startswith('did you mean')
-        if self.doubts and not is_sure:
+        if self.doubts and not (help_text or '').startswith('did you mean'):
             return
         span, used = span_of(place), span_of(used_at) if used_at else None
         if used and (used.source, used.line) == (span.source, span.line):

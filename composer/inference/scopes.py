@@ -33,6 +33,7 @@ class Scope:
         yielded: What it yields, and where.
         inner: The functions defined in it.
         waits: Whether who calls the behaviour waits for it.
+        doubtful: The expressions that it returns where only the file decides, by their nodes.
         stored: What its names stood for anywhere.
     """
 
@@ -47,6 +48,7 @@ class Scope:
     yielded: list[tuple[Value, Place]] = field(default_factory=list)
     inner: list[Function] = field(default_factory=list)
     waits: bool = True
+    doubtful: set[int] = field(default_factory=set)
     stored: Names = field(default_factory=dict)
 
     def set(self, name: str, value: Value) -> None:

@@ -260,6 +260,11 @@ class ProjectModule:
 
 
 @dataclass(frozen=True, slots=True)
+class Never:
+    """What a call gives that always raises."""
+
+
+@dataclass(frozen=True, slots=True)
 class Alternatives:
     """One of several values.
 
@@ -325,6 +330,7 @@ Value: TypeAlias = (
     | Instance
     | Partial
     | ProjectModule
+    | Never
     | Alternatives
 )
 
@@ -332,6 +338,7 @@ BY_FILE = 1
 BY_PARAMETER = 2
 
 UNKNOWN = Unknown()
+NEVER = Never()
 CHOSEN = Unknown(BY_PARAMETER)
 NODE = NodeValue()
 NONE = Constant(type(None), None)
@@ -352,6 +359,8 @@ def join(values: Iterable[Value]) -> Value:
     found: dict[Value, None] = {}
     for value in values:
         found.update(dict.fromkeys(alternatives(value)))
+    if len(found) > 1:
+        found.pop(NEVER, None)
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:

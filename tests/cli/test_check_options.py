@@ -267,8 +267,9 @@ def test_an_import_shows_what_the_source_does_not(run, imports, tmp_path):
     code, out, err = imports(node, DECORATED)
     assert code == 1
     assert 'error[bad-signature]: start(node, speed) is called as start(node): missing' in out
-    assert "error[generator-not-allowed]: 'count' is a generator" in out
-    assert err == 'imported\n2 errors in 1 file\n'
+    # What a wrapper returns may be something else than what it wraps.
+    assert 'generator-not-allowed' not in out
+    assert err == 'imported\n1 error in 1 file\n'
     assert run('rover.yaml') == (0, 'rover.yaml: ok, 1 node\n', '')
 
 

@@ -180,7 +180,7 @@ def test_a_comment_that_silences_something_in_one_combination_is_used(run):
         ('{layers: [/etc/passwd]}', "1:14: error[bad-combination]: '/etc/passwd' lies outside of"),
         ('{set: {nodes.x.y: 1}}', "1:11: error[bad-combination]: there is no 'x' in nodes"),
         ('{set: {"": 1}}', '1:11: error[bad-combination]: the path is empty'),
-        ('{layers: ["\\0"]}', '1:14: error[bad-combination]: there is no file'),
+        ('{layers: ["\\0"]}', '1:14: error[bad-combination]: no file has a null character'),
         ('{set: {version: 2}}', '1:20: error[unsupported-version]: '),
     ],
 )

@@ -171,7 +171,7 @@ def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
         ),
         (
             r'{file: "\0"}',
-            ('missing-include', 'robot.yaml:3:16', r"there is no file '\x00'"),
+            ('missing-include', 'robot.yaml:3:16', 'no file has a null character in its name'),
         ),
         (
             '{file: "package://no_such/x.yaml"}',

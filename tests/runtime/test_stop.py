@@ -12,7 +12,7 @@ import time
 
 def walk(node):
     try:
-        while True:
+        while True:  # composer: ignore[endless-loop]
             node.logger.info('walking')
             yield
     finally:
@@ -20,14 +20,14 @@ def walk(node):
 
 async def walk_async(node):
     try:
-        while True:
+        while True:  # composer: ignore[endless-loop]
             node.logger.info('walking')
             yield
     finally:
         node.logger.info('closed')
 
 def stubborn(node):
-    while True:
+    while True:  # composer: ignore[endless-loop]
         try:
             node.logger.info('walking')
             yield
@@ -36,7 +36,7 @@ def stubborn(node):
 
 def slow_end(node):
     try:
-        while True:
+        while True:  # composer: ignore[endless-loop]
             node.logger.info('walking')
             yield
     finally:
@@ -50,7 +50,7 @@ def stop(node):
 
 def spin(node):
     node.logger.info('spinning')
-    while True:
+    while True:  # composer: ignore[endless-loop]
         pass
 
 def hold_interpreter(node):

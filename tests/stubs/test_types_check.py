@@ -1,13 +1,16 @@
 """`composer check --types` finds what contradicts the declarations of a system, and nothing else."""
 
-import json
 import shutil
 from pathlib import Path
 
 import pytest
 
+from composer.checks.checker import create_context
 from composer.cli import main as cli
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
 from composer.stubs import type_checkers
+from composer.stubs.types_check import TypesCheck
 
 DATA = Path(__file__).resolve().parent.parent / 'data' / 'typed'
 
@@ -15,39 +18,33 @@ pytestmark = pytest.mark.ros
 
 
 @pytest.fixture(scope='module')
-def checked(tmp_path_factory):
-    """Check the typed system once; return the exit code and the report."""
+def found(tmp_path_factory):
+    """Check the types of a system once, as if no other check had found anything."""
     folder = tmp_path_factory.mktemp('typed')
     shutil.copytree(DATA, folder, dirs_exist_ok=True)
-    patch = pytest.MonkeyPatch()
-    with patch.context() as context:
-        context.chdir(folder)
-        context.setenv('XDG_CACHE_HOME', str(folder / 'cache'))
-        words = ['--types', 'mypy', 'system.yaml', '--format', 'json', '--output', 'report.json']
-        code = cli.run(['check', *words, '--ignore', 'unknown-parameter'])
-    return code, json.loads((folder / 'report.json').read_text())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv('XDG_CACHE_HOME', str(folder / 'cache'))
+        context = create_context(load_system(Path('system.yaml')), InterfaceCatalogue())
+        return list(TypesCheck(type_checkers.find_type_checker('mypy'))(context, []))
 
 
-def test_every_error_is_found_in_its_line_and_no_other_line(checked):
-    code, report = checked
+def test_every_error_is_found_in_its_line_and_no_other_line(found):
     wanted = {
         (path.name, number)
         for path in DATA.glob('*.py')
         for number, line in enumerate(path.read_text().splitlines(), start=1)
         if line.endswith('# error')
     }
-    places = [place for each in report['findings'] for place in (each, *each['related'])]
-    found = {(each['file'], each['line']) for each in places if each['file'].endswith('.py')}
-    assert found == wanted
-    assert code == 1
+    assert {(each.span.source.name, each.span.line) for each in found} == wanted
 
 
-def test_columns_are_those_of_the_original(checked):
+def test_columns_are_those_of_the_original(found):
     lines = (DATA / 'driving.py').read_text().splitlines()
     number, line = next(each for each in enumerate(lines, start=1) if 'LONGEST' in each[1])
-    (finding,) = (each for each in checked[1]['findings'] if each['line'] == number)
-    assert finding['column'] == line.index('LaserScan') + 1
-    assert finding['message'] == '"type[LaserScan]" has no attribute "LONGEST"'
+    (finding,) = (each for each in found if each.span.line == number)
+    assert finding.span.column == line.index('LaserScan') + 1
+    assert finding.message == '"type[LaserScan]" has no attribute "LONGEST"'
 
 
 def test_without_a_type_checker_it_says_what_to_install(tmp_path, monkeypatch, capsys):

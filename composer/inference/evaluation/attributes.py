@@ -121,6 +121,10 @@ class Attributes(Part):
     def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
         """Return an attribute, or a problem: the rule, what is wrong, and help."""
         if name.startswith('__'):
+            if name == '__class__' and isinstance(owner, Message):
+                return MessageClass(owner.type)
+            if name in ('__name__', '__qualname__') and isinstance(owner, MessageClass):
+                return constant(in_python(owner.type).rpartition('/')[2].rpartition('.')[2])
             if isinstance(owner, NodeValue | PartOfNode):
                 self._evaluator.escape(owner)
             return UNKNOWN
@@ -178,7 +182,7 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
-                return self._evaluator.kept.get(name, UNKNOWN)
+                return self._evaluator.kept.get(name, CHOSEN)
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -274,7 +278,7 @@ class Attributes(Part):
             else:
                 run.reading.is_own_state_open = True
             key = str(index.value) if isinstance(index, Constant) else ''
-            return self._evaluator.kept.get(f'[{key}]', UNKNOWN)
+            return self._evaluator.kept.get(f'[{key}]', CHOSEN)
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []

@@ -27,6 +27,11 @@ from composer.inference.values import (
     join,
 )
 
+# Those whose results are short if the text is.
+_COMPUTED = frozenset(
+    {'endswith', 'isdigit', 'lower', 'lstrip', 'removeprefix', 'removesuffix', 'rstrip'}
+    | {'startswith', 'strip', 'title', 'upper'}
+)
 _TEXT_METHODS = frozenset(
     {
         'capitalize',
@@ -68,6 +73,9 @@ class Containers(Part):
                 return self._call_sequence(owner, name, arguments)
             case Constant() | Scalar() if owner.kind is str:
                 self._evaluator.calls.escape_all(arguments)
+                known = _call_text(owner, name, arguments)
+                if known is not None:
+                    return known
                 if name in _TEXT_METHODS:
                     return Scalar(str, is_chosen(owner))
                 if name in ('split', 'rsplit', 'splitlines'):
@@ -210,3 +218,18 @@ class Containers(Part):
 
 def _is_simple(key: object) -> bool:
     return isinstance(key, str | int | float | bool)
+
+
+def _call_text(owner: Constant | Scalar, name: str, arguments: Arguments) -> Value | None:
+    """Return what a method of a text returns, if all is known."""
+    given = [argument.value for argument in arguments.all()]
+    if name not in _COMPUTED or not isinstance(owner, Constant) or arguments.named:
+        return None
+    if arguments.is_open or not all(isinstance(each, Constant) for each in given):
+        return None
+    values = [each.value for each in given if isinstance(each, Constant)]
+    try:
+        result = getattr(owner.value, name)(*values)
+    except (TypeError, ValueError):
+        return None
+    return constant(result, is_chosen=max(map(is_chosen, [owner, *given])))

@@ -91,6 +91,8 @@ class Evaluator:
     def look_up(self, node: ast.Name, scope: Scope) -> Value:
         """Return what a name stands for."""
         name = node.id
+        if name == '__debug__':
+            return CHOSEN
         current: Scope | None = scope
         while current is not None:
             if name in current.local:

@@ -9,6 +9,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.values import (
+    NEVER,
     NONE,
     UNKNOWN,
     Alternatives,
@@ -234,6 +235,8 @@ class Functions(Part):
 def result_of(kind: FunctionKind, scope: Scope) -> Value:
     """Return what a call gave, from the scope of the function at its end."""
     returned = join([value for value, _ in scope.returned]) if scope.returned else NONE
+    if kind is FunctionKind.PLAIN and not scope.returned:
+        return NEVER
     if kind is FunctionKind.COROUTINE:
         return Awaitable(returned)
     if kind.is_generator:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import split_part
 from composer.inference.values import (
+    CHOSEN,
     UNKNOWN,
     External,
     MessageClass,
@@ -25,6 +26,17 @@ if TYPE_CHECKING:
     from composer.python_source.modules import ModuleSource
 
 _FOLDERS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+
+
+# On what these say, branches are taken or not.
+_OF_THE_MACHINE = {
+    'os.environ',
+    'os.name',
+    'sys.argv',
+    'sys.platform',
+    'sys.version_info',
+    'typing.TYPE_CHECKING',
+}
 
 
 class Imports(Part):
@@ -67,6 +79,8 @@ class Imports(Part):
 
     def external(self, full_name: str, place: Place) -> Value:
         """Return what a full name stands for that is not of the project."""
+        if full_name in _OF_THE_MACHINE:
+            return CHOSEN
         interface = find_interface(full_name)
         if interface is None:
             package, _, name = full_name.partition('.')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 from typing import cast
 
 from composer.inference.current_run import name_place
@@ -31,6 +32,7 @@ from composer.inference.values import (
     alternatives,
     are_chosen,
     constant,
+    is_chosen,
     join,
 )
 
@@ -38,7 +40,7 @@ from composer.inference.values import (
 _BY_TYPE: dict[type, str] = {
     bool: 'builtins.all builtins.any builtins.bool builtins.callable builtins.issubclass '
     'math.isclose math.isfinite math.isinf math.isnan',
-    int: 'builtins.hash builtins.id builtins.int builtins.len builtins.ord math.ceil math.floor '
+    int: 'builtins.hash builtins.id builtins.int builtins.ord math.ceil math.floor '
     'math.trunc random.randint random.randrange time.monotonic_ns time.time_ns',
     float: 'builtins.float math.acos math.asin math.atan math.atan2 math.copysign math.cos '
     'math.cosh math.degrees math.dist math.exp math.fabs math.fmod math.fsum math.hypot math.log '
@@ -93,6 +95,9 @@ class LibraryCalls(Part):
         if owner is None or name is None:
             return UNKNOWN
         has_default = len(arguments.positional) > 2  # noqa: PLR2004
+        if owner.value == PartOfNode('parameters') and has_default:
+            rest = Arguments(arguments.positional[1:])
+            return self._evaluator.node_calls.read_parameters(owner.value, 'get', rest)
         found: list[Value] = []
         for each in alternatives(name.value):
             if not isinstance(each, Constant) or not isinstance(each.value, str):
@@ -123,6 +128,7 @@ class LibraryCalls(Part):
             return Scalar(bool)
         if owner.value == PartOfNode('state'):
             self._evaluator.run.reading.state_tested.add(str(name.value.value))
+            return Scalar(bool, BY_PARAMETER)
         if owner.value == PartOfNode('parameters'):
             contained = self._evaluator.attributes.contained(ast.In(), name.value, owner.value)
             self._evaluator.attributes.note_containment(name.value, owner.value, name.place)
@@ -253,6 +259,14 @@ class LibraryCalls(Part):
             return MessageClass(first.value.type)
         return UNKNOWN
 
+    def _call_builtins_len(self, arguments: Arguments, place: Place) -> Value:
+        first = arguments.get(0, '')
+        value = first.value if first else UNKNOWN
+        if isinstance(value, Sequence) and value.is_whole:
+            held = [item for item, _ in value.items]
+            return constant(len(held), is_chosen=max(map(is_chosen, held), default=0))
+        return Scalar(int, is_chosen(value))
+
     def _call_builtins_round(self, arguments: Arguments, place: Place) -> Value:
         del place
         return Scalar(int) if len(arguments.positional) == 1 else UNKNOWN
@@ -295,6 +309,9 @@ def _is_one_instance(value: Value, wanted: Value) -> bool | None:
         return value.type == wanted.type or (None if same else False)
     if isinstance(value, Message) and isinstance(wanted, External):
         return False if wanted.name.startswith('builtins.') else None
-    if isinstance(value, Mapping) and wanted == External('builtins.dict'):
-        return True
+    if isinstance(wanted, External) and wanted.name.startswith('builtins.'):
+        kind = getattr(builtins, wanted.name.removeprefix('builtins.'), None)
+        own = dict if isinstance(value, Mapping) else getattr(value, 'kind', None)
+        if isinstance(kind, type) and isinstance(own, type):
+            return issubclass(own, kind)
     return None

@@ -65,7 +65,9 @@ class NodeCalls(Part):
                 results.append(UNKNOWN)
                 continue
             waited = waits_here and method in ('call', 'call_async')
-            self._evaluator.run.use(kind, each.value, name_place(name, each), waits=waited)
+            # Of several names, conditions may leave out some.
+            with self._evaluator.run.condition(is_doubt=isinstance(name.value, Alternatives)):
+                self._evaluator.run.use(kind, each.value, name_place(name, each), waits=waited)
             type_name = self._evaluator.run.facts.type_of(section, each.value)
             results.append(self._send(method, type_name, payload, arguments))
         result = join(results)
@@ -117,6 +119,8 @@ class NodeCalls(Part):
     ) -> None:
         """Note parameters of another node, if the code names both."""
         node_name = arguments.get(0, 'node_name')
+        if node_name is not None:
+            self._evaluator.run.decide(node_name.value)
         for target in alternatives(node_name.value) if node_name else ():
             if not isinstance(target, Constant) or not isinstance(target.value, str):
                 continue

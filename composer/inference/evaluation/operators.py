@@ -90,7 +90,7 @@ def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value
     if isinstance(sign, ast.Add) and isinstance(right, Sequence) and not right.is_lost:
         items = [*left.items, *right.items]
         return Sequence(items, left.kind, left.is_open or right.is_open, origin=left.origin)
-    times = right.value if isinstance(right, Constant) and right.kind is int else -1
+    times = right.value if isinstance(right, Constant) and right.kind in (int, bool) else -1
     if isinstance(sign, ast.Mult) and 0 <= times * len(left.items) <= _MOST_ITEMS:
         return Sequence(left.items * times, left.kind, left.is_open, origin=left.origin)
     if isinstance(sign, ast.Mult):

@@ -10,6 +10,7 @@ from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
+    NEVER,
     NONE,
     UNKNOWN,
     Alternatives,
@@ -162,6 +163,9 @@ class Statements(Part):
         """A value that nothing takes may have been meant for something."""
         value = self._evaluator.evaluate(node.value, scope)
         run = self._evaluator.run
+        if value == NEVER:
+            scope.names = None
+            return
         is_plain = not isinstance(node.value, ast.BinOp | ast.Compare)
         is_plain = is_plain or isinstance(value, Constant | Scalar)
         if isinstance(node.value, _WITHOUT_EFFECT) and is_plain:
@@ -185,10 +189,11 @@ class Statements(Part):
 
     def _return(self, node: ast.Return, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope) if node.value else NONE
-        if isinstance(node.value, ast.expr):
-            scope.returned.append((value, Place(scope.module, node.value)))
-        else:
-            scope.returned.append((value, Place(scope.module, node)))
+        place = Place(scope.module, node.value or node)
+        if not self._evaluator.run.dead_branches:
+            scope.returned.append((value, place))
+        if self._evaluator.run.doubts:
+            scope.doubtful.add(id(place.node))
         scope.names = None
 
     def _raise(self, node: ast.Raise, scope: Scope) -> None:
@@ -346,7 +351,7 @@ class Statements(Part):
                 self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
-            with run.condition():
+            with run.condition(is_doubt=_is_guard(handler) or _is_broad(handler)):
                 self.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)

@@ -50,14 +50,14 @@ def fail(error):
     if error == 'unsayable':
         raise ValueError(chr(0xdcff) + chr(0))
 
-def plain(node, *_, error):
+def plain(node, *_, error):  # composer: ignore[field-type]
     fail(error)
 
 def generator(node, *_, error):
     yield
     fail(error)
 
-async def coroutine(node, *_, error):
+async def coroutine(node, *_, error):  # composer: ignore[field-type]
     fail(error)
 
 async def async_generator(node, *_, error):

@@ -71,12 +71,12 @@ async def fail_async(node, goal):
 
 def wrong_feedback(node, goal):
     try:
-        yield {'sequense': [1]}
+        yield {'sequense': [1]}  # composer: ignore[unknown-field]
     finally:
         node.logger.info('closed')
 
 def wrong_result(node, goal):
-    return {'sequense': [1]}
+    return {'sequense': [1]}  # composer: ignore[unknown-field]
 
 def accept(node, goal, most=5):
     if goal.order > 100:

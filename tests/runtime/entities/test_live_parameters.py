@@ -419,7 +419,7 @@ def test_parameters_are_a_mapping_with_what_a_mapping_offers(compose):
             log(f"keys: {parameters['keys']}, unset: {parameters.unset}")
             log(f"size: {len(parameters) == len(list(parameters)) == len(dict(parameters))}")
             try:
-                parameters.nam
+                parameters.nam  # composer: ignore[unknown-parameter]
             except Exception as error:
                 log(f'{type(error).__name__}: {error}; {error.help}')
     """

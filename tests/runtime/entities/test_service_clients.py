@@ -121,7 +121,7 @@ def undeclared(node):
     node.call(''.join(['a', 'sc']))
 
 def wrong_request(node):
-    node.call('ask', {'dat': True})
+    node.call('ask', {'dat': True})  # composer: ignore[unknown-field]
 """
 
 SERVER = """

@@ -34,7 +34,7 @@ def with_constant(node, request, text):
     return {'success': True, 'message': text}
 
 def wrong_field(node, request):
-    return {'succes': True}
+    return {'succes': True}  # composer: ignore[unknown-field]
 
 def fail(node, request):
     raise OSError('no such device')

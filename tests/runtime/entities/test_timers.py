@@ -71,7 +71,7 @@ def by_name(node):
     node.logger.info(f'ended: {sum(timer.is_canceled() for timer in node.ros.timers)}')
     node.publish('by_name', f'{node.name} {node.state.nested["deep"]}')
     try:
-        node.publish('by_nam', 'hello')
+        node.publish('by_nam', 'hello')  # composer: ignore[unknown-publisher]
     except Exception as error:
         node.logger.info(f'{type(error).__name__}: {error}; {error.help}')
 """

@@ -21,7 +21,7 @@ def wait_for(name):
     while not Path(name).exists():
         time.sleep(0.01)
 
-def hang(node, *_):
+def hang(node, *_):  # composer: ignore[field-type]
     wait_for('over')
 
 def hang_inside(node):
@@ -33,7 +33,7 @@ async def pause():
     threading.Thread(target=lambda: (wait_for('over'), future.set_result(None))).start()
     await future
 
-async def hang_async(node, *_):
+async def hang_async(node, *_):  # composer: ignore[field-type]
     await pause()
 
 async def block_async(node, *_):

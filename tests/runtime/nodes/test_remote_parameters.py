@@ -19,7 +19,7 @@ def change(node, of, values):
     node.logger.info(f'now: {got}')
     yield
 
-def change_and_tell(node, of, values, timeout=30):
+def change_and_tell(node, of, values, timeout=30):  # composer: ignore[refused-parameter]
     try:
         node.set_parameters(of, values, timeout=timeout)
     except (CallError, ParametersRefusedError) as error:

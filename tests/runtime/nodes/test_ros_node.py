@@ -64,7 +64,7 @@ def tell_simulated(node):
 
 def set_of_plain(node):
     try:
-        node.set_parameters('plain', {'speed': 2.0}, timeout=30)
+        node.set_parameters('plain', {'speed': 2.0}, timeout=30)  # composer: ignore[unknown-parameter]
     except Exception as error:
         node.logger.info(f'{type(error).__name__}: {error}; {error.help}')
 
