@@ -339,7 +339,7 @@ def graph_command(
     help='The folder to write them to.',
 )
 def stubs_command(files: tuple[Path, ...], output: Path) -> int:
-    """Write typed stubs of the messages and nodes of FILES, for type checkers and editors.
+    """Write typed stubs of the messages and nodes of FILES.
 
     Annotate a behaviour with the class of its node, as in `node: Governor` after
     `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
@@ -364,7 +364,7 @@ def new_command(name: str) -> int:
 @cli.group('interfaces', invoke_without_command=True, subcommand_metavar=_SUBCOMMAND)
 @click.pass_context
 def interfaces_group(context: click.Context) -> int:
-    """Build and list interface packages."""
+    """Build, find, list and show interface packages."""
     return _help_without_command(context)
 
 
