@@ -76,8 +76,10 @@ GOOD = """
 
 
 def bad(name, behaviour):
+    # With a parameter, its services are there from the start: a behaviour destroys them whole.
     return f"""
   {name}:
+    parameters: {{number: 1}}
     publishers: {{words: std_msgs/msg/String}}
     subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: 'parts:hear'}}}}
     service_clients: {{ask: std_srvs/srv/Trigger}}
