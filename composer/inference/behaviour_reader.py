@@ -95,7 +95,8 @@ class BehaviourReader:
     def _read_with(self, node: NodeSpec, binding: Binding, *, tells_values: bool) -> Reading:
         """Return a reading that other nodes share if they answer alike."""
         facts = NodeFacts(node, self._has_real_type, tells_values)
-        wire = wire_of(binding, facts)
+        # Part of the key below; nodes call their publishers differently.
+        wire = wire_of(binding, NodeFacts(node, self._has_real_type))
         key = (binding.behaviour.name, wire, tells_values, _frozen(binding.behaviour.arguments))
         known = self._read.setdefault(key, {})
         for questions, readings in known.items():
