@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
+from composer.inference.message_types import MessageTypes
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -44,6 +45,11 @@ class CheckContext:
     def behaviours(self) -> BehaviourReader:
         """What reads the behaviours."""
         return BehaviourReader(self.modules, self.catalogue, self.has_real_type)
+
+    @cached_property
+    def types(self) -> MessageTypes:
+        """What the messages of the system have."""
+        return MessageTypes(self.catalogue)
 
     @property
     def catalogue(self) -> InterfaceCatalogue:

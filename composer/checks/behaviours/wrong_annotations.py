@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS, PUBLISHED
-from composer.interfaces.descriptions import (
-    ActionDescription,
-    MessageDescription,
-    ServiceDescription,
-)
+from composer.inference.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.language.bindings import node_bindings
 from composer.python_source.annotations import Annotation, read_annotation
@@ -22,13 +18,15 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import BehaviourKey, EntityKind
+    from composer.interfaces.descriptions import (
+        MessageDescription,
+    )
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
     from composer.python_source.syntax import FunctionNode
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'wrong-annotation'
-_PARTS = {'Request', 'Response', 'Goal', 'Result', 'Feedback'}
 # A value of each built-in type, to check against the field.
 _SAMPLES: dict[str, object] = {'bool': False, 'float': 0.5, 'int': 1, 'str': 'a'}
 
@@ -143,14 +141,14 @@ def _check_parameter(
         return
     read = read_annotation(arguments[1].annotation, module.imports)
     if read.builtin is None and (
-        read.interface is None or _are_alike(context, read.interface, wire.given)
+        read.interface is None or context.types.are_alike(read.interface, wire.given)
     ):
         return
     yield _explain(
         context,
         binding,
         f"'{binding.behaviour.function}' takes a {_shown(read)} as '{arguments[1].arg}', "
-        f'and is given a {_in_python(wire.given)}',
+        f'and is given a {in_python(wire.given)}',
     )
 
 
@@ -160,9 +158,9 @@ def _check_payload(
     """Check a payload: a message, a mapping, or the bare value of a single field."""
     if wanted is None:
         return
-    description = _describe(context, wanted)
+    description = context.types.describe(wanted)
     if read.interface is not None:
-        fits = _are_alike(context, read.interface, wanted) or _may_hold(
+        fits = context.types.are_alike(read.interface, wanted) or _may_hold(
             description, read.interface
         )
     elif read.builtin in _SAMPLES and description is not None:
@@ -175,7 +173,7 @@ def _check_payload(
             context,
             binding,
             f"'{binding.behaviour.function}' {verb} a {_shown(read)}, "
-            f'which does not make a {_in_python(wanted)}',
+            f'which does not make a {in_python(wanted)}',
         )
 
 
@@ -198,45 +196,5 @@ def _may_hold(description: MessageDescription | None, interface: str) -> bool:
     return len(fields) == 1 and fields[0].type.nested == interface
 
 
-def _are_alike(context: CheckContext, one: str, other: str) -> bool:
-    """Return whether two types are the same for a behaviour.
-
-    Types of one name in two packages are the same if they have the same fields, or if their
-    fields are unknown: the examples of ROS come in several packages.
-    """
-    if one == other:
-        return True
-    if one.rpartition('/')[2] != other.rpartition('/')[2]:
-        return False
-    first, second = _describe(context, one), _describe(context, other)
-    return first is None or second is None or _fields(first) == _fields(second)
-
-
-def _fields(description: MessageDescription) -> list[tuple[str, str]]:
-    return [(field.name, str(field.type)) for field in description.fields]
-
-
-def _describe(context: CheckContext, name: str) -> MessageDescription | None:
-    """Return the description of a message, or of a part of a service or action."""
-    whole, part = _split(name)
-    description = context.catalogue.describe(whole)
-    if isinstance(description, ServiceDescription | ActionDescription) and part:
-        inner = getattr(description, part.lower(), None)
-        return cast('MessageDescription | None', inner)
-    return description if isinstance(description, MessageDescription) else None
-
-
 def _shown(read: Annotation) -> str:
-    return read.builtin or _in_python(read.interface or '')
-
-
-def _in_python(name: str) -> str:
-    """Return `std_srvs/srv/SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
-    whole, part = _split(name)
-    return f'{whole}.{part}' if part else whole
-
-
-def _split(name: str) -> tuple[str, str]:
-    """Return the interface and its part, which is empty for a message."""
-    whole, _, part = name.rpartition('_')
-    return (whole, part) if part in _PARTS else (name, '')
+    return read.builtin or in_python(read.interface or '')
