@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.values import UNKNOWN, Value, join
 from composer.python_source.local_names import list_arguments, nested_names, stored_names
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -84,7 +85,7 @@ def join_names(several: Iterable[Names | None]) -> Names | None:
     return {name: join(names.get(name, UNKNOWN) for names in ways) for name in every}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LocalNames:
     """The names that a function stores.
 
