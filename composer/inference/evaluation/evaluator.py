@@ -19,7 +19,7 @@ from composer.inference.evaluation.project_classes import Classes
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
-from composer.inference.statements.loops import Loops
+from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.narrowing import Narrowing
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
