@@ -29,7 +29,10 @@ class Scope:
         local: All names of its own, stored anywhere in it.
         unsure: Those that inner functions may store, too.
         names: What its names stand for where the reading is; `None` where it never comes to.
-        jumps: What they stood for at each `break` and `continue` of the innermost loop.
+        broken: What they stood for at each `break` of the innermost loop; `continued` is of
+            each `continue`.
+        looped: Of each loop around that is followed round by round, the names that it stores, and
+            what its targets stand for in any round.
         returned: What it returns, and where.
         yielded: What it yields, and where.
         inner: The functions defined in it.
@@ -44,7 +47,9 @@ class Scope:
     local: frozenset[str] = frozenset()
     unsure: frozenset[str] = frozenset()
     names: Names | None = field(default_factory=dict)
-    jumps: list[Names] = field(default_factory=list)
+    broken: list[Names] = field(default_factory=list)
+    continued: list[Names] = field(default_factory=list)
+    looped: list[tuple[frozenset[str], Names]] = field(default_factory=list)
     returned: list[tuple[Value, Place]] = field(default_factory=list)
     yielded: list[tuple[Value, Place]] = field(default_factory=list)
     inner: list[Function] = field(default_factory=list)

@@ -137,11 +137,16 @@ class Awaitable:
 
 @record
 class Generated:
-    """A generator, by what it yields and what it returns."""
+    """A generator, by what it yields and what it returns.
+
+    Attributes:
+        items: What it yields one after the other, if that is known.
+    """
 
     yielded: Value
     returned: Value
     is_async: bool = False
+    items: tuple[Value, ...] | None = None
 
 
 @dataclass(slots=True, eq=False)
