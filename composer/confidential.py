@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from composer.ament import ament_prefixes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
 PROJECT_MARKS = ('pyproject.toml', '.git')
 _WORD = re.compile(r'\w+')
@@ -75,6 +75,16 @@ def hide(value: Any, origin: str, written: str = '') -> None:
         text = str(value).lower()
         words = {text, *_WORD.findall(text)} - {*_WORD.findall(written.lower())} - _COMMON
         _origins.update((word, origin) for word in words if word not in _origins)
+
+
+def hidden_values() -> dict[str, str]:
+    """Return what is hidden, with its origins, to be hidden again after other files are read."""
+    return dict(_origins)
+
+
+def hide_again(values: Mapping[str, str]) -> None:
+    """Hide values beside those that are hidden now."""
+    _origins.update(values)
 
 
 def origin_of(value: Any) -> str | None:

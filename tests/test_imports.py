@@ -33,6 +33,7 @@ ROOMS = (
         'python_source',
         'inference',
         'checks',
+        'planning',
         'reports',
         'drawing',
         'executor',
@@ -49,7 +50,8 @@ SHARED_NAMES = {
     'names.py',  # the rules for names, and their checks
     'parameters.py',  # their checks, and their life in a node
     'qos.py',  # profiles and policies, and their checks
-    'json_document.py',  # the same form, of findings and of drawings
+    'json_document.py',  # the same form, of findings, plans and drawings
+    'text.py',  # the same
 }
 MOST_FILES = 16
 

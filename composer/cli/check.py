@@ -9,15 +9,15 @@ import click
 
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_system
-from composer.cli.argument_types import split_words
-from composer.cli.file_selection import (
+from composer.cli.common.argument_types import split_words
+from composer.cli.common.file_selection import (
     SelectedSystem,
     Selection,
     has_arguments,
     read_standard_input,
     select_files,
 )
-from composer.cli.output import wants_colour, write_file
+from composer.cli.common.output import wants_colour, write_file
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_combinations, load_system
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.checker import FurtherCheck
-    from composer.cli.import_check import ImportCheck
+    from composer.cli.common.import_check import ImportCheck
     from composer.language.loaded_system import LoadedSystem
     from composer.rules import Need
     from composer.stubs.types_check import TypesCheck
@@ -125,7 +125,7 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
 
 
 def _import_check() -> ImportCheck:
-    from composer.cli.import_check import ImportCheck
+    from composer.cli.common.import_check import ImportCheck
 
     return ImportCheck()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from composer.cli.argument_types import (
+from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
     check_log_levels,
     check_rule,
@@ -17,6 +17,7 @@ from composer.cli.argument_types import (
     refuse_options,
     refuse_together,
     split_words,
+    takes_settings,
     takes_system,
 )
 from composer.drawing import FORMATS as PICTURE_FORMATS
@@ -295,6 +296,59 @@ def show_command(
     if wants_parameters:
         return show_parameters(paths, arguments, set_values)
     return show(paths, arguments, set_values, output_format=output_format, origins=origin)
+
+
+@cli.command('plan', context_settings=NUMBERS_ARE_VALUES)
+@click.argument(
+    'words', nargs=-1, type=click.UNPROCESSED, metavar='OLD NEW [NAME:=VALUE]...', required=True
+)
+@click.option(
+    '--layer',
+    'layers',
+    multiple=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar='FILE',
+    help='Change both systems by this file. Can be repeated.',
+)
+@takes_settings
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(['text', 'json']),
+    default='text',
+    show_default=True,
+    help='The output format.',
+)
+@click.option(
+    '--exit-code',
+    'tells_difference',
+    is_flag=True,
+    help='Exit with 2 if there is a difference.',
+)
+def plan_command(
+    words: tuple[str, ...],
+    layers: tuple[Path, ...],
+    set_values: tuple[str, ...],
+    format_name: str,
+    *,
+    tells_difference: bool,
+) -> int:
+    """Show what turns the system of OLD into that of NEW.
+
+    There is a line for each operation: + added, ~ changed in place, ± recreated, - removed; with
+    old and new values, why something must be recreated, and what is lost.
+    """
+    from composer.cli.plan import plan
+
+    paths, arguments = split_words(words)
+    return plan(
+        paths,
+        arguments,
+        set_values,
+        layers=layers,
+        format_name=format_name,
+        tells_difference=tells_difference,
+    )
 
 
 @cli.command('graph', context_settings=NUMBERS_ARE_VALUES)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks.checker import create_context
-from composer.cli.output import show_findings, write_file
+from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue

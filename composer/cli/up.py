@@ -10,9 +10,9 @@ import click
 
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
-from composer.cli.file_selection import load_given
-from composer.cli.import_check import import_behaviours
-from composer.cli.output import show_findings
+from composer.cli.common.file_selection import load_given
+from composer.cli.common.import_check import import_behaviours
+from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, RosNotFoundError
 from composer.interfaces.catalogue import InterfaceCatalogue

@@ -10,7 +10,7 @@ import pytest
 
 import composer
 from composer.checks.checker import check_files, check_system
-from composer.cli.file_selection import list_systems
+from composer.cli.common.file_selection import list_systems
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.reports.text import render_finding

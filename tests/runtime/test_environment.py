@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.checks.environment import find_environment_problems
-from composer.cli.output import wants_colour
+from composer.cli.common.output import wants_colour
 from composer.errors import StartError
 from composer.runtime.environment import (
     check_log_folder,

@@ -28,6 +28,13 @@ _OPTION = re.compile(r'-[^\W\d]|--')
 
 def takes_system(command: _Command) -> _Command:
     """Add the file, layers and arguments (`words`) and `--set` (`set_values`) to a command."""
+    metavar = 'FILE [LAYER]... [NAME:=VALUE]...'
+    words = click.argument('words', nargs=-1, type=click.UNPROCESSED, metavar=metavar)
+    return words(takes_settings(command))
+
+
+def takes_settings(command: _Command) -> _Command:
+    """Add `--set` (`set_values`) to a command."""
     set_option = click.option(
         '--set',
         'set_values',
@@ -36,9 +43,7 @@ def takes_system(command: _Command) -> _Command:
         help='Change a value, as in nodes.talker.log_level=debug; null removes it. '
         'Can be repeated.',
     )
-    metavar = 'FILE [LAYER]... [NAME:=VALUE]...'
-    words = click.argument('words', nargs=-1, type=click.UNPROCESSED, metavar=metavar)
-    return words(set_option(command))
+    return set_option(command)
 
 
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
@@ -130,7 +135,7 @@ def check_rule(
 
 
 def _folder_error(folder: str) -> UsageError:
-    from composer.cli.file_selection import list_systems
+    from composer.cli.common.file_selection import list_systems
 
     systems = [escape(str(path)) for path in list_systems(Path(folder))]
     shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]

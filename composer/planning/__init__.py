@@ -1,0 +1,1 @@
+"""What an edit does to a system: the difference between two readings of it, as operations."""

@@ -1,0 +1,229 @@
+"""Two snapshots of a system → the operations that turn the one into the other.
+
+A node is the same as before if it has the same full name, and an entity if it has the same section
+and name in it. What ROS fixes when something is created can only change with it: that is
+recreated. All else changes in place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from composer.entity_kinds import ENTITY_KINDS
+from composer.planning.changes import Reading, compare_entries, compare_fields
+from composer.planning.plan import Action, Change, Operation, Plan
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from composer.diagnostics import Span
+    from composer.entity_kinds import EntityKind
+    from composer.language.specs import NodeSpec
+    from composer.planning.plan import Target
+    from composer.planning.snapshot import Snapshot
+
+# Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
+_NOT_COMPARED = {
+    *('path', 'name', 'namespace', 'description', 'external', 'parameter_files', 'state'),
+    *(kind.section for kind in ENTITY_KINDS),
+}
+_CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rules:
+    """How things of one kind change.
+
+    Attributes:
+        noun: One of them in words.
+        lost: What goes with one.
+        fixed: The keys that only a new one can have another value of, and why.
+    """
+
+    noun: str
+    lost: str
+    fixed: Mapping[str, str]
+
+
+_PARAMETERS = _Rules(
+    'parameter',
+    'a value set while it ran',
+    dict.fromkeys(('type', 'read_only'), 'ROS fixes this when the parameter is declared'),
+)
+_FIXED = {
+    **dict.fromkeys(('type', *_CHANNELS, 'qos'), 'ROS fixes this when it is created'),
+    **dict.fromkeys(('group', 'clock'), 'rclpy fixes this when it is created'),
+}
+_LOST = {
+    'publishers': 'messages not delivered yet',
+    'subscriptions': 'messages queued',
+    'timers': 'its phase',
+    'services': 'requests queued',
+    'service_clients': 'responses that calls wait for',
+    'actions': 'results not fetched yet',
+    'action_clients': 'the results of goals in flight',
+}
+_NODES = _Rules(
+    'node',
+    'its state, parameters set while it ran, all that is queued',
+    dict.fromkeys(
+        ('remap', 'rosout', 'type_description_service', 'logger_services'),
+        'ROS reads this when the node is created',
+    ),
+)
+# The other fields of a process say how it is kept, not how it runs.
+_PROCESSES = _Rules(
+    'process',
+    'the running process',
+    dict.fromkeys(
+        (
+            *('command', 'package', 'executable', 'arguments', 'name', 'namespace'),
+            *('parameters', 'parameter_files', 'remap', 'log_level', 'env', 'cwd'),
+        ),
+        'a process takes this when it starts',
+    ),
+)
+_SYSTEM = _Rules(
+    'system',
+    'all that is not in the files',
+    {
+        'environment': 'ROS reads this when it starts',
+        'executor.threads': 'the executor takes this when it starts',
+        'interfaces': 'a process can load an interface package once',
+    },
+)
+_OF_THE_SYSTEM = (
+    'environment',
+    'threads',
+    'shutdown_timeout_sec',
+    'diagnostics_period_sec',
+)
+_AT_ITS_START = ('on_start', 'wait_for')
+
+
+def compare(old: Snapshot, new: Snapshot) -> Plan:
+    """Return what must be done to turn the system of `old` into that of `new`."""
+    return Plan(new.spec.name, tuple(_Comparison(old, new).operations()))
+
+
+class _Comparison:
+    def __init__(self, old: Snapshot, new: Snapshot) -> None:
+        self._old, self._new = old, new
+
+    def operations(self) -> Iterator[Operation]:
+        yield from self._compare_system()
+        old, new = self._old.spec, self._new.spec
+        for name in dict.fromkeys([*old.processes, *new.processes]):
+            process = (old.processes.get(name), new.processes.get(name))
+            yield from self._compare(_PROCESSES, ('', 'processes', name), '', *process)
+        before = {node.full_name: node for node in old.nodes.values()}
+        after = {node.full_name: node for node in new.nodes.values()}
+        for full_name in dict.fromkeys([*before, *after]):
+            yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
+
+    def _compare_system(self) -> Iterator[Operation]:
+        old, new = self._reading(self._old), self._reading(self._new)
+        changes = [*compare_fields(old, new, _OF_THE_SYSTEM), *self._changed_packages(old, new)]
+        if changes:
+            target = ('', 'system', self._new.spec.name)
+            span = self._new.positions.value(())
+            yield _modification(_SYSTEM, target, self._new.spec.name, '', span, changes)
+
+    def _changed_packages(self, old: Reading, new: Reading) -> Iterator[Change]:
+        """Yield the packages that are loaded, and are others now."""
+        before, after = self._old.definitions, self._new.definitions
+        loaded = {package for package, _ in before}
+        differing = {at[0] for at in {**before, **after} if before.get(at) != after.get(at)}
+        for package in sorted(loaded & differing):
+            key = f'interfaces.{package}'
+            yield Change(key, None, None, old.find_span(key), new.find_span(key), is_code=True)
+
+    def _compare_nodes(
+        self, full_name: str, old: NodeSpec | None, new: NodeSpec | None
+    ) -> Iterator[Operation]:
+        further: list[Change] = []
+        if old is not None and new is not None:
+            readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
+            further += compare_entries(*readings, 'state', old.state, new.state)
+        own = list(self._compare(_NODES, (full_name, 'nodes', ''), '', old, new, further))
+        yield from own
+        if old is None or new is None or any(each.action is Action.RECREATE for each in own):
+            return
+        for kind in ENTITY_KINDS:
+            yield from self._compare_entities(kind, old, new)
+
+    def _compare_entities(
+        self, kind: EntityKind, old: NodeSpec, new: NodeSpec
+    ) -> Iterator[Operation]:
+        rules = _PARAMETERS
+        if kind.section != 'parameters':
+            rules = _Rules(kind.noun, _LOST[kind.section], _FIXED)
+        before, after = getattr(old, kind.section), getattr(new, kind.section)
+        for name in dict.fromkeys([*before, *after]):
+            further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
+            target = (new.full_name, kind.section, name)
+            entity = (before.get(name), after.get(name))
+            yield from self._compare(rules, target, new.key, *entity, further)
+
+    def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
+        """Yield the change of what parameter files say of a parameter."""
+        before = self._old.overrides(old).get(name)
+        after = self._new.overrides(new).get(name)
+        old_value, old_span = (before.value, before.value_span) if before else (None, None)
+        new_value, new_span = (after.value, after.value_span) if after else (None, None)
+        if repr(old_value) != repr(new_value):
+            yield Change('value', old_value, new_value, old_span, new_span)
+
+    def _compare(
+        self,
+        rules: _Rules,
+        target: Target,
+        node: str,
+        old: Any,
+        new: Any,
+        further: Iterable[Change] = (),
+    ) -> Iterator[Operation]:
+        """Yield what is done to one thing, of which each side may have none."""
+        if old is None:
+            span = self._new.positions.key(new.path)
+            yield Operation(Action.ADD, rules.noun, target, _name(new), node, span)
+        elif new is None:
+            span, lost = self._old.positions.key(old.path), (rules.lost,)
+            yield Operation(Action.REMOVE, rules.noun, target, _name(old), node, span, lost=lost)
+        elif old is not new:
+            names = [each.name for each in fields(new) if each.name not in _NOT_COMPARED]
+            readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
+            changes = [*compare_fields(*readings, names), *further]
+            if changes:
+                span = self._new.positions.key(new.path)
+                yield _modification(rules, target, _name(new), node, span, changes)
+
+    @staticmethod
+    def _reading(snapshot: Snapshot) -> Reading:
+        return Reading(snapshot, snapshot.spec, ())
+
+
+def _modification(
+    rules: _Rules, target: Target, name: str, node: str, span: Span, changes: list[Change]
+) -> Operation:
+    reasons = (rules.fixed.get(each.key) or rules.fixed.get(each.top_key) for each in changes)
+    reason = next(filter(None, reasons), '')
+    late = [each.key for each in changes if each.key in _AT_ITS_START and not reason]
+    return Operation(
+        Action.RECREATE if reason else Action.CHANGE,
+        rules.noun,
+        target,
+        name,
+        node,
+        span,
+        tuple(changes),
+        reason,
+        (rules.lost,) if reason else (),
+        tuple(f'{key} counts from its next start' for key in late),
+    )
+
+
+def _name(spec: Any) -> str:
+    """Return the key under which something stands in the file."""
+    return str(spec.path[-1])

@@ -1,0 +1,95 @@
+"""A plan as data: the operations that turn one system into another."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Span
+
+# What a plan is about: the full name of a node (empty for processes and the system itself), the
+# section, and the name in it.
+Target: TypeAlias = tuple[str, str, str]
+
+
+class Action(Enum):
+    """What is done to a part of a system; the value is the sign that stands for it."""
+
+    ADD = '+'
+    CHANGE = '~'
+    RECREATE = '±'
+    REMOVE = '-'
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One value that differs.
+
+    Attributes:
+        key: As in the file, with dots for what is nested: `qos.depth`.
+        old: What it was, as data; `None` if it was not there.
+        new: What it becomes; `None` if it goes.
+        old_span: Where the old value was written, `None` if it was not in a file.
+        new_span: Where the new one is written.
+        is_code: Whether the source of this behaviour differs, not what the file says of it.
+    """
+
+    key: str
+    old: Any = None
+    new: Any = None
+    old_span: Span | None = None
+    new_span: Span | None = None
+    is_code: bool = False
+
+    @property
+    def top_key(self) -> str:
+        """The first part of its key."""
+        return self.key.partition('.')[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """What is done to one part of a system.
+
+    Attributes:
+        noun: What it is: `node`, `timer`, `process`, `system`, …
+        target: Which one it is.
+        name: Its key in the file.
+        node: The key of its node in the file; empty if it belongs to none.
+        span: Where it is written: in the new files, unless it is removed.
+        changes: The values that differ.
+        reason: Why it must be recreated; empty if it need not be.
+        lost: What does not survive.
+        notes: What else its reader should know.
+    """
+
+    action: Action
+    noun: str
+    target: Target
+    name: str
+    node: str
+    span: Span
+    changes: tuple[Change, ...] = ()
+    reason: str = ''
+    lost: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """All operations: on the system, its processes, and its nodes with their entities."""
+
+    name: str
+    operations: tuple[Operation, ...]
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to do."""
+        return bool(self.operations)
+
+    def counts(self) -> dict[Action, int]:
+        """Return how many operations there are of each kind, in the order of `Action`."""
+        counter = Counter(each.action for each in self.operations)
+        return {action: counter[action] for action in Action}

@@ -1,0 +1,132 @@
+"""A system as its files and the sources of its behaviours say it at one time."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer.language.bindings import node_bindings
+from composer.python_source.module_finder import MissingModule
+from composer.ros_parameters.file_reader import read_parameter_file
+from composer.ros_parameters.overrides import MergedFiles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from composer.checks.context import CheckContext
+    from composer.language.specs import NodeSpec, SystemSpec
+    from composer.python_source.module_finder import ModuleFinder
+    from composer.python_source.modules import ModuleSource
+    from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
+    from composer.yaml_text.positions import SourceMap
+
+
+@dataclass(slots=True)
+class Snapshot:
+    """What two readings of a system are compared by.
+
+    Attributes:
+        positions: Where the parts of `spec` are written.
+        code: The digest of each module that a behaviour is in, and of the modules of the project
+            that this imports, by its name.
+        definitions: The text of each definition file of the declared interface packages, by the
+            package and the path in its folder.
+    """
+
+    spec: SystemSpec
+    positions: SourceMap
+    code: Mapping[str, str]
+    definitions: Mapping[tuple[str, str], str]
+    _files: dict[tuple[str, ...], MergedFiles] = field(default_factory=dict)
+
+    def overrides(self, node: NodeSpec) -> Mapping[str, ParameterEntry]:
+        """Return what the parameter files of a node say of its parameters, by their names."""
+        files = node.parameter_files
+        if not files:
+            return {}
+        if files not in self._files:
+            self._files[files] = MergedFiles(map(_read, files))
+        return self._files[files].find_overrides(node.full_name)
+
+
+def take_snapshot(context: CheckContext) -> Snapshot:
+    """Return what a system is compared by; everything is read now."""
+    spec = context.spec
+    sources = _Sources(context.modules)
+    nodes = spec.nodes.values()
+    modules = {each.behaviour.module for node in nodes for each in node_bindings(node)}
+    definitions = {
+        (package.package, name): text
+        for package in context.interfaces.definitions or ()
+        for name, text in package.sources.items()
+    }
+    code = {name: sources.digest(name) for name in modules}
+    snapshot = Snapshot(spec, context.system.positions, code, definitions)
+    for node in nodes:
+        snapshot.overrides(node)
+    return snapshot
+
+
+class _Sources:
+    """Digests of modules, each read once."""
+
+    def __init__(self, finder: ModuleFinder) -> None:
+        self._finder = finder
+        self._imported: dict[str, tuple[str, ...]] = {}
+
+    def digest(self, name: str) -> str:
+        """Return the digest of a module and of those of the project that it imports."""
+        found = {name: None}
+        pending = [name]
+        while pending:
+            for each in self._imports(pending.pop()):
+                if each not in found:
+                    found[each] = None
+                    pending.append(each)
+        digest = hashlib.sha256()
+        for each in sorted(found):
+            digest.update(f'{each}\0'.encode())
+            digest.update('\n'.join(self._lines(each)).encode(errors='surrogatepass'))
+        return digest.hexdigest()
+
+    def _lines(self, name: str) -> tuple[str, ...]:
+        module = self._finder.find(name)
+        return () if isinstance(module, MissingModule) else module.lines
+
+    def _imports(self, name: str) -> tuple[str, ...]:
+        if name not in self._imported:
+            module = self._finder.find(name)
+            read = () if isinstance(module, MissingModule) else _names_imported(name, module)
+            self._imported[name] = tuple(
+                each
+                for each in dict.fromkeys(read)
+                if self._is_reloaded(each) and self._finder.has(each)
+            )
+        return self._imported[name]
+
+    def _is_reloaded(self, name: str) -> bool:
+        # Composer runs, and stays as it is, also in its own project.
+        return name.partition('.')[0] != 'composer' and self._finder.is_of_project(name)
+
+
+def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
+    """Yield what a module may import, anywhere in it; of `from a import b` both `a` and `a.b`."""
+    is_package = module.path is not None and module.path.name == '__init__.py'
+    package = name.split('.') if is_package else name.split('.')[:-1]
+    yield from ('.'.join(package[:depth]) for depth in range(1, len(package) + 1))
+    for statement in module.body:
+        for node in ast.walk(statement):
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                base = package[: len(package) - node.level + 1] if node.level else []
+                parts = [*base, *(node.module.split('.') if node.module else ())]
+                yield '.'.join(parts)
+                yield from ('.'.join([*parts, alias.name]) for alias in node.names)
+
+
+def _read(path: str) -> ParameterFile:
+    return read_parameter_file(Path(path))

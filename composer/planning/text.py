@@ -1,0 +1,89 @@
+"""A plan as text: a line for each operation, and their count."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from composer.confidential import conceal
+from composer.planning.plan import Action
+from composer.terminal import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.planning.plan import Change, Operation, Plan
+
+_COLOURS = {
+    Action.ADD: 'green',
+    Action.CHANGE: 'yellow',
+    Action.RECREATE: 'magenta',
+    Action.REMOVE: 'red',
+}
+_VERBS = {
+    Action.ADD: 'to add',
+    Action.CHANGE: 'to change',
+    Action.RECREATE: 'to recreate',
+    Action.REMOVE: 'to remove',
+}
+_LONGEST_VALUE = 60
+
+
+def render_plan(plan: Plan, *, colour: bool = False) -> str:
+    """Return a plan as text, with a newline at its end."""
+    lines = [_render_operation(each, colour=colour) for each in plan.operations]
+    counts = [f'{count} {_VERBS[action]}' for action, count in plan.counts().items() if count]
+    lines.append(f'{escape(plan.name)}: {", ".join(counts) or "no difference"}')
+    return '\n'.join(lines) + '\n'
+
+
+def describe_change(change: Change) -> str:
+    """Return `period 0.5 → 1.0 (arm.yaml:12 → new.yaml:12)`."""
+    places = _describe_places(change)
+    if change.is_code:
+        return f'{change.key} has new code{places}'
+    values = [_show(each) for each in (change.old, change.new)]
+    if change.old is None:
+        return f'{change.key} = {values[1]}{places}'
+    if change.new is None:
+        return f'{change.key} = {values[0]} goes{places}'
+    return f'{change.key} {values[0]} → {values[1]}{places}'
+
+
+def _render_operation(operation: Operation, *, colour: bool) -> str:
+    sign = operation.action.value
+    if colour:
+        sign = click.style(sign, fg=_COLOURS[operation.action])
+    return f'{sign} {escape("; ".join(_describe(operation)))}'
+
+
+def _describe(operation: Operation) -> Iterator[str]:
+    subject = f"{operation.noun} '{operation.name}'"
+    if operation.node:
+        subject += f" of '{operation.node}'"
+    changes = ', '.join(map(describe_change, operation.changes))
+    yield f'{subject}: {changes}' if changes else f'{subject} ({operation.span.place})'
+    if operation.reason:
+        yield operation.reason
+    if operation.lost:
+        yield f'lost: {", ".join(operation.lost)}'
+    yield from operation.notes
+
+
+def _describe_places(change: Change) -> str:
+    old, new = (each and each.place for each in (change.old_span, change.new_span))
+    if change.is_code or old == new or old is None or new is None:
+        place = new or old
+        return f' ({place})' if place else ''
+    return f' ({old} → {new})'
+
+
+def _show(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    if isinstance(value, str) and value and not any(map(str.isspace, value)):
+        text = value
+    if len(text) > _LONGEST_VALUE:
+        text = f'{text[:_LONGEST_VALUE]}…'
+    return conceal(text)
