@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from composer.entity_kinds import USED_KINDS
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -25,7 +26,7 @@ SENDING_METHODS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeUse:
     """A use of an entity of the node by its name, as in `node.publish('status', …)`.
 
@@ -55,7 +56,7 @@ class NodeUse:
     among: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Problem:
     """Something wrong in a behaviour, whatever its node declares.
 
@@ -72,7 +73,7 @@ class Problem:
     used_at: Span | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class StateUse:
     """A name of `node.state` or `node.own_state` that is read.
 
@@ -85,7 +86,7 @@ class StateUse:
     is_guarded: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RemoteParameter:
     """A parameter that `node.set_parameters` or `node.get_parameters` names.
 

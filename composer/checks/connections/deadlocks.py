@@ -7,7 +7,6 @@ gives up its thread while it waits, so there are never too few threads for those
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from composer.diagnostics import Related
 from composer.entity_kinds import KIND_OF_NOUN
 from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator
@@ -38,7 +38,7 @@ Group = tuple[str, str]
 _ACCEPTING = 'goals'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Wait:
     """A behaviour waits for a service, or for an action: an answer, or the end of a goal.
 

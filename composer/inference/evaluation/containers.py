@@ -133,13 +133,17 @@ class Containers(Part):
                 if owner.is_open or not keys:
                     return UNKNOWN
                 pair = Sequence([(join(keys), place), (join(values), place)], tuple)
-                return Generated(pair, NONE)
+                pairs = [
+                    Sequence([(constant(key, where), place), (value, where)], tuple)
+                    for key, (value, where) in owner.entries.items()
+                ]
+                return Generated(pair, NONE, items=tuple(pairs))
             case 'keys':
                 keys = [constant(key) for key in owner.entries if _is_simple(key)]
-                return Generated(UNKNOWN if owner.is_open else join(keys), NONE)
+                return _generated(keys, is_open=owner.is_open)
             case 'values':
                 values = [value for value, _ in owner.entries.values()]
-                return Generated(UNKNOWN if owner.is_open else join(values), NONE)
+                return _generated(values, is_open=owner.is_open)
         self._evaluator.escape(owner)
         self._evaluator.calls.escape_all(arguments)
         return UNKNOWN
@@ -210,6 +214,12 @@ class Containers(Part):
         else:
             owner.items.append((self._evaluator.item_of(value), place))
             owner.is_open = True
+
+
+def _generated(values: list[Value], *, is_open: bool) -> Generated:
+    if is_open:
+        return Generated(UNKNOWN, NONE)
+    return Generated(join(values), NONE, items=tuple(values))
 
 
 def _is_simple(key: object) -> bool:

@@ -168,7 +168,8 @@ class Functions(Part):
         self._bind(function, arguments, scope)
         self.active.append(definition)
         self._evaluator.run.modules.followed.add(id(definition))
-        self._evaluator.lasting_doubts.append((0, 0))
+        run = self._evaluator.run
+        doubts = run.doubts, run.state_doubts
         try:
             if isinstance(definition, ast.Lambda):
                 value = self._evaluator.evaluate(definition.body, scope)
@@ -185,8 +186,7 @@ class Functions(Part):
                     self.follow_later(inner)
                     self._evaluator.run.doubts -= 1
         finally:
-            count, of_state = self._evaluator.lasting_doubts.pop()
-            self._evaluator.run.doubt(-count, -of_state)
+            run.doubts, run.state_doubts = doubts
             self.active.pop()
         return scope
 

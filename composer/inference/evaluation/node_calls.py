@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import ast
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
@@ -76,15 +76,16 @@ class NodeCalls(Part):
                 self._evaluator.run.reading.open_kinds.add(kind)
                 results.append(UNKNOWN)
                 continue
-            # Of several names, conditions may leave out some.
-            with self._evaluator.run.condition(is_doubt=len(several) > 1):
+            # Of several names, conditions may leave out some, unless they are chosen right here.
+            is_doubt = len(several) > 1 and not isinstance(name.place.node, ast.IfExp)
+            with self._evaluator.run.condition(is_doubt=is_doubt):
                 self._evaluator.run.use(
                     kind, each.value, name_place(name, each), waits=waited, among=among
                 )
             type_name = self._evaluator.run.facts.type_of(section, each.value)
             result = self._send(method, type_name, payload, arguments)
             if isinstance(result, PartOfNode):
-                result = replace(result, entity=each.value)
+                result = PartOfNode(result.name, result.type, each.value)
             results.append(result)
         found = join(results)
         return Awaitable(found) if method == 'call_async' else found
