@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from composer.input_limits import MAX_VALUES
 from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
+from composer.records import record
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import PatternIndex
 from composer.ros_parameters.overrides import MergedFiles
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _User:
     """A node or process with the parameter files that it uses.
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from composer.entity_kinds import USED_KINDS
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.inference.values import Constant
     from composer.python_source.modules import ModuleSource
 
+# What a behaviour waits for when it uses an entity.
+Waited: TypeAlias = Literal['', 'answer', 'end']
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
 # The methods of the node that send something, and the noun of what they use by its name.
@@ -23,7 +26,7 @@ SENDING_METHODS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeUse:
     """A use of an entity of the node by its name, as in `node.publish('status', …)`.
 
@@ -35,7 +38,9 @@ class NodeUse:
         is_certain: Whether it happens whatever else the file says: it does not depend on
             parameters, the node's name, or arguments under `with:`.
         is_guarded: Whether the behaviour catches the error that it raises.
-        waits: Whether the behaviour itself waits for the answer.
+        waits: What the behaviour itself waits for, whatever else the file says: the answer, or
+            the end of the goal.
+        among: The names of which it is one, if one of several is used.
         is_change: Whether it is looked for among the changes of `on_parameters`.
     """
 
@@ -46,11 +51,12 @@ class NodeUse:
     has_default: bool = False
     is_certain: bool = True
     is_guarded: bool = False
-    waits: bool = False
+    waits: Waited = ''
     is_change: bool = False
+    among: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Problem:
     """Something wrong in a behaviour, whatever its node declares.
 
@@ -67,7 +73,7 @@ class Problem:
     used_at: Span | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class StateUse:
     """A name of `node.state` or `node.own_state` that is read.
 
@@ -80,7 +86,7 @@ class StateUse:
     is_guarded: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RemoteParameter:
     """A parameter that `node.set_parameters` or `node.get_parameters` names.
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.records import record
+
 if TYPE_CHECKING:
     import ast
     from collections.abc import Iterable, Iterator
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 _MOST_ALTERNATIVES = 16
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Place:
     """An expression or statement of a module."""
 
@@ -29,19 +31,20 @@ class Place:
     node: ast.AST
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Unknown:
     """Anything.
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs.
+            name of the node, `BY_PARAMETER` for what may change while the system runs, and
+            `BY_STATE` for what behaviours keep, which they may have from the file.
     """
 
     is_chosen: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Constant:
     """A number, a text, bytes, a truth value or `None`.
 
@@ -57,7 +60,7 @@ class Constant:
     origin: Place | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Scalar:
     """A number, text or the like of a type of Python, as in `float`."""
 
@@ -66,7 +69,7 @@ class Scalar:
     origin: Place | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Message:
     """A message, request, response, goal, result or feedback, by its type's full name.
 
@@ -78,40 +81,41 @@ class Message:
     is_made: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MessageClass:
     """The class of messages of a type."""
 
     type: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ArrayField:
     """The value of a field that is an array."""
 
     type: FieldType
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeValue:
     """The node that a behaviour is called with."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PartOfNode:
     """`parameters`, `state`, `own_state` or `logger` of the node, and what comes out of it.
 
     Attributes:
         name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns,
             `changes` what `on_parameters` is given.
-        type: Of a goal, its action.
+        type: Of a goal, its action; `entity` is the action client that sent it.
     """
 
     name: str
     type: str = ''
+    entity: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BoundMethod:
     """A method of something, not called yet."""
 
@@ -119,27 +123,32 @@ class BoundMethod:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class External:
     """What an import gives that is not of the project: a module, or something in one."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Awaitable:
     """A coroutine that has not been awaited."""
 
     result: Value
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Generated:
-    """A generator, by what it yields and what it returns."""
+    """A generator, by what it yields and what it returns.
+
+    Attributes:
+        items: What it yields one after the other, if that is known.
+    """
 
     yielded: Value
     returned: Value
     is_async: bool = False
+    items: tuple[Value, ...] | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -252,19 +261,19 @@ class Partial:
     arguments: Arguments
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ProjectModule:
     """A module of the project."""
 
     module: ModuleSource
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Never:
     """What a call gives that always raises."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Alternatives:
     """One of several values.
 
@@ -276,7 +285,7 @@ class Alternatives:
     is_direct: bool = field(default=False, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Argument:
     """An argument of a call, and where it is written."""
 
@@ -284,7 +293,7 @@ class Argument:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Arguments:
     """The arguments of a call.
 
@@ -334,8 +343,9 @@ Value: TypeAlias = (
     | Alternatives
 )
 
-BY_FILE = 1
-BY_PARAMETER = 2
+BY_STATE = 1
+BY_FILE = 2
+BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
@@ -364,9 +374,9 @@ def join(values: Iterable[Value]) -> Value:
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     return Alternatives(tuple(found))
 
 

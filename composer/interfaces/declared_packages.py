@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.paths import explain_absent
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import SourceMap
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class DeclaredPackages:
     """The interface packages that a file declares, and the types that its system can use.
 

@@ -6,7 +6,6 @@ unknown fields, and operands of the wrong type.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import TemplateError, nodes
@@ -18,12 +17,13 @@ from composer.checks.behaviours.sample_values import (
 )
 from composer.expressions.sandbox import Sandbox, too_deep
 from composer.interfaces.descriptions import FieldType, MessageDescription
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.interfaces.catalogue import InterfaceCatalogue
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ExpressionValue:
     """What is known of the value of an expression.
 

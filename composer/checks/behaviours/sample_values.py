@@ -6,7 +6,6 @@ with every message; of what else depends on values, nothing is said.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from jinja2 import Undefined, nodes
@@ -16,6 +15,7 @@ from composer.expressions.evaluation import Evaluator
 from composer.expressions.sandbox import Method
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
+from composer.records import record
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ _OF_FILTERS: dict[str, object] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ExpressionFinding:
     """One error in an expression.
 

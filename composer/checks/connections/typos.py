@@ -180,8 +180,8 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
                 matching.add(span)
             else:
                 written = [_as_written(bare, each, node.namespace) for each in names]
-                meant = _at_the_top(bare, names) or find_nearest(bare, written)
-                found[span] = _explain_rule(context, path, node, name, did_you_mean(meant))
+                nearest = _at_the_top(bare, names) or find_nearest(bare, written)
+                found[span] = _explain_rule(context, path, node, name, did_you_mean(nearest))
     yield from (finding for span, finding in found.items() if span not in matching)
 
 

@@ -8,7 +8,6 @@ from composer.inference.values import (
     NONE,
     UNKNOWN,
     Arguments,
-    Awaitable,
     BoundMethod,
     Constant,
     Generated,
@@ -62,9 +61,6 @@ class Containers(Part):
                 return self._evaluator.node_calls.call_own_state(name, arguments)
             case PartOfNode(name='time') if name == 'to_msg':
                 return Message('builtin_interfaces/msg/Time')
-            case PartOfNode(name='goal') if name in ('result', 'result_async'):
-                result: Value = Message(f'{owner.type}_Result') if owner.type else UNKNOWN
-                return Awaitable(result) if name == 'result_async' else result
             case PartOfNode(name='logger') if name == 'get_child':
                 return owner
             case Mapping():
@@ -137,13 +133,17 @@ class Containers(Part):
                 if owner.is_open or not keys:
                     return UNKNOWN
                 pair = Sequence([(join(keys), place), (join(values), place)], tuple)
-                return Generated(pair, NONE)
+                pairs = [
+                    Sequence([(constant(key, where), place), (value, where)], tuple)
+                    for key, (value, where) in owner.entries.items()
+                ]
+                return Generated(pair, NONE, items=tuple(pairs))
             case 'keys':
                 keys = [constant(key) for key in owner.entries if _is_simple(key)]
-                return Generated(UNKNOWN if owner.is_open else join(keys), NONE)
+                return _generated(keys, is_open=owner.is_open)
             case 'values':
                 values = [value for value, _ in owner.entries.values()]
-                return Generated(UNKNOWN if owner.is_open else join(values), NONE)
+                return _generated(values, is_open=owner.is_open)
         self._evaluator.escape(owner)
         self._evaluator.calls.escape_all(arguments)
         return UNKNOWN
@@ -214,6 +214,12 @@ class Containers(Part):
         else:
             owner.items.append((self._evaluator.item_of(value), place))
             owner.is_open = True
+
+
+def _generated(values: list[Value], *, is_open: bool) -> Generated:
+    if is_open:
+        return Generated(UNKNOWN, NONE)
+    return Generated(join(values), NONE, items=tuple(values))
 
 
 def _is_simple(key: object) -> bool:

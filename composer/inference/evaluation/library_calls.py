@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.part import Part
@@ -36,6 +36,9 @@ from composer.inference.values import (
     join,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 # What functions return, whatever they are called with.
 _BY_TYPE: dict[type, str] = {
     bool: 'builtins.all builtins.any builtins.bool builtins.callable builtins.issubclass '
@@ -64,6 +67,8 @@ _KNOWN_RESULTS |= {
 }
 # How long a `range` is that is followed item by item.
 _LONGEST_RANGE = 256
+# How long one is whose numbers are followed, too.
+_LONGEST_KNOWN_RANGE = 16
 
 
 class LibraryCalls(Part):
@@ -210,6 +215,10 @@ class LibraryCalls(Part):
         known = [each.value for each in limits if isinstance(each, Constant) and each.kind is int]
         if len(known) == len(limits) > 0 and 0 not in known[2:]:
             length = len(range(*known))
+            if length <= _LONGEST_KNOWN_RANGE:
+                chosen = max(map(is_chosen, limits))
+                numbers = [constant(each, is_chosen=chosen) for each in range(*known)]
+                return Sequence([(each, place) for each in numbers], range)
             if length <= _LONGEST_RANGE:
                 return Sequence([(Scalar(int), place)] * length, range)
         return Sequence([(Scalar(int), place)], range, is_open=True)
@@ -217,11 +226,25 @@ class LibraryCalls(Part):
     def _call_builtins_enumerate(self, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, 'iterable')
         item = self._evaluator.item_of(first.value) if first else UNKNOWN
-        return Generated(Sequence([(Scalar(int), place), (item, place)], tuple), NONE)
+        begin = arguments.get(1, 'start')
+        start = begin.value if begin else constant(0)
+        items = self._evaluator.loops.items_of(first.value) if first else None
+        pair = Sequence([(Scalar(int), place), (item, place)], tuple)
+        if items is None or not isinstance(start, Constant) or start.kind is not int:
+            return Generated(pair, NONE)
+        numbers = [constant(start.value + index) for index in range(len(items))]
+        pairs = zip(numbers, items, strict=True)
+        return Generated(pair, NONE, items=tuple(_row(each, place) for each in pairs))
 
     def _call_builtins_zip(self, arguments: Arguments, place: Place) -> Value:
         items = [(self._evaluator.item_of(each.value), place) for each in arguments.positional]
-        return Generated(Sequence(items, tuple, arguments.is_open), NONE)
+        item = Sequence(items, tuple, arguments.is_open)
+        several = [self._evaluator.loops.items_of(each.value) for each in arguments.positional]
+        known = [each for each in several if each is not None]
+        if arguments.is_open or arguments.named or len(known) < len(several):
+            return Generated(item, NONE)
+        rounds = zip(*known, strict=False)
+        return Generated(item, NONE, items=tuple(_row(each, place) for each in rounds))
 
     def _call_builtins_reversed(self, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, '')
@@ -294,6 +317,10 @@ class LibraryCalls(Part):
             return UNKNOWN
         rest = Arguments(arguments.positional[1:], arguments.named, arguments.is_open)
         return Partial(arguments.positional[0].value, rest)
+
+
+def _row(values: Iterable[Value], place: Place) -> Sequence:
+    return Sequence([(each, place) for each in values], tuple)
 
 
 def _is_instance(value: Value, wanted: Value) -> bool | None:

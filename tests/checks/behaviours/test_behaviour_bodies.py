@@ -95,6 +95,13 @@ WRONG = {
     "node.publish('command')": 'bad-call',
     'Vector3(1.0, 2.0)': 'bad-call',
     'pass_on(node)': 'bad-call',
+    # names, round by round
+    "for i in range(2): node.publish(f'command{i}', {})": 'unknown-publisher',
+    "for n in ('command', 'other'): node.publish(n, {})": 'unknown-publisher',
+    "[node.publish(n, {}) for n in ('command', 'other') if n != 'command']": 'unknown-publisher',
+    "node.call('enable' if m.child_frame_id else 'other', True)": 'unknown-service-client',
+    "for n, value in {'command': {}, 'level': 256}.items(): pass_on(node, n, value)": 'field-range',
+    "p = {n: 1.0 for n in ('x', 'w')}; node.publish('command', {'linear': p})": 'unknown-field',
     # what is read of messages
     'print(m.pose.pose.positon)': 'unknown-field',
     "print(node.call('enable', True).sucess)": 'unknown-field',
@@ -126,6 +133,12 @@ WRONG = {
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    "for n, on in (('command', True), ('other', False)): node.publish(n, {}) if on else None",
+    "for n in ('command', 'other'):\n    if m.child_frame_id == n: node.publish(n, {})",
+    "for n in ('command', 'other'):\n    if n == 'other': continue\n    node.publish(n, {})",
+    "n = 'command' if m.child_frame_id else 'other'\nif n != 'other': node.publish(n, {})",
+    "node.publish('command', {'linear': {n: 1.0 for n in 'xyzw' if n != 'w'}})",
+    "c = []\nfor n in range(36):\n    c.append(0.0)\nnode.publish('cover', {'pose': {'covariance': c}})",
     "if node.name == 'other': node.publish('comand', {})",
     "if hasattr(m, 'velocity'): print(m.velocity)",
     'try: print(m.velocity)\nexcept AttributeError: pass',

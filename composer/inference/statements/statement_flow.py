@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
+from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
+    BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
-    Alternatives,
     Awaitable,
     Class,
     Constant,
@@ -24,9 +25,7 @@ from composer.inference.values import (
     Scalar,
     Sequence,
     Value,
-    alternatives,
     is_chosen,
-    join,
     truth_of,
 )
 
@@ -202,38 +201,41 @@ class Statements(Part):
                 self._evaluator.evaluate(each, scope)
         scope.names = None
 
-    def _break(self, _: ast.Break | ast.Continue, scope: Scope) -> None:
+    def _break(self, _: ast.Break, scope: Scope) -> None:
         if scope.names is not None:
-            scope.jumps.append(scope.names)
+            scope.broken.append(scope.names)
         scope.names = None
 
-    _continue = _break
+    def _continue(self, _: ast.Continue, scope: Scope) -> None:
+        if scope.names is not None:
+            scope.continued.append(scope.names)
+        scope.names = None
 
     def _assert(self, node: ast.Assert, scope: Scope) -> None:
         test = self._evaluator.tested(node.test, scope)
         if truth_of(test) is False:
             scope.names = None
             return
-        self._evaluator.narrow(node.test, scope, is_true=True)
+        self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
 
     # Branches
 
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        is_doubtful = False
+        doubt = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
-                is_doubtful |= truth is None and is_chosen(test) > 0
+                doubt = max(doubt, is_chosen(test) if truth is None else 0)
                 before = scope.copy_names()
-                self._evaluator.narrow(node.test, scope, is_true=True)
+                self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
                     self.follow_all(node.body, scope)
                 ends.append(None if truth is False else scope.names)
                 scope.names = before
-                self._evaluator.narrow(node.test, scope, is_true=False)
+                self._evaluator.narrowing.narrow(node.test, scope, test, is_true=False)
                 branches.enter_context(self._evaluator.branch(test, is_taken=False))
                 if truth is True:
                     ends.append(None)
@@ -247,18 +249,19 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if is_doubtful and has_jumped:
+        if doubt and has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubts += 1
-            self._evaluator.lasting_doubts[-1] += 1
+            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         subject = self._evaluator.evaluate(node.subject, scope)
-        self._evaluator.run.decide(subject)
+        run = self._evaluator.run
+        run.decide(subject)
         ends: list[Names | None] = []
         before = scope.copy_names()
         for case in node.cases:
             scope.names = None if before is None else dict(before)
+            doubt_rounds(node.subject, scope)
             for pattern in ast.walk(case.pattern):
                 if isinstance(pattern, ast.MatchValue):
                     self._evaluator.evaluate(pattern.value, scope)
@@ -273,7 +276,8 @@ class Statements(Part):
                 scope.set(node.subject.id, UNKNOWN)
             if case.guard is not None:
                 self._evaluator.evaluate(case.guard, scope)
-            with self._evaluator.run.condition(is_doubt=is_chosen(subject)):
+            chosen = is_chosen(subject)
+            with run.condition(is_doubt=chosen > 0, by_state=chosen == BY_STATE):
                 self.follow_all(case.body, scope)
             ends.append(scope.names)
         scope.names = join_names([before, *ends])
@@ -281,56 +285,12 @@ class Statements(Part):
     # Loops
 
     def _for(self, node: ast.For | ast.AsyncFor, scope: Scope) -> None:
-        iterated = self._evaluator.iterated(node.iter, scope, isinstance(node, ast.AsyncFor))
-        item = self._evaluator.item_of(iterated)
-
-        def begin() -> None:
-            self.store(node.target, item, scope)
-
-        self._loop(node, scope, begin, is_doubt=False)
+        self._evaluator.loops.follow_for(node, scope)
 
     _asyncfor = _for
 
     def _while(self, node: ast.While, scope: Scope) -> None:
-        test: list[Value] = [UNKNOWN]
-
-        def begin() -> None:
-            test[0] = self._evaluator.tested(node.test, scope)
-            if truth_of(test[0]) is False:
-                scope.names = None
-            else:
-                self._evaluator.narrow(node.test, scope, is_true=True)
-
-        is_endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
-        self._loop(node, scope, begin, is_doubt=False, is_endless=is_endless)
-
-    def _loop(
-        self,
-        node: ast.For | ast.AsyncFor | ast.While,
-        scope: Scope,
-        begin: object,
-        *,
-        is_doubt: bool,
-        is_endless: bool = False,
-    ) -> None:
-        """Follow a loop twice: what the first round stores, the second one finds."""
-        run = self._evaluator.run
-        jumps, scope.jumps = scope.jumps, []
-        before = scope.copy_names()
-        with run.condition(is_doubt=is_doubt):
-            with run.silence():
-                begin()  # type: ignore[operator]
-                self.follow_all(node.body, scope)
-            after = join_names([before, scope.names, *scope.jumps])
-            scope.names = _widened(before, after)
-            again = scope.copy_names()
-            scope.jumps = []
-            begin()  # type: ignore[operator]
-            self.follow_all(node.body, scope)
-        ends = [None if is_endless else again, None if is_endless else scope.names, *scope.jumps]
-        scope.jumps = jumps
-        scope.names = join_names(ends)
-        self.follow_all(node.orelse, scope)
+        self._evaluator.loops.follow_while(node, scope)
 
     # Guards
 
@@ -338,11 +298,14 @@ class Statements(Part):
         run = self._evaluator.run
         before = scope.copy_names()
         is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
+        tried = run.tried
         with run.guard(is_guard=is_guard, is_broad=is_broad):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
             self.follow_all(node.orelse, scope)
+        # Only then the file may decide whether it raises.
+        is_doubtful = run.tried > tried
         ends = [scope.names]
         caught = join_names([before, after])
         for handler in node.handlers:
@@ -351,7 +314,8 @@ class Statements(Part):
                 self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
-            with run.condition(is_doubt=_is_guard(handler) or _is_broad(handler)):
+            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
+            with run.condition(is_doubt=is_doubt):
                 self.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)
@@ -377,27 +341,6 @@ class Statements(Part):
             scope.names = join_names([before, scope.names])
 
     _asyncwith = _with
-
-
-def _widened(before: Names | None, after: Names | None) -> Names | None:
-    """Return what names stand for in any round: what changes is more than the first two values."""
-    if before is None or after is None:
-        return after
-    return {
-        name: value if before.get(name) == value else _widen(value)
-        for name, value in after.items()
-    }
-
-
-def _widen(value: Value) -> Value:
-    if not isinstance(value, Alternatives):
-        return value
-    return join(
-        Scalar(each.kind, each.is_chosen)
-        if isinstance(each, Constant) and each.kind in (int, float, str)
-        else each
-        for each in alternatives(value)
-    )
 
 
 def _is_guard(handler: ast.ExceptHandler) -> bool:
