@@ -11,6 +11,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
+    BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
@@ -222,12 +223,12 @@ class Statements(Part):
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        is_doubtful = False
+        doubt = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
-                is_doubtful |= truth is None and is_chosen(test) > 0
+                doubt = max(doubt, is_chosen(test) if truth is None else 0)
                 before = scope.copy_names()
                 self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
@@ -248,14 +249,14 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if is_doubtful and has_jumped:
+        if doubt and has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubts += 1
-            self._evaluator.lasting_doubts[-1] += 1
+            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         subject = self._evaluator.evaluate(node.subject, scope)
-        self._evaluator.run.decide(subject)
+        run = self._evaluator.run
+        run.decide(subject)
         ends: list[Names | None] = []
         before = scope.copy_names()
         for case in node.cases:
@@ -275,7 +276,8 @@ class Statements(Part):
                 scope.set(node.subject.id, UNKNOWN)
             if case.guard is not None:
                 self._evaluator.evaluate(case.guard, scope)
-            with self._evaluator.run.condition(is_doubt=is_chosen(subject)):
+            chosen = is_chosen(subject)
+            with run.condition(is_doubt=chosen > 0, by_state=chosen == BY_STATE):
                 self.follow_all(case.body, scope)
             ends.append(scope.names)
         scope.names = join_names([before, *ends])
@@ -296,11 +298,14 @@ class Statements(Part):
         run = self._evaluator.run
         before = scope.copy_names()
         is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
+        tried = run.tried
         with run.guard(is_guard=is_guard, is_broad=is_broad):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
             self.follow_all(node.orelse, scope)
+        # Only then the file may decide whether it raises.
+        is_doubtful = run.tried > tried
         ends = [scope.names]
         caught = join_names([before, after])
         for handler in node.handlers:
@@ -309,7 +314,8 @@ class Statements(Part):
                 self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
-            with run.condition(is_doubt=_is_guard(handler) or _is_broad(handler)):
+            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
+            with run.condition(is_doubt=is_doubt):
                 self.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)
