@@ -56,7 +56,7 @@ class NodeStarter:
         if hook is None:
             return
         failures: list[BaseException] = []
-        function = node.bind(hook, own_state=False)
+        function = node.bind(hook)
         call = node.reported_call(Owner('on_start'), hook.path, function, failures.append)
         _, ended = node.begin(call)
         while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:

@@ -137,7 +137,7 @@ def _finish(node: LiveNode, timeout_sec: float) -> None:
     hook = node.spec.on_stop
     if hook is None or not node.has_begun:
         return
-    function = node.bind(hook, own_state=False)
+    function = node.bind(hook)
     node.run_to_end(
         node.reported_call(Owner('on_stop'), hook.path, function), timeout_sec=timeout_sec
     )

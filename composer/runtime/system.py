@@ -128,6 +128,7 @@ class System:
             without_parameter_services=frozenset(
                 node.full_name for node in spec.nodes.values() if not node.parameter_services
             ),
+            stop_timeout_sec=spec.shutdown_timeout_sec,
             health=None if spec.diagnostics_period_sec is None else HealthRegistry(),
         )
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
-    from composer.language.specs import ActionClientSpec, BehaviourSpec
+    from composer.language.specs import ActionClientSpec
     from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
@@ -43,7 +43,6 @@ class ActionClient:
 
     def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
         action_class: Any = import_interface(spec.type)
-        kind, name = 'action client', spec.name
         self._node = node
         self._name = node.resolve_action_name(spec.action)
         self._logger = EscapingLogger(node.ros.get_logger())
@@ -56,9 +55,7 @@ class ActionClient:
             self._unavailable,
             self._unanswered,
         )
-        self._behaviours = _Behaviours(
-            node, {Owner(kind, name, key): getattr(spec, key) for key in ('feedback', 'result')}
-        )
+        self._behaviours = _Behaviours(node, spec)
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -81,6 +78,16 @@ class ActionClient:
         goal.begin(handle)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
+
+    def change(self, spec: ActionClientSpec) -> None:
+        """See `LiveEntity`."""
+        self._behaviours.change(spec)
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._node.at_destruction.remove(self._client.destroy)
+        self._client.destroy()
+        self._behaviours.destroy()
 
     def _unavailable(self, timeout_sec: float) -> ActionNotAvailableError:
         message = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
@@ -168,22 +175,39 @@ class _Behaviours:
     one for all of them: of two, the one triggered last may come first.
     """
 
-    def __init__(self, node: LiveNode, behaviours: dict[Owner, BehaviourSpec | None]) -> None:
+    def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
+        self._node = node
         self._items: deque[tuple[BehaviourCall, Any]] = deque()
+        self._calls: dict[str, BehaviourCall] = {}
+        self._guard: Any = None
+        self.change(spec)
+
+    def change(self, spec: ActionClientSpec) -> None:
+        """Call the behaviours of `spec` from the next item on."""
+        node = self._node
+        behaviours = {'feedback': spec.feedback, 'result': spec.result}
         self._calls = {
-            owner.key: node.call(
-                owner,
-                spec.path,
-                node.bind(spec, own_state=False),
+            key: node.call(
+                Owner('action client', spec.name, key),
+                behaviour.path,
+                node.bind(behaviour),
                 may_begin=node.gate.allows_events,
             )
-            for owner, spec in behaviours.items()
-            if spec is not None
+            for key, behaviour in behaviours.items()
+            if behaviour is not None
         }
-        if self._calls:
-            are_async = any(call.is_async for call in self._calls.values())
-            drain = self._drain_async if are_async else self._drain
+        if not self._calls:
+            return
+        are_async = any(call.is_async for call in self._calls.values())
+        drain = self._drain_async if are_async else self._drain
+        if self._guard is None:
             self._guard = node.ros.create_guard_condition(drain, callback_group=node.group(None))
+        self._guard.callback = drain
+
+    def destroy(self) -> None:
+        """Call no behaviour any more."""
+        if self._guard is not None:
+            self._node.ros.destroy_guard_condition(self._guard)
 
     def put(self, key: str, item: Any) -> None:
         """Let the behaviour under a key, if there is one, be called with an item."""

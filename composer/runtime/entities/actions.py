@@ -8,7 +8,8 @@ from dataclasses import replace
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action import ActionServer as RosActionServer
+from rclpy.action import CancelResponse, GoalResponse
 from rclpy.action.server import RCLError
 from rclpy.qos import QoSProfile
 
@@ -22,6 +23,7 @@ from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
     from composer.language.specs import ActionSpec
+    from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.live_node import LiveNode
 
 _POLL_SEC = 0.005
@@ -31,14 +33,7 @@ _CANCEL_SEC = 5.0
 _SERVICE_QOS = QoSProfile(depth=1000)
 
 
-def create_action(node: LiveNode, spec: ActionSpec) -> ActionServer:
-    """Create an action that the node serves."""
-    server = _Server(node, spec)
-    node.at_destruction.append(server.destroy)
-    return server
-
-
-class _Server(ActionServer):
+class ActionServer(RosActionServer):
     """An action server whose plain and generator behaviours run in threads of their own.
 
     The stock server executes goals in the threads of the executor, where goals that sleep keep
@@ -50,16 +45,7 @@ class _Server(ActionServer):
         self._execution = _Execution(node, spec, self._queue)
         self._live_node = node
         self._owner = Owner('action', spec.name)
-        self._accept = None
-        if spec.accept is not None:
-            self._accept = node.call(
-                replace(self._owner, key='accept'),
-                spec.accept.path,
-                node.bind(spec.accept, own_state=False),
-                options=spec,
-                deliver=return_result,
-                may_begin=node.gate.allows_requests,
-            )
+        self._accept = self._create_accept(spec)
         self._tokens: dict[bytes, int] = {}
         super().__init__(
             node.ros,
@@ -74,6 +60,20 @@ class _Server(ActionServer):
             result_service_qos_profile=_SERVICE_QOS,
             cancel_service_qos_profile=_SERVICE_QOS,
         )
+
+        node.at_destruction.append(self.destroy)
+
+    def change(self, spec: ActionSpec) -> None:
+        """See `LiveEntity`: goals that have begun end as they began."""
+        self._queue.concurrency = spec.concurrency
+        self._execution = _Execution(self._live_node, spec, self._queue)
+        self._accept = self._create_accept(spec)
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        with suppress(ValueError):
+            self._live_node.at_destruction.remove(self.destroy)
+        super().destroy()
 
     def add_future(self, future: Any) -> None:
         """Let results be sent by the thread that they come from: see the base class.
@@ -93,6 +93,19 @@ class _Server(ActionServer):
             threading.Thread(
                 target=self._execute_here, args=(callback, goal_handle), daemon=True
             ).start()
+
+    def _create_accept(self, spec: ActionSpec) -> BehaviourCall | None:
+        if spec.accept is None:
+            return None
+        node = self._live_node
+        return node.call(
+            replace(self._owner, key='accept'),
+            spec.accept.path,
+            node.bind(spec.accept),
+            options=spec,
+            deliver=return_result,
+            may_begin=node.gate.allows_requests,
+        )
 
     def _execute_here(self, callback: Any, goal: Any) -> None:
         # Nothing in it waits, so that it ends when it is first resumed.
@@ -156,7 +169,7 @@ class _Execution:
         action_class: Any = import_interface(spec.type)
         self._node = node
         self._queue = queue
-        self._begin = node.bind(spec.behaviour)
+        self._begin = node.bind(spec.behaviour, Owner('action', spec.name))
         self._result_class = action_class.Result
         self._to_result = converter_for(action_class.Result).convert
         self._to_feedback = converter_for(action_class.Feedback).convert

@@ -10,29 +10,29 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
 from composer.runtime.entities.action_clients import ActionClient
-from composer.runtime.entities.actions import create_action
+from composer.runtime.entities.actions import ActionServer
 from composer.runtime.entities.parameters import declare_parameters
-from composer.runtime.entities.publishers import create_publisher
+from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
-from composer.runtime.entities.services import create_service
-from composer.runtime.entities.subscriptions import create_subscription
-from composer.runtime.entities.timers import create_timer
+from composer.runtime.entities.services import Service
+from composer.runtime.entities.subscriptions import Subscription
+from composer.runtime.entities.timers import Timer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
 
 # By section, in the order of creation: each takes the node and the record of one entity, and
-# returns what is kept of it in `LiveNode.entities`.
-CREATORS: dict[str, Callable[[LiveNode, Any], Any]] = {
-    'publishers': create_publisher,
+# is what is kept of it in `LiveNode.entities`.
+CREATORS: dict[str, Callable[[LiveNode, Any], LiveEntity]] = {
+    'publishers': Publisher,
     'service_clients': ServiceClient,
     'action_clients': ActionClient,
-    'services': create_service,
-    'actions': create_action,
-    'subscriptions': create_subscription,
-    'timers': create_timer,
+    'services': Service,
+    'actions': ActionServer,
+    'subscriptions': Subscription,
+    'timers': Timer,
 }
 
 

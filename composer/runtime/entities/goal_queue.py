@@ -17,10 +17,13 @@ class GoalQueue:
 
     Args:
         start: Begins to execute a goal; `finished` is called when it has ended.
+
+    Attributes:
+        concurrency: What becomes of goals that come while one runs.
     """
 
     def __init__(self, concurrency: Concurrency, start: Callable[[Any], None]) -> None:
-        self._concurrency = concurrency
+        self.concurrency = concurrency
         self._start = start
         self._running: dict[bytes, Any] = {}
         self._waiting: deque[Any] = deque()
@@ -30,14 +33,14 @@ class GoalQueue:
     def has_room(self) -> bool:
         """Return whether another goal may be accepted now."""
         with self._lock:
-            return self._concurrency != 'reject' or not self._running
+            return self.concurrency != 'reject' or not self._running
 
     def add(self, goal: Any) -> None:
         """Run an accepted goal now or later."""
         superseded: list[Any] = []
         with self._lock:
-            waits = bool(self._running) and self._concurrency in ('queue', 'preempt')
-            if self._concurrency == 'preempt':
+            waits = bool(self._running) and self.concurrency in ('queue', 'preempt')
+            if self.concurrency == 'preempt':
                 self._superseded.update(self._running)
                 superseded = list(self._waiting)
                 self._waiting.clear()

@@ -126,7 +126,7 @@ def _create_callback(
     node: LiveNode, spec: BehaviourSpec
 ) -> Callable[[list[Parameter]], SetParametersResult]:
     """Return what asks `on_parameters` whether changes are accepted."""
-    function = node.bind(spec, own_state=False)
+    function = node.bind(spec)
     call = node.call(Owner('on_parameters'), spec.path, function, deliver=return_result)
 
     def ask(changes: list[Parameter]) -> SetParametersResult:

@@ -15,18 +15,38 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 
-def create_publisher(node: LiveNode, spec: PublisherSpec) -> Publish:
-    """Create a publisher; return what publishes a payload on it."""
-    message_class = import_interface(spec.type)
-    profile = create_qos_profile(spec.qos, node.system.profiles)
-    endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.place(spec.path))
-    node.endpoints.append(endpoint)
-    send = node.ros.create_publisher(
-        message_class, spec.topic, profile, event_callbacks=endpoint.publisher_events()
-    ).publish
-    convert = converter_for(message_class).convert
+class Publisher:
+    """A publisher.
 
-    def publish(payload: Payload) -> None:
-        send(convert(payload))
+    Attributes:
+        publish: Publishes a payload on it.
+    """
 
-    return publish
+    __slots__ = ('_endpoint', '_node', '_ros', 'publish')
+
+    def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
+        message_class = import_interface(spec.type)
+        profile = create_qos_profile(spec.qos, node.system.profiles)
+        self._node = node
+        self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
+        self._ros = node.ros.create_publisher(
+            message_class,
+            spec.topic,
+            profile,
+            event_callbacks=self._endpoint.publisher_events(),
+        )
+        node.endpoints.append(self._endpoint)
+        send, convert = self._ros.publish, converter_for(message_class).convert
+
+        def publish(payload: Payload) -> None:
+            send(convert(payload))
+
+        self.publish: Publish = publish
+
+    def change(self, _spec: PublisherSpec) -> None:
+        """See `LiveEntity`: all that it has is fixed."""
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._node.endpoints.remove(self._endpoint)
+        self._node.ros.destroy_publisher(self._ros)

@@ -28,6 +28,7 @@ class ServiceClient:
 
     def __init__(self, node: LiveNode, spec: ServiceClientSpec) -> None:
         service_class: Any = import_interface(spec.type)
+        self._node = node
         self._failures = node.system.failures
         self._convert = converter_for(service_class.Request).convert
         self._service = node.ros.resolve_service_name(spec.service)
@@ -63,6 +64,13 @@ class ServiceClient:
         request = self._convert(payload)
         send = partial(self._client.call_async, request)
         return await self._requests.send_async(send, timeout_sec)
+
+    def change(self, _spec: ServiceClientSpec) -> None:
+        """See `LiveEntity`: all that it has is fixed."""
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._node.ros.destroy_client(self._client)
 
     def _unavailable(self, timeout_sec: float) -> CallError:
         message = f"no server of '{self._service}' appeared within {timeout_sec:g} s"

@@ -18,15 +18,26 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 
-def create_service(node: LiveNode, spec: ServiceSpec) -> Any:
-    """Create a service that the node serves."""
-    return node.ros.create_service(
-        import_interface(spec.type),
-        spec.service,
-        _create_callback(node, spec),
-        qos_profile=create_qos_profile(spec.qos, node.system.profiles),
-        callback_group=node.group(spec.group),
-    )
+class Service:
+    """A service that the node serves."""
+
+    def __init__(self, node: LiveNode, spec: ServiceSpec) -> None:
+        self._node = node
+        self._ros = node.ros.create_service(
+            import_interface(spec.type),
+            spec.service,
+            _create_callback(node, spec),
+            qos_profile=create_qos_profile(spec.qos, node.system.profiles),
+            callback_group=node.group(spec.group),
+        )
+
+    def change(self, spec: ServiceSpec) -> None:
+        """See `LiveEntity`."""
+        self._ros.callback = _create_callback(self._node, spec)
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._node.ros.destroy_service(self._ros)
 
 
 def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
@@ -35,7 +46,7 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     call = node.call(
         owner,
         spec.path,
-        node.bind(spec.behaviour),
+        node.bind(spec.behaviour, owner),
         options=spec,
         deliver=converter_for(service_class.Response).convert,
         may_begin=node.gate.allows_requests,

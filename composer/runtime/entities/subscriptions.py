@@ -11,31 +11,47 @@ from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from composer.language.specs import SubscriptionSpec
     from composer.runtime.nodes.live_node import LiveNode
 
 
-def create_subscription(node: LiveNode, spec: SubscriptionSpec) -> Any:
-    """Create a subscription."""
-    owner = Owner('subscription', spec.name)
-    call = node.call(
-        owner,
-        spec.path,
-        return_result if spec.behaviour is None else node.bind(spec.behaviour),
-        options=spec,
-        deliver=node.publish_to(spec.publish),
-        may_begin=node.gate.allows_events,
-    )
-    profile = create_qos_profile(spec.qos, node.system.profiles)
-    endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.place(spec.path))
-    node.endpoints.append(endpoint)
-    subscription = node.ros.create_subscription(
-        import_interface(spec.type),
-        spec.topic,
-        call.run,
-        profile,
-        callback_group=node.group(spec.group),
-        event_callbacks=endpoint.subscription_events(),
-    )
-    node.count_missed(owner, subscription)
-    return subscription
+class Subscription:
+    """A subscription."""
+
+    def __init__(self, node: LiveNode, spec: SubscriptionSpec) -> None:
+        self._node = node
+        self._owner = Owner('subscription', spec.name)
+        profile = create_qos_profile(spec.qos, node.system.profiles)
+        self._endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.placing(spec))
+        self._ros = node.ros.create_subscription(
+            import_interface(spec.type),
+            spec.topic,
+            self._create_callback(spec),
+            profile,
+            callback_group=node.group(spec.group),
+            event_callbacks=self._endpoint.subscription_events(),
+        )
+        node.endpoints.append(self._endpoint)
+        node.count_missed(self._owner, self._ros)
+
+    def change(self, spec: SubscriptionSpec) -> None:
+        """See `LiveEntity`."""
+        self._ros.callback = self._create_callback(spec)
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._node.endpoints.remove(self._endpoint)
+        self._node.ros.destroy_subscription(self._ros)
+
+    def _create_callback(self, spec: SubscriptionSpec) -> Callable[..., Any]:
+        node, behaviour = self._node, spec.behaviour
+        return node.call(
+            self._owner,
+            spec.path,
+            return_result if behaviour is None else node.bind(behaviour, self._owner),
+            options=spec,
+            deliver=node.publish_to(spec.publish),
+            may_begin=node.gate.allows_events,
+        ).run

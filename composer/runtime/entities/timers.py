@@ -17,7 +17,7 @@ from composer.runtime.messages.payloads import converter_for
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
 
-    from rclpy.timer import Timer
+    from rclpy.timer import Timer as RosTimer
 
     from composer.language.specs import ClockName, TimerSpec
     from composer.runtime.nodes.live_node import LiveNode
@@ -25,28 +25,57 @@ if TYPE_CHECKING:
 _CLOCKS = {'steady': ClockType.STEADY_TIME, 'system': ClockType.SYSTEM_TIME}
 
 
-def create_timer(node: LiveNode, spec: TimerSpec) -> Timer:
-    """Create a timer; it ticks once the node has started."""
-    ticker = _Ticker(node, spec)
-    owner = Owner('timer', spec.name)
-    call = node.call(
-        owner,
-        spec.path,
-        ticker.function,
-        options=spec,
-        deliver=node.publish_to(spec.publish),
-        may_begin=node.gate.allows_events,
-    )
-    ticker.timer = node.ros.create_timer(
-        spec.period_sec,
-        call.run,
-        callback_group=node.group(spec.group),
-        clock=_create_clock(spec.clock),
-        # A period is counted from the start of the node, not from its creation.
-        autostart=False,
-    )
-    node.count_missed(owner, ticker.timer)
-    return ticker.timer
+class Timer:
+    """A timer; it ticks once the node has started.
+
+    Attributes:
+        ros: The rclpy timer.
+    """
+
+    def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
+        self._node = node
+        self._owner = Owner('timer', spec.name)
+        self._period_sec = spec.period_sec
+        self._ticker = _Ticker(node, self._owner, spec)
+        self.ros = node.ros.create_timer(
+            spec.period_sec,
+            self._create_callback(spec),
+            callback_group=node.group(spec.group),
+            clock=_create_clock(spec.clock),
+            # A period is counted from the start of the node, not from its creation.
+            autostart=False,
+        )
+        self._ticker.timer = self.ros
+        node.count_missed(self._owner, self.ros)
+
+    def change(self, spec: TimerSpec) -> None:
+        """See `LiveEntity`: a generator begins anew, and a new period begins now."""
+        self._ticker.close(self._node.system.stop_timeout_sec)
+        self._ticker.forget()
+        self._ticker = _Ticker(self._node, self._owner, spec)
+        self._ticker.timer = self.ros
+        self.ros.callback = self._create_callback(spec)
+        if spec.period_sec != self._period_sec:
+            self._period_sec = spec.period_sec
+            self.ros.timer_period_ns = round(spec.period_sec * 1e9)
+            self.ros.reset()
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""
+        self._ticker.close(self._node.system.stop_timeout_sec)
+        self._ticker.forget()
+        self._node.ros.destroy_timer(self.ros)
+
+    def _create_callback(self, spec: TimerSpec) -> Callable[..., Any]:
+        node = self._node
+        return node.call(
+            self._owner,
+            spec.path,
+            self._ticker.function,
+            options=spec,
+            deliver=node.publish_to(spec.publish),
+            may_begin=node.gate.allows_events,
+        ).run
 
 
 def _create_clock(name: ClockName) -> Clock | None:
@@ -60,20 +89,20 @@ class _Ticker:
         function: Does it; it takes no arguments.
     """
 
-    timer: Timer
+    timer: RosTimer
 
-    def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
-        self._node, self._spec = node, spec
+    def __init__(self, node: LiveNode, owner: Owner, spec: TimerSpec) -> None:
+        self._node, self._owner, self._spec = node, owner, spec
+        # The generator that is suspended until the next tick, if there is one.
+        self._generator: Any = None
+        # Ticks of a reentrant group overlap, which a generator cannot: it skips such a tick.
+        self._turn = threading.Lock()
         if spec.behaviour is None:
             publisher = node.spec.publishers[spec.publish or '']
             message = converter_for(import_interface(publisher.type)).convert(spec.message)
             self.function: Callable[[], Any] = lambda: message
             return
-        self._begin = self.function = node.bind(spec.behaviour)
-        # The generator that is suspended until the next tick, if there is one.
-        self._generator: Any = None
-        # Ticks of a reentrant group overlap, which a generator cannot: it skips such a tick.
-        self._turn = threading.Lock()
+        self._begin = self.function = node.bind(spec.behaviour, owner)
         self._kind = kind_of(self._begin)
         if self._kind is FunctionKind.GENERATOR:
             self.function = self._resume
@@ -93,8 +122,13 @@ class _Ticker:
             return
         is_async = self._kind is FunctionKind.ASYNC_GENERATOR
         close = partial(_close_async, generator) if is_async else generator.close
-        call = self._node.reported_call(Owner('timer', self._spec.name), self._spec.path, close)
+        call = self._node.reported_call(self._owner, self._spec.path, close)
         self._node.run_to_end(call, timeout_sec=timeout_sec)
+
+    def forget(self) -> None:
+        """End it no more at the stop: it has been."""
+        if self in self._node.suspended:
+            self._node.suspended.remove(self)
 
     def _resume(self) -> Any:
         if not self._turn.acquire(blocking=False):

@@ -32,13 +32,17 @@ class HangLimit:
     """How long the behaviour of one entity may run; reports the calls that run longer.
 
     Args:
-        place: Where the file declares it, as `file:line`.
+        place: Returns where the file declares it, as `file:line`.
         after_sec: `None` for no limit.
         warn: Takes the text, as the node's logger does.
     """
 
     def __init__(
-        self, owner: Owner, place: str, after_sec: float | None, warn: Callable[[str], Any]
+        self,
+        owner: Owner,
+        place: Callable[[], str],
+        after_sec: float | None,
+        warn: Callable[[str], Any],
     ) -> None:
         self._owner = owner
         self.after_sec = after_sec
@@ -82,7 +86,7 @@ class HangLimit:
         self._quiet_until = now_ns * 1e-9 + self._quiet.next_delay_sec()
         self._reported[token] = since_ns
         self._warn(
-            f'{self._owner} ({self._place}) has been running for {ran_sec:.1f} s{others}; '
+            f'{self._owner} ({self._place()}) has been running for {ran_sec:.1f} s{others}; '
             f'it is at\n{call.format_stack()}'
         )
         running.on_end(token, lambda: self._report_end(token, 'returned', monotonic_ns()))
@@ -91,7 +95,7 @@ class HangLimit:
         reported_ns = self._reported.pop(token, None)
         if reported_ns is not None:
             ran_sec = (now_ns - reported_ns) * 1e-9
-            self._warn(f'{self._owner} ({self._place}) {what} after {ran_sec:.1f} s')
+            self._warn(f'{self._owner} ({self._place()}) {what} after {ran_sec:.1f} s')
 
 
 class WatchedNode(Protocol):

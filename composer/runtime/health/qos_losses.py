@@ -26,7 +26,7 @@ class QosLosses:
     """What one publisher or subscription has missed of what its QoS promises.
 
     Args:
-        owner: What it is called in the log.
+        describe: Returns what it is called in the log.
         policies: Its policies, where durations without a limit are left out.
         publishes: Whether it is a publisher.
         log: Takes the text, as the node's logger does.
@@ -34,13 +34,13 @@ class QosLosses:
 
     def __init__(
         self,
-        owner: str,
+        describe: Callable[[], str],
         policies: Mapping[str, Any],
         log: Callable[[str], Any],
         *,
         publishes: bool,
     ) -> None:
-        self._owner = owner
+        self._describe = describe
         self._policies = policies
         self._publishes = publishes
         self._log = log
@@ -104,11 +104,11 @@ class QosLosses:
                 count.last_line = monotonic()
             count.unreported += times - is_first
         if is_first:
-            self._log(f'{self._owner} {what}')
+            self._log(f'{self._describe()} {what}')
 
     def _format_count(self, what: str, count: _LossCount) -> str:
         """Return the line about what was counted, and reset the count."""
         times = 'once more' if count.unreported == 1 else f'{count.unreported} more times'
         count.unreported = 0
         count.last_line = monotonic()
-        return f'{self._owner} {what}, {times}'
+        return f'{self._describe()} {what}, {times}'

@@ -43,7 +43,7 @@ class TopicEndpoint:
     Args:
         ros: Its node.
         noun: Its kind, as in `publisher`.
-        place: Where the file declares it, as `file:line`.
+        place: Returns where the file declares it, as `file:line`.
 
     Attributes:
         topic: Its name in the graph.
@@ -56,22 +56,27 @@ class TopicEndpoint:
         noun: str,
         spec: TopicEndSpec,
         profile: QoSProfile,
-        place: str,
+        place: Callable[[], str],
     ) -> None:
         self.ros = ros
         self._spec = spec
         self._declared = read_policies(profile)
-        self._owner = f"{noun} '{spec.name}' ({place})"
+        self._noun = noun
+        self._place = place
         self._publishes = KIND_OF_NOUN[noun].provides
         self._reported: set[tuple[str, str]] = set()
         self._checks_left = 0
         self.topic = ros.resolve_topic_name(spec.topic)
         self.losses = QosLosses(
-            self._owner,
+            self.describe,
             self._declared,
             EscapingLogger(ros.get_logger()).warning,
             publishes=self._publishes,
         )
+
+    def describe(self) -> str:
+        """Return its kind, name and place."""
+        return f"{self._noun} '{self._spec.name}' ({self._place()})"
 
     def subscription_events(self) -> SubscriptionEventCallbacks:
         """Return the event callbacks of a subscription."""
@@ -144,7 +149,7 @@ class TopicEndpoint:
 
     def _report(self, name: str, reason: str) -> None:
         what = 'sends nothing to' if self._publishes else 'gets nothing from'
-        text = f"{self._owner} {what} '{name}': {reason}"
+        text = f"{self.describe()} {what} '{name}': {reason}"
         EscapingLogger(self.ros.get_logger()).warning(text)
 
     def _find_reason(self, end: TopicEndpointInfo, here: Mapping[str, Any]) -> str | None:

@@ -147,7 +147,7 @@ class Node:
             UndeclaredError: The node declares no such publisher.
             PayloadError: The payload does not fit the publisher's type.
         """
-        self._entity('publishers', name)(payload)
+        self._entity('publishers', name).publish(payload)
 
     def call(self, name: str, payload: Payload = None, timeout: float | None = 5.0) -> Any:
         """Call a service and return its response; works in any behaviour.

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from rclpy.callback_groups import CallbackGroup
     from rclpy.task import Future
 
-    from composer.language.specs import BehaviourSpec, NodeSpec, OnError
+    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec, OnError
     from composer.runtime.health.statistics import EntityHealth
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.system_handle import SystemHandle
@@ -54,6 +54,16 @@ class Suspended(Protocol):
 
     def close(self, timeout_sec: float) -> None:
         """End it; what it raises is reported."""
+
+
+class LiveEntity(Protocol):
+    """An entity of a node that runs."""
+
+    def change(self, spec: Any) -> None:
+        """Do as `spec` says from the next call on; what ROS fixes is the same as before."""
+
+    def destroy(self) -> None:
+        """Remove it from the node and the graph; its behaviours are not called any more."""
 
 
 class BehaviourOptions(Protocol):
@@ -90,7 +100,7 @@ class LiveNode:
     ros: ComposedRosNode
     behaviour_node: Node
     errors: ErrorReporter
-    entities: defaultdict[str, dict[str, Any]]
+    entities: defaultdict[str, dict[str, LiveEntity]]
     waits: Waits
     background: CallbackGroup
     gate: Gate
@@ -102,6 +112,7 @@ class LiveNode:
     running: RunningCalls = field(default_factory=RunningCalls)
     has_begun: bool = False
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
+    _views: dict[Owner, Node] = field(default_factory=dict)
     _is_destroyed: bool = False
 
     @property
@@ -124,17 +135,22 @@ class LiveNode:
         return expand_name(name, self.ros.get_name(), self.ros.get_namespace())
 
     def place(self, path: DataPath) -> str:
-        """Return `file:line` of a place in the file."""
-        span = self.system.positions.key(path)
-        return f'{span.source.name}:{span.line}'
+        """Return `file:line` of a place in the file, as it is now."""
+        return self.system.positions.key(path).place
 
-    def bind(self, behaviour: BehaviourSpec, *, own_state: bool = True) -> Callable[..., Any]:
+    def placing(self, spec: EntitySpec) -> Callable[[], str]:
+        """Return what tells where an entity is declared: an edit may move it."""
+        return partial(self.place, spec.path)
+
+    def bind(self, behaviour: BehaviourSpec, owner: Owner | None = None) -> Callable[..., Any]:
         """Return the function of a behaviour with the node and its constant arguments given.
 
         Args:
-            own_state: Whether it has an `own_state`, which none of the node's others has.
+            owner: The entity whose `own_state` it has; `None` for one without.
         """
-        node = self.behaviour_node.with_own_state() if own_state else self.behaviour_node
+        node = self.behaviour_node
+        if owner is not None:
+            node = self._views.setdefault(owner, node.with_own_state())
         return partial(self.system.functions[behaviour.name], node, **behaviour.arguments)
 
     def call(
@@ -155,9 +171,8 @@ class LiveNode:
             deliver: Takes what the function returns.
             may_begin: See `BehaviourCall`.
         """
-        place = self.place(path)
         own = options or self.spec
-        self._limit(owner, place, own)
+        self._limit(owner, path, own)
         health = self._health(owner)
 
         def failed(owner: Owner, error: BaseException) -> None:
@@ -165,7 +180,7 @@ class LiveNode:
                 return
             if health is not None:
                 health.note_error(error)
-            self.errors.report(f'{owner} ({place})', error)
+            self.errors.report(f'{owner} ({self.place(path)})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
         return BehaviourCall(
@@ -192,13 +207,13 @@ class LiveNode:
         Args:
             failed: Takes what it raised, after that has been reported.
         """
-        place = self.place(path)
-        self._limit(owner, place, self.spec)
+        if owner not in self.limits:
+            self._limit(owner, path, self.spec)
 
         def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            self.errors.report(f'{owner} ({place})', error)
+            self.errors.report(f'{owner} ({self.place(path)})', error)
             if failed is not None:
                 failed(error)
 
@@ -236,11 +251,12 @@ class LiveNode:
         """Return what publishes results on a publisher, but for `None`; without one, nothing."""
         if publisher is None:
             return discard_result
-        publish = self.entities['publishers'][publisher]
+        publishers: dict[str, Any] = self.entities['publishers']
 
         def publish_result(payload: Any) -> None:
             if payload is not None:
-                publish(payload)
+                # Looked up each time: an edit may put another one in its place.
+                publishers[publisher].publish(payload)
 
         return publish_result
 
@@ -254,7 +270,8 @@ class LiveNode:
         """Yield the rclpy timers that call behaviours."""
         for kind in ENTITY_KINDS:
             if kind.is_timed:
-                yield from self.entities.get(kind.section, {}).values()
+                timers: dict[str, Any] = self.entities.get(kind.section, {})
+                yield from (timer.ros for timer in timers.values())
 
     def flush_counts(self) -> None:
         """Log the counts of what has not been logged."""
@@ -280,17 +297,17 @@ class LiveNode:
         board = self.system.health
         return None if board is None else board.entity(self.full_name, owner)
 
-    def _limit(self, owner: Owner, place: str, options: BehaviourOptions) -> None:
-        if owner not in self.limits:
-            warn = EscapingLogger(self.ros.get_logger()).warning
-            self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
+    def _limit(self, owner: Owner, path: DataPath, options: BehaviourOptions) -> None:
+        warn = EscapingLogger(self.ros.get_logger()).warning
+        place = partial(self.place, path)
+        self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
 
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
     ros = ComposedRosNode(spec, system.context, system.ros_arguments)
     reserve(ros, 'the node', 'destroy_node')
-    entities: defaultdict[str, dict[str, Any]] = defaultdict(dict)
+    entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
     gate = Gate(system.stop)
     waits = Waits(system.executor, system.stop)

@@ -56,6 +56,7 @@ class SystemHandle:
         stop: The request to stop the system.
         failures: Which services failed lately.
         without_parameter_services: The full names of the nodes that have none.
+        stop_timeout_sec: What running behaviours get to end.
         health: The health of the system's entities; `None` measures nothing.
     """
 
@@ -70,4 +71,5 @@ class SystemHandle:
     stop: StopRequest
     failures: ServiceFailures
     without_parameter_services: frozenset[str]
+    stop_timeout_sec: float
     health: HealthRegistry | None

@@ -105,7 +105,7 @@ def test_a_wait_for_what_is_not_there_does_not_count_as_running(wait_for):
     """A call that went on after a long wait was reported at once, with its stack."""
     owner, hour_ns = Owner('on_start'), int(3600e9)
     running, warnings, present, over = RunningCalls(), [], threading.Event(), threading.Event()
-    limit = HangLimit(owner, 'system.yaml:7', 3600.0, warnings.append)
+    limit = HangLimit(owner, lambda: 'system.yaml:7', 3600.0, warnings.append)
     notice = WaitNotice(lambda _line: None, 'service')
     waits, begun = Waits(SimpleNamespace(waiting=nullcontext), StopRequest()), threading.Event()
 
