@@ -80,6 +80,9 @@ def cli(context: click.Context) -> int:
     'Overrides the file. Can be repeated.',
 )
 @click.option(
+    '--watch', 'watches', is_flag=True, help='Change the running system when its files change.'
+)
+@click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
 @click.pass_context
@@ -89,6 +92,7 @@ def up_command(
     set_values: tuple[str, ...],
     log_levels: tuple[str, ...],
     *,
+    watches: bool,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run its system until it is stopped.
@@ -106,7 +110,15 @@ def up_command(
             click.echo(f'\n{escape(str(paths[0]))}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
-    return up(paths, arguments, context.obj, log_levels, set_values, ends_process=True)
+    return up(
+        paths,
+        arguments,
+        context.obj,
+        log_levels,
+        set_values,
+        watches=watches,
+        ends_process=True,
+    )
 
 
 @cli.command('check', context_settings=NUMBERS_ARE_VALUES)

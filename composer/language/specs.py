@@ -402,6 +402,13 @@ class SystemSpec:
     processes: Mapping[str, ProcessSpec]
 
     @property
+    def without_parameter_services(self) -> frozenset[str]:
+        """The full names of the nodes whose parameters others cannot read and set."""
+        return frozenset(
+            node.full_name for node in self.nodes.values() if not node.parameter_services
+        )
+
+    @property
     def longest_stop_sec(self) -> float:
         """The longest time that callbacks, and then processes, get to end at the stop."""
         own = self.shutdown_timeout_sec

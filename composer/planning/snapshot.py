@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import MergedFiles
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec, SystemSpec
@@ -30,8 +31,9 @@ class Snapshot:
 
     Attributes:
         positions: Where the parts of `spec` are written.
-        code: The digest of each module that a behaviour is in, and of the modules of the project
-            that this imports, by its name.
+        code: For each module that a behaviour is in, and each of the project that such a one
+            imports, the digest of its source and of all that it imports itself, by its name.
+        sources: The texts of these modules.
         definitions: The text of each definition file of the declared interface packages, by the
             package and the path in its folder.
     """
@@ -39,6 +41,7 @@ class Snapshot:
     spec: SystemSpec
     positions: SourceMap
     code: Mapping[str, str]
+    sources: Mapping[str, str]
     definitions: Mapping[tuple[str, str], str]
     _files: dict[tuple[str, ...], MergedFiles] = field(default_factory=dict)
 
@@ -51,10 +54,19 @@ class Snapshot:
             self._files[files] = MergedFiles(map(_read, files))
         return self._files[files].find_overrides(node.full_name)
 
+    def stale_modules(self, other: Snapshot) -> set[str]:
+        """Return the modules whose source, or what they import, differs from `other`'s."""
+        names = {*self.code, *other.code}
+        return {name for name in names if self.code.get(name) != other.code.get(name)}
 
-def take_snapshot(context: CheckContext) -> Snapshot:
-    """Return what a system is compared by; everything is read now."""
-    spec = context.spec
+
+def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snapshot:
+    """Return what a system is compared by; everything is read now.
+
+    Args:
+        prefixes: Where the interface packages are that were built for the system.
+    """
+    spec = extend_processes(context.spec, prefixes)
     sources = _Sources(context.modules)
     nodes = spec.nodes.values()
     modules = {each.behaviour.module for node in nodes for each in node_bindings(node)}
@@ -63,8 +75,14 @@ def take_snapshot(context: CheckContext) -> Snapshot:
         for package in context.interfaces.definitions or ()
         for name, text in package.sources.items()
     }
-    code = {name: sources.digest(name) for name in modules}
-    snapshot = Snapshot(spec, context.system.positions, code, definitions)
+    reachable = sources.reachable(modules)
+    snapshot = Snapshot(
+        spec,
+        context.system.positions,
+        {name: sources.digest(name) for name in reachable},
+        {name: sources.text(name) for name in reachable},
+        definitions,
+    )
     for node in nodes:
         snapshot.overrides(node)
     return snapshot
@@ -77,24 +95,27 @@ class _Sources:
         self._finder = finder
         self._imported: dict[str, tuple[str, ...]] = {}
 
+    def reachable(self, names: Iterable[str]) -> list[str]:
+        """Return modules and all of the project that they import, at first or second hand."""
+        found = dict.fromkeys(names)
+        pending = list(found)
+        while pending:
+            new = [each for each in self._imports(pending.pop()) if each not in found]
+            found |= dict.fromkeys(new)
+            pending += new
+        return sorted(found)
+
     def digest(self, name: str) -> str:
         """Return the digest of a module and of those of the project that it imports."""
-        found = {name: None}
-        pending = [name]
-        while pending:
-            for each in self._imports(pending.pop()):
-                if each not in found:
-                    found[each] = None
-                    pending.append(each)
         digest = hashlib.sha256()
-        for each in sorted(found):
-            digest.update(f'{each}\0'.encode())
-            digest.update('\n'.join(self._lines(each)).encode(errors='surrogatepass'))
+        for each in self.reachable([name]):
+            digest.update(f'{each}\0{self.text(each)}\0'.encode(errors='surrogatepass'))
         return digest.hexdigest()
 
-    def _lines(self, name: str) -> tuple[str, ...]:
+    def text(self, name: str) -> str:
+        """Return the source of a module."""
         module = self._finder.find(name)
-        return () if isinstance(module, MissingModule) else module.lines
+        return '' if isinstance(module, MissingModule) else '\n'.join(module.lines) + '\n'
 
     def _imports(self, name: str) -> tuple[str, ...]:
         if name not in self._imported:

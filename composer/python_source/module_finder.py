@@ -78,6 +78,14 @@ class ModuleFinder:
             self._found[name] = self._find(name)
         return self._found[name]
 
+    def read_files(self) -> list[Path]:
+        """Return the files of the modules of the project that have been read."""
+        return [
+            module.path
+            for name, module in self._found.items()
+            if isinstance(module, ModuleSource) and module.path and self.is_of_project(name)
+        ]
+
     def has(self, name: str) -> bool:
         """Return whether there is a module or package of this name."""
         return not self._locate(name).missing

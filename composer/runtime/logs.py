@@ -57,6 +57,13 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
             set_logger_level(name, severity)
 
 
+def set_level(node: NodeSpec) -> None:
+    """Give the logger of a node the level that the file says now; without one, the default."""
+    name = _logger_name(node)
+    level = LoggingSeverity[node.log_level.upper()] if node.log_level else LoggingSeverity.UNSET
+    set_logger_level(name, level)
+
+
 def warn_of_unknown_loggers(spec: SystemSpec, requests: Sequence[str]) -> None:
     """Log a warning for each level that the command line sets for a node that there is not.
 

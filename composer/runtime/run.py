@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from composer import signals
@@ -18,11 +18,12 @@ from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+    from contextlib import AbstractContextManager
     from types import FrameType
 
     from composer.language.specs import SystemSpec
-    from composer.yaml_text.positions import SourceMap
+    from composer.runtime.rewiring.reading import Reading
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
@@ -36,10 +37,9 @@ _EXIT_SEC = 10.0
 
 
 def run_system(
-    spec: SystemSpec,
-    positions: SourceMap,
-    functions: Mapping[str, Callable[..., Any]],
+    reading: Reading,
     *,
+    watch: Callable[[System], AbstractContextManager[object]] | None = None,
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
     ends_process: bool = False,
@@ -53,6 +53,8 @@ def run_system(
     Python code can run. A SIGINT before the system is up gives the exit code 130.
 
     Args:
+        reading: What it runs as.
+        watch: Entered with the system once it is up; left before it stops.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it.
 
@@ -63,7 +65,7 @@ def run_system(
         StartError: The system could not start.
         UsageError: The ROS arguments are wrong.
     """
-    stop = StopRequest()
+    stop, spec = StopRequest(), reading.spec
     with (
         log_levels(list(spec.nodes.values()), log_level_requests),
         _guarded(spec, ends_process=ends_process) as guardian,
@@ -71,9 +73,7 @@ def run_system(
     ):
         warn_of_unknown_loggers(spec, log_level_requests)
         system = System(
-            spec,
-            positions,
-            functions,
+            reading,
             guardian,
             ros_arguments,
             log_level_requests,
@@ -83,7 +83,8 @@ def run_system(
         try:
             system.start()
             try:
-                system.wait()
+                with watch(system) if watch else nullcontext():
+                    system.wait()
             finally:
                 # Also if a signal handler of a behaviour raised an error in this thread.
                 code, ended = system.stop()

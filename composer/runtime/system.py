@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from contextlib import suppress
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
+from composer.planning.differences import compare
 from composer.processes.guardian_client import end_marked
 from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
@@ -22,6 +23,7 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
+from composer.runtime.rewiring.rewire import Rewiring
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -29,14 +31,16 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from composer.language.specs import SystemSpec
+    from composer.planning.plan import Plan
+    from composer.planning.snapshot import Snapshot
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.yaml_text.positions import SourceMap
+    from composer.runtime.rewiring.reading import Reading
 
 _EXECUTOR_STOP_SEC = 1.0
 
@@ -45,8 +49,7 @@ class System:
     """A system that can be started once and stopped once.
 
     Args:
-        positions: Where the parts of `spec` were written.
-        functions: The behaviours, by their names.
+        reading: What it runs as.
         guardian: Ends the process if the stop takes too long. If it owns the process, that exits
             after the stop, and nothing uses ROS then.
         ros_arguments: The arguments after `--ros-args` of the command line.
@@ -60,16 +63,15 @@ class System:
 
     def __init__(
         self,
-        spec: SystemSpec,
-        positions: SourceMap,
-        functions: Mapping[str, Callable[..., Any]],
+        reading: Reading,
         guardian: GuardianClient,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
         stop_request: StopRequest | None = None,
     ) -> None:
-        self._spec = spec
+        self._reading = reading
+        spec = reading.spec
         self._guardian = guardian
         self.has_ended = False
         self._begun = monotonic()
@@ -89,7 +91,7 @@ class System:
         )
         self._graph_watcher = GraphWatcher(self._endpoints)
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
-        self._handle = self._create_handle(positions, functions, ros_arguments)
+        self._handle = self._create_handle(ros_arguments)
         self._starter = NodeStarter(self._nodes, self._handle)
         self._restarter = NodeRestarter(
             self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
@@ -107,27 +109,20 @@ class System:
         )
         self._stop_request.kill_processes = self._processes.kill_all
 
-    def _create_handle(
-        self,
-        positions: SourceMap,
-        functions: Mapping[str, Callable[..., Any]],
-        ros_arguments: Sequence[str],
-    ) -> SystemHandle:
-        spec = self._spec
+    def _create_handle(self, ros_arguments: Sequence[str]) -> SystemHandle:
+        spec = self._reading.spec
         return SystemHandle(
             context=self._context,
-            positions=positions,
+            positions=self._reading.positions,
             profiles=spec.qos,
-            functions=functions,
+            functions=self._reading.functions,
             ros_arguments=ros_arguments,
             act_on_error=self._error_policy.act,
             shutdown=self._stop_request.make,
             executor=self._executor,
             stop=self._stop_request,
             failures=ServiceFailures(),
-            without_parameter_services=frozenset(
-                node.full_name for node in spec.nodes.values() if not node.parameter_services
-            ),
+            without_parameter_services=spec.without_parameter_services,
             stop_timeout_sec=spec.shutdown_timeout_sec,
             health=None if spec.diagnostics_period_sec is None else HealthRegistry(),
         )
@@ -156,7 +151,7 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
-            self._starter.create(self._spec.nodes.values())
+            self._starter.create(self._reading.spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
             self._publish_diagnostics()
@@ -177,7 +172,7 @@ class System:
         parts = _describe_parts(self._nodes, self._processes.by_name)
         # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
-        system_logger.info(f'{self._spec.name}: {parts} ready in {elapsed:.2f} s')
+        system_logger.info(f'{self._reading.spec.name}: {parts} ready in {elapsed:.2f} s')
         self._starter.open(prompt)
         self._processes.tell_ends()
         self._parameter_services.begin()
@@ -185,6 +180,28 @@ class System:
     def wait(self) -> None:
         """Wait until a stop is requested, or nobody reads the output any more."""
         self._stop_request.wait(self._stop_if_unread)
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What it runs as, as its files say it."""
+        return self._reading.snapshot
+
+    def rewire(self, new: Reading) -> Plan:
+        """Become the system of `new`; return what was done.
+
+        Raises:
+            ComposerError: That failed, and the system is as it was.
+        """
+        with self._restarter.lock:
+            plan = compare(self._reading.snapshot, new.snapshot)
+            if self.stop_requested or not plan:
+                return plan
+            rewiring = Rewiring(
+                self._nodes, self._handle, self._starter, self._restarter, self._reading, new
+            )
+            rewiring.apply(plan)
+            self._reading = new
+        return plan
 
     def stop(self) -> tuple[int, bool]:
         """Stop the system.
@@ -207,7 +224,7 @@ class System:
 
     def _stop(self) -> bool:
         """Stop everything; return whether all behaviours have ended."""
-        timeout_sec = self._spec.shutdown_timeout_sec
+        timeout_sec = self._reading.spec.shutdown_timeout_sec
         self._error_policy.stop()
         self._parameter_services.stop()
         with self._restarter.lock:
@@ -257,10 +274,12 @@ class System:
             self.request_stop(code)
 
     def _publish_diagnostics(self) -> None:
-        health, period_sec = self._handle.health, self._spec.diagnostics_period_sec
+        health, period_sec = self._handle.health, self._reading.spec.diagnostics_period_sec
         if health is None or period_sec is None:
             return
-        publisher = DiagnosticsPublisher(self._spec.name, period_sec, health, self._overdue_calls)
+        publisher = DiagnosticsPublisher(
+            self._reading.spec.name, period_sec, health, self._overdue_calls
+        )
         try:
             publisher.start(self._context, self._handle.ros_arguments)
         except ImportError as error:

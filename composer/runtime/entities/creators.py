@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError, StartError
 from composer.runtime.entities.action_clients import ActionClient
 from composer.runtime.entities.actions import ActionServer
-from composer.runtime.entities.parameters import declare_parameters
+from composer.runtime.entities.parameters import NodeParameters
 from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
 from composer.runtime.entities.services import Service
@@ -47,12 +47,22 @@ def create_entities(nodes: Sequence[LiveNode]) -> None:
     """
     for node in nodes:
         with _failing_for(node):
-            declare_parameters(node)
+            node.parameters = NodeParameters(node)
     for section, create in CREATORS.items():
         for node in nodes:
             with _failing_for(node):
                 for spec in getattr(node.spec, section).values():
                     node.entities[section][spec.name] = create(node, spec)
+
+
+def create_entity(node: LiveNode, section: str, spec: Any) -> LiveEntity:
+    """Create one entity more of a node that runs.
+
+    Raises:
+        StartError: It cannot be created.
+    """
+    with _failing_for(node):
+        return CREATORS[section](node, spec)
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import (
@@ -29,29 +28,61 @@ if TYPE_CHECKING:
 _FLOAT_MAX = 1.7976931348623157e308
 
 
-def declare_parameters(node: LiveNode) -> None:
-    """Declare the node's parameters.
+class NodeParameters:
+    """The declared parameters of a node.
 
     Raises:
         StartError: The command line or a parameter file gives one a value that its declaration
             refuses.
     """
-    refusing = partial(_refuse_unless_chosen, node.spec.parameters)
-    node.ros.add_on_set_parameters_callback(refusing)
-    for spec in node.spec.parameters.values():
+
+    def __init__(self, node: LiveNode) -> None:
+        self._node = node
+        self._refusing = lambda changes: _refuse_unless_chosen(node.spec.parameters, changes)
+        self._asking: Callable[[list[Parameter]], SetParametersResult] | None = None
+        node.ros.add_on_set_parameters_callback(self._refusing)
+        for spec in node.spec.parameters.values():
+            self.declare(spec)
+        self.ask(node.spec.on_parameters)
+
+    def declare(self, spec: ParameterSpec) -> None:
+        """Declare a parameter.
+
+        Raises:
+            StartError: Its value is refused.
+        """
+        ros = self._node.ros
         try:
-            _declare(node.ros, spec)
+            _declare(ros, spec)
         except ParameterException as error:
             reason = str(error).removesuffix(f': {spec.name}')
-            message = f"parameter '{spec.name}' from {_origin(node.ros, spec.name)}: {reason}"
+            message = f"parameter '{spec.name}' from {_origin(ros, spec.name)}: {reason}"
             raise StartError(message) from error
-    if node.spec.on_parameters:
-        # rclpy calls the callback first that was added last, and a behaviour is not asked about
-        # what is refused anyway.
-        node.ros.remove_on_set_parameters_callback(refusing)
-        asking = _create_callback(node, node.spec.on_parameters)
-        node.ros.add_on_set_parameters_callback(asking)
-        node.ros.add_on_set_parameters_callback(refusing)
+
+    def undeclare(self, name: str) -> None:
+        """Remove a parameter, read-only ones included."""
+        ros = self._node.ros
+        loosen_parameter(ros, name)
+        ros.undeclare_parameter(name)
+
+    def ask(self, behaviour: BehaviourSpec | None) -> None:
+        """Ask this behaviour about changes from now on; `None` for nobody."""
+        ros = self._node.ros
+        if self._asking is not None:
+            ros.remove_on_set_parameters_callback(self._asking)
+            self._asking = None
+        if behaviour is not None:
+            # rclpy calls the callback first that was added last, and a behaviour is not asked
+            # about what is refused anyway.
+            ros.remove_on_set_parameters_callback(self._refusing)
+            self._asking = _create_callback(self._node, behaviour)
+            ros.add_on_set_parameters_callback(self._asking)
+            ros.add_on_set_parameters_callback(self._refusing)
+
+
+def loosen_parameter(ros: ComposedRosNode, name: str) -> None:
+    """Let a parameter have any value, until it has another descriptor; rclpy refuses to."""
+    ros._descriptors[name] = ParameterDescriptor(name=name, dynamic_typing=True)  # noqa: SLF001
 
 
 def create_descriptor(spec: ParameterSpec) -> ParameterDescriptor:

@@ -42,7 +42,13 @@ if TYPE_CHECKING:
     from rclpy.callback_groups import CallbackGroup
     from rclpy.task import Future
 
-    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec, OnError
+    from composer.language.specs import (
+        BehaviourSpec,
+        EntitySpec,
+        NodeSpec,
+        OnError,
+        ParameterSpec,
+    )
     from composer.runtime.health.statistics import EntityHealth
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.system_handle import SystemHandle
@@ -64,6 +70,19 @@ class LiveEntity(Protocol):
 
     def destroy(self) -> None:
         """Remove it from the node and the graph; its behaviours are not called any more."""
+
+
+class NodeParameters(Protocol):
+    """The declared parameters of a node that runs."""
+
+    def declare(self, spec: ParameterSpec) -> None:
+        """Declare a parameter."""
+
+    def undeclare(self, name: str) -> None:
+        """Remove a parameter."""
+
+    def ask(self, behaviour: BehaviourSpec | None) -> None:
+        """Ask this behaviour about changes from now on."""
 
 
 class BehaviourOptions(Protocol):
@@ -93,6 +112,7 @@ class LiveNode:
         endpoints: Its publishers and subscriptions.
         suspended: Behaviours that are ended before `on_stop`.
         limits: How long behaviours may run, by their owners.
+        parameters: Its declared parameters, once its entities are created.
     """
 
     spec: NodeSpec
@@ -111,6 +131,7 @@ class LiveNode:
     limits: dict[Owner, HangLimit] = field(default_factory=dict)
     running: RunningCalls = field(default_factory=RunningCalls)
     has_begun: bool = False
+    parameters: NodeParameters | None = None
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _views: dict[Owner, Node] = field(default_factory=dict)
     _is_destroyed: bool = False

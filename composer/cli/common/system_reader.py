@@ -1,0 +1,67 @@
+"""The system of a command line as it is read before it runs, and again after each edit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.checks.checker import check_in_context, create_context
+from composer.checks.ignore_comments import IgnoreComments
+from composer.cli.common.file_selection import load_given
+from composer.cli.common.import_check import import_behaviours
+from composer.cli.common.output import show_findings
+from composer.diagnostics import has_errors
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.planning.snapshot import Snapshot
+    from composer.runtime.rewiring.reading import Reading
+
+
+@record
+class SystemReader:
+    """Reads a system.
+
+    Attributes:
+        paths: The file and its layers.
+        words: Values for the arguments that the file declares.
+        set_values: Values to change.
+    """
+
+    paths: Sequence[Path]
+    words: Sequence[str]
+    set_values: Sequence[str]
+
+    def check(self) -> CheckContext | None:
+        """Return a system without errors; of one with errors these are printed.
+
+        Raises:
+            UsageError: The arguments do not fit the file.
+        """
+        system = load_given(self.paths, self.words, self.set_values)
+        context = create_context(system, InterfaceCatalogue())
+        return None if _report(check_in_context(system, context)) else context
+
+
+def import_reading(context: CheckContext, snapshot: Snapshot) -> Reading | None:
+    """Import the behaviours of a system; if they have errors, print these and return `None`."""
+    from composer.runtime.rewiring.reading import Reading
+
+    system = context.system
+    functions, findings = import_behaviours(context)
+    # The check has already reported comments that silence nothing.
+    comments = IgnoreComments(system.positions.source)
+    if _report([each for each in findings if not comments.silence(each)]):
+        return None
+    return Reading(snapshot.spec, system.positions, functions, snapshot)
+
+
+def _report(findings: list[Diagnostic]) -> bool:
+    """Print findings; return whether any is an error."""
+    show_findings(findings)
+    return has_errors(findings)

@@ -1,0 +1,145 @@
+"""Edits of a system's files change the system while it runs."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from composer.cli.common.system_reader import import_reading
+from composer.errors import ComposerError
+from composer.language.paths import resolve_path
+from composer.planning.snapshot import take_snapshot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from composer.checks.context import CheckContext
+    from composer.cli.common.system_reader import SystemReader
+    from composer.planning.plan import Plan
+    from composer.runtime.system import System
+
+# Changes of these files may change a system; parameter files may have any name.
+_SUFFIXES = ('.yaml', '.yml', '.py', '.msg', '.srv', '.action')
+# An editor writes a file in several steps: the last one counts.
+_STEP_MS = 10
+_DEBOUNCE_MS = 100
+
+
+class Reloader:
+    """Reads the files of a running system again, and lets it become what they say.
+
+    Args:
+        reader: Reads them.
+        context: What they said when it started.
+        prefixes: Where the interface packages are that were built for the system.
+    """
+
+    def __init__(
+        self, reader: SystemReader, context: CheckContext, prefixes: Sequence[Path]
+    ) -> None:
+        self._reader = reader
+        self._prefixes = prefixes
+        self._files = _list_files(reader, context)
+        self._lock = threading.Lock()
+
+    def reload(self, system: System) -> Plan | None:
+        """Read the files, and rewire the system; return what was done, `None` if that failed.
+
+        Errors are logged or printed; after one the system is as it was.
+        """
+        from composer.runtime.logs import system_logger
+
+        with self._lock:
+            begun = monotonic()
+            try:
+                plan = self._rewire(system)
+            except ComposerError as error:
+                system_logger.error(f'not reloaded: {error}')
+                return None
+            if plan is None:
+                system_logger.error('not reloaded: the system runs on as it was')
+            elif plan:
+                took_ms = (monotonic() - begun) * 1000
+                system_logger.info(f'reloaded in {took_ms:.0f} ms: {summarize(plan)}')
+            return plan
+
+    def _rewire(self, system: System) -> Plan | None:
+        from composer.runtime.rewiring.fresh_modules import fresh_modules
+
+        context = self._reader.check()
+        if context is None:
+            return None
+        self._files |= _list_files(self._reader, context)
+        snapshot = take_snapshot(context, self._prefixes)
+        stale = snapshot.stale_modules(system.snapshot)
+        with fresh_modules(stale, snapshot.sources) as put_back:
+            reading = import_reading(context, snapshot)
+            if reading is None:
+                put_back()
+                return None
+            plan = system.rewire(reading)
+        self._files = _list_files(self._reader, context)
+        return plan
+
+    @contextmanager
+    def watching(self, system: System) -> Iterator[None]:
+        """Reload the system whenever a file changes, until the block ends."""
+        ended = threading.Event()
+        thread = threading.Thread(
+            target=self._watch, args=(system, ended), name='composer-watch-files', daemon=True
+        )
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
+
+    def _watch(self, system: System, ended: threading.Event) -> None:
+        from watchfiles import watch
+
+        while not ended.is_set():
+            folders = {path.parent for path in self._files}
+            changes = watch(
+                *folders,
+                watch_filter=lambda _change, path: self._matters(path),
+                stop_event=ended,
+                step=_STEP_MS,
+                debounce=_DEBOUNCE_MS,
+                rust_timeout=500,
+                recursive=False,
+            )
+            for _ in changes:
+                self.reload(system)
+                if folders != {path.parent for path in self._files}:
+                    break
+
+    def _matters(self, path: str) -> bool:
+        return path.endswith(_SUFFIXES) or Path(path) in self._files
+
+
+def summarize(plan: Plan) -> str:
+    """Return `~1 timer, +2 subscriptions`."""
+    counts = Counter((each.action, each.noun) for each in plan.operations)
+    return ', '.join(
+        f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
+        for (action, noun), count in counts.items()
+    )
+
+
+def _list_files(reader: SystemReader, context: CheckContext) -> set[Path]:
+    """Return the files that a system is read from, as their real paths."""
+    spec = context.spec
+    files = {*reader.paths, *context.system.files, *context.modules.read_files()}
+    named = [
+        *(each.parameter_files for each in spec.nodes.values()),
+        *(each.parameter_files for each in spec.processes.values()),
+    ]
+    files |= {resolve_path(text, Path()) for texts in named for text in texts}
+    for package in context.interfaces.definitions or ():
+        files |= {package.folder / name for name in package.sources}
+    return {path.resolve() for path in files}
