@@ -42,6 +42,7 @@ class ExternalProcess:
         run: The last one; `None` before the first.
         restarts: How often it was started again.
         is_done: Whether it has ended for good.
+        is_leaving: Whether the system has let go of it.
     """
 
     def __init__(self, spec: ProcessSpec) -> None:
@@ -49,6 +50,7 @@ class ExternalProcess:
         self.run: ProcessRun | None = None
         self.restarts = 0
         self.is_done = False
+        self.is_leaving = False
         # A process that keeps dying is started again ever more slowly, as nodes are.
         self.backoff = Backoff(least_sec=spec.restart_delay_sec)
 

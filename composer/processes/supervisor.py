@@ -45,10 +45,10 @@ class ProcessSupervisor:
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line.
-        is_alone: Whether the system has no nodes.
 
     Attributes:
         by_name: The processes.
+        is_alone: Whether the system has no nodes.
     """
 
     def __init__(
@@ -59,8 +59,6 @@ class ProcessSupervisor:
         timeout_sec: float,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
-        *,
-        is_alone: bool = False,
     ) -> None:
         self.by_name = {spec.name: ExternalProcess(spec) for spec in specs}
         self._logger = logger
@@ -68,7 +66,7 @@ class ProcessSupervisor:
         self._timeout_sec = timeout_sec
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
-        self._is_alone = is_alone
+        self.is_alone = False
         self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
@@ -94,6 +92,17 @@ class ProcessSupervisor:
         if answer['kind'] == 'failed':
             self._runs.pop(run.number, None)
             raise _start_error(process.spec, answer)
+
+    def remove(self, name: str) -> None:
+        """End a process, and all that it has started, and forget it."""
+        process = self.by_name.pop(name)
+        process.is_leaving = True
+        run, tools = process.run, self._tools
+        if run is None or tools is None or run.gone.is_set():
+            return
+        timeout_sec = self._timeout_of(process.spec)
+        tools.reaper.stop(run.number, signal.Signals[process.spec.stop_signal], timeout_sec)
+        run.gone.wait(timeout_sec + _KILLED_SEC)
 
     def tell_ends(self) -> None:
         """Log from now on how processes have ended: the system has started, or never will."""
@@ -199,7 +208,7 @@ class ProcessSupervisor:
         run.output_ended.wait(_LAST_OUTPUT_SEC)
         process, name = run.process, run.process.spec.name
         end = f"process '{name}' {describe_end(code)}"
-        if self._stopping.is_set():
+        if self._stopping.is_set() or process.is_leaving:
             expected = (0, -signal.Signals[process.spec.stop_signal])
             self._log(end, is_error=code not in expected and not run.was_killed)
             return
@@ -217,7 +226,7 @@ class ProcessSupervisor:
         delay_sec = process.backoff.next_delay_sec()
         self._has_started.wait(_LONGEST_START_SEC)
         self._log(f'{end}; it is started again in {delay_sec:g} s', is_error=code != 0)
-        if not self._stopping.wait(delay_sec):
+        if not (self._stopping.wait(delay_sec) or process.is_leaving):
             self._restart(process)
 
     def _restart(self, process: ExternalProcess) -> None:
@@ -236,7 +245,7 @@ class ProcessSupervisor:
         """End a system without nodes whose processes have all ended."""
         self._has_started.wait()
         processes = self.by_name.values()
-        if self._is_alone and all(each.is_done for each in processes):
+        if self.is_alone and all(each.is_done for each in processes):
             self._logger.info('all processes have ended: the system ends')
             have_succeeded = all(each.run is not None and each.run.code == 0 for each in processes)
             self._end_system(ExitCode.DONE if have_succeeded else ExitCode.FAILED)

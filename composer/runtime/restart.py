@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from composer.errors import ComposerError, StartError
+from composer.errors import ComposerError
 from composer.processes.backoff import Backoff
 from composer.runtime.logs import system_logger
 from composer.runtime.stop import stop_node
@@ -13,7 +13,7 @@ from composer.runtime.stop import stop_node
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.language.specs import NodeSpec, OnError
+    from composer.language.specs import OnError
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.start import NodeStarter
@@ -99,28 +99,12 @@ class NodeRestarter:
             if self._system.stop.is_set or not self._end(old):
                 return
             try:
-                self.add(old.spec)
+                self._build(old)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
                 self._system.act_on_error(full_name, 'restart')
                 return
         system_logger.warning(f"node '{old.spec.key}' was restarted")
-
-    def add(self, spec: NodeSpec) -> None:
-        """Create and start a node, and let its behaviours be called.
-
-        Raises:
-            StartError: It could not be created or started; it is gone again.
-        """
-        (node,) = self._starter.create([spec])
-        self._system.executor.add_node(node.ros)
-        try:
-            self._starter.run_on_start(node)
-        except ComposerError:
-            self.remove(spec.full_name)
-            raise
-        self._starter.open([node])
-        node.ros.start_parameter_services()
 
     def remove(self, full_name: str) -> bool:
         """Stop and remove a node; return whether it is gone: one that hangs stays."""
@@ -129,16 +113,12 @@ class NodeRestarter:
             del self._nodes[full_name]
         return has_ended
 
-    def replace(self, node: LiveNode, spec: NodeSpec) -> None:
-        """Stop a node, and start another one of its name.
-
-        Raises:
-            StartError: The old one hangs, or the new one could not start.
-        """
-        if not self._end(node):
-            message = f"node '{node.spec.key}' cannot be recreated, because it hangs"
-            raise StartError(message)
-        self.add(spec)
+    def _build(self, old: LiveNode) -> None:
+        (node,) = self._starter.create([old.spec])
+        self._system.executor.add_node(node.ros)
+        self._starter.run_on_start(node)
+        self._starter.open([node])
+        node.ros.start_parameter_services()
 
     def _end(self, node: LiveNode) -> bool:
         """Remove a node; return whether a new one may take its place."""
@@ -149,7 +129,7 @@ class NodeRestarter:
         if not has_ended:
             executor.wake()
             hanging = ', '.join(str(call.owner) for call in node.running.calls())
-            system_logger.error(f"node '{name}' cannot be restarted, because it hangs: {hanging}")
+            system_logger.error(f"node '{name}' hangs, and is left as it is: {hanging}")
             return False
         executor.remove_node(node.ros)
         node.destroy()

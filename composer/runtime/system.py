@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
+    from composer.processes.external_process import ExternalProcess
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.health.unmatched import TopicEndpoint
@@ -105,8 +106,8 @@ class System:
             spec.shutdown_timeout_sec,
             ros_arguments,
             log_levels,
-            is_alone=not spec.nodes,
         )
+        self._processes.is_alone = not spec.nodes
         self._stop_request.kill_processes = self._processes.kill_all
 
     def _create_handle(self, ros_arguments: Sequence[str]) -> SystemHandle:
@@ -162,7 +163,7 @@ class System:
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
-            prompt = self._start_all()
+            prompt = self._start_all(self._nodes.values(), self._processes.by_name.values())
         except BaseException:
             self.stop()
             raise
@@ -186,21 +187,34 @@ class System:
         """What it runs as, as its files say it."""
         return self._reading.snapshot
 
-    def rewire(self, new: Reading) -> Plan:
+    def rewire(self, new: Reading, *, aborts_goals: bool = False) -> Plan:
         """Become the system of `new`; return what was done.
+
+        Args:
+            aborts_goals: Whether goals of actions that go are aborted, not waited for.
 
         Raises:
             ComposerError: That failed, and the system is as it was.
         """
+        plan = compare(self._reading.snapshot, new.snapshot)
+        rewiring = Rewiring(
+            self._nodes,
+            self._processes,
+            self._handle,
+            self._starter,
+            self._restarter,
+            self._start_more,
+            self._reading,
+            new,
+        )
+        rewiring.wait_for_goals(plan, aborts=aborts_goals)
         with self._restarter.lock:
-            plan = compare(self._reading.snapshot, new.snapshot)
             if self.stop_requested or not plan:
                 return plan
-            rewiring = Rewiring(
-                self._nodes, self._handle, self._starter, self._restarter, self._reading, new
-            )
             rewiring.apply(plan)
             self._reading = new
+            self._processes.is_alone = not new.spec.nodes
+            self._hang_watcher.follow(_limits(new.spec))
         return plan
 
     def stop(self) -> tuple[int, bool]:
@@ -242,15 +256,21 @@ class System:
             self._end_graph()
         return ended
 
-    def _start_all(self) -> list[LiveNode]:
-        """Start all processes and nodes; return the nodes whose gates are still to be opened."""
-        for process in self._processes.by_name.values():
+    def _start_all(
+        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+    ) -> list[LiveNode]:
+        """Start processes and nodes; return the nodes whose gates are still to be opened.
+
+        Raises:
+            StartError: One could not start.
+        """
+        for process in processes:
             if not (process.spec.wait_for or self.stop_requested):
                 self._processes.start(process)
-        prompt = [node for node in self._nodes.values() if not node.spec.wait_for]
+        prompt = [node for node in nodes if not node.spec.wait_for]
         for node in prompt:
             self._starter.run_on_start(node)
-        waiters = list_waiters(self._nodes, self._processes, self._start_late)
+        waiters = list_waiters(nodes, processes, self._start_late, self._processes.start)
         if not waiters or self.stop_requested:
             return prompt
         self._starter.open(prompt)
@@ -259,6 +279,21 @@ class System:
         )
         starter.start_all(waiters, self._stop_request)
         return []
+
+    def _start_more(
+        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+    ) -> None:
+        """Start nodes and processes beside those that run.
+
+        Raises:
+            StartError: One could not start.
+        """
+        for node in nodes:
+            self._executor.add_node(node.ros)
+            node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
+        self._starter.open(self._start_all(nodes, processes))
+        for node in nodes:
+            node.ros.start_parameter_services()
 
     def _start_late(self, node: LiveNode) -> None:
         self._starter.run_on_start(node)

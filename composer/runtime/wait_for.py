@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.processes.external_process import ExternalProcess
-    from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.stop_request import StopRequest
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -168,13 +167,14 @@ class WaitingStarter:
 
 
 def list_waiters(
-    nodes: Mapping[str, LiveNode],
-    processes: ProcessSupervisor,
+    nodes: Iterable[LiveNode],
+    processes: Iterable[ExternalProcess],
     start_node: Callable[[LiveNode], None],
+    start_process: Callable[[ExternalProcess], None],
 ) -> list[Waiter]:
-    """Return the nodes and processes of a system that have conditions."""
-    waiting_processes = [each for each in processes.by_name.values() if each.spec.wait_for]
-    waiting_nodes = [each for each in nodes.values() if each.spec.wait_for]
+    """Return those of the nodes and processes that have conditions."""
+    waiting_processes = [each for each in processes if each.spec.wait_for]
+    waiting_nodes = [each for each in nodes if each.spec.wait_for]
     return [
         *(
             Waiter(
@@ -182,7 +182,7 @@ def list_waiters(
                 process.spec.wait_for,
                 partial(_resolve_of_process, process.spec),
                 partial(_log_of_process, process.spec),
-                partial(processes.start, process),
+                partial(start_process, process),
             )
             for process in waiting_processes
         ),

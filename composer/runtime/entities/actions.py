@@ -63,6 +63,21 @@ class ActionServer(RosActionServer):
 
         node.at_destruction.append(self.destroy)
 
+    def retire(self, *, is_retired: bool, aborts: bool = False) -> None:
+        """Accept no more goals, or again.
+
+        Args:
+            aborts: Whether to abort the goals in flight: functions run to their end, generators
+                to their next `yield`.
+        """
+        self._queue.is_closed = is_retired
+        self._queue.aborts = is_retired and aborts
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether a goal is in flight."""
+        return bool(self._tokens)
+
     def change(self, spec: ActionSpec) -> None:
         """See `LiveEntity`: goals that have begun end as they began."""
         self._queue.concurrency = spec.concurrency
@@ -248,7 +263,12 @@ class _Execution:
             goal.publish_feedback(self._to_feedback(payload))
 
     def _must_end(self, goal: Any) -> bool:
-        return goal.is_cancel_requested or self.is_ending() or self._queue.is_superseded(goal)
+        return (
+            goal.is_cancel_requested
+            or self.is_ending()
+            or self._queue.aborts
+            or self._queue.is_superseded(goal)
+        )
 
     def _end_early(self, goal: Any) -> bool:
         """Give a goal that may not go on its final state; return whether it was such a one."""

@@ -20,10 +20,14 @@ class GoalQueue:
 
     Attributes:
         concurrency: What becomes of goals that come while one runs.
+        is_closed: Whether no more goals are accepted.
+        aborts: Whether those that run are to end.
     """
 
     def __init__(self, concurrency: Concurrency, start: Callable[[Any], None]) -> None:
         self.concurrency = concurrency
+        self.is_closed = False
+        self.aborts = False
         self._start = start
         self._running: dict[bytes, Any] = {}
         self._waiting: deque[Any] = deque()
@@ -33,7 +37,7 @@ class GoalQueue:
     def has_room(self) -> bool:
         """Return whether another goal may be accepted now."""
         with self._lock:
-            return self.concurrency != 'reject' or not self._running
+            return not self.is_closed and (self.concurrency != 'reject' or not self._running)
 
     def add(self, goal: Any) -> None:
         """Run an accepted goal now or later."""

@@ -130,11 +130,16 @@ class HangWatcher(Watcher):
         limits_sec: Iterable[float | None],
         errors: ErrorReporter,
     ) -> None:
-        shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
-        pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
-        super().__init__('composer-watch', self._check_calls, min(pause_sec, _LONGEST_PAUSE_SEC))
+        super().__init__('composer-watch', self._check_calls, _LONGEST_PAUSE_SEC)
         self._nodes = nodes
         self._errors = errors
+        self.follow(limits_sec)
+
+    def follow(self, limits_sec: Iterable[float | None]) -> None:
+        """Check as often as these limits of all entities need."""
+        shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
+        pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
+        self._pause_sec = min(pause_sec, _LONGEST_PAUSE_SEC)
 
     def _check_calls(self) -> None:
         for node in self._nodes():

@@ -205,6 +205,17 @@ class HealthRegistry:
         """
         return self._entities.setdefault((node, owner), EntityHealth())
 
+    def forget(self, node: str, owns: Callable[[Owner], bool]) -> None:
+        """Forget entities of a node that are gone.
+
+        Args:
+            node: The node's full name.
+            owns: Whether an owner's behaviours are among them.
+        """
+        for key in list(self._entities):
+            if key[0] == node and owns(key[1]):
+                del self._entities[key]
+
     def reports(
         self, period_sec: float, overdue: Iterable[tuple[str, RunningCall]], now_ns: int
     ) -> dict[EntityKey, EntityReport]:

@@ -32,14 +32,17 @@ class Gate:
         is_open: Whether all of them may: from the start of all nodes to their stop.
         serves: Whether those of services and actions may: from the end of the node's own
             `on_start` to its `on_stop`.
+        is_paused: Whether none begins for now, while entities are exchanged; what has begun goes
+            on.
     """
 
-    __slots__ = ('_stop', 'is_open', 'serves')
+    __slots__ = ('_stop', 'is_open', 'is_paused', 'serves')
 
     def __init__(self, stop: StopRequest) -> None:
         self._stop = stop
         self.is_open = False
         self.serves = False
+        self.is_paused = False
 
     def open(self) -> None:
         """Let all behaviours run."""
@@ -54,6 +57,8 @@ class Gate:
     def allows(self, entity: Any) -> bool:
         """Return whether the callback of an entity may begin."""
         # Not `allows_events`: this is asked twice for every callback.
+        if self.is_paused:
+            return False
         return (self.is_open and not self._stop.is_set) or (
             self.serves and isinstance(entity, (Service, ActionServer))
         )

@@ -300,6 +300,23 @@ class LiveNode:
         for end in self.endpoints:
             end.losses.flush()
 
+    def forget(self, noun: str, name: str) -> None:
+        """Forget what is known of an entity that is gone: its `own_state`, limit and health."""
+
+        def owns(owner: Owner) -> bool:
+            return (owner.kind, owner.name) == (noun, name)
+
+        for known in (self.limits, self._views):
+            for owner in filter(owns, list(known)):
+                del known[owner]
+        if self.system.health is not None:
+            self.system.health.forget(self.full_name, owns)
+
+    def forget_all(self) -> None:
+        """Forget the health of all its entities: it is gone for good."""
+        if self.system.health is not None:
+            self.system.health.forget(self.spec.full_name, lambda _owner: True)
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:

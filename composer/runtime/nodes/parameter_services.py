@@ -68,7 +68,8 @@ class ParameterServiceStarter:
                 if self._ended.is_set():
                     return
                 begun = monotonic()
-                _start_services(self._nodes[name])
+                if node := self._nodes.get(name):
+                    _start_services(node)
                 took_sec = monotonic() - begun
             self._ended.wait(_PAUSE_FACTOR * took_sec)
 

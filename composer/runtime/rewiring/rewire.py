@@ -1,7 +1,8 @@
 """Applies a plan to a running system: all of it, or nothing.
 
-What may fail comes first, and what has been done is undone in reverse if it does. What goes, goes
-last.
+What may fail comes first, and is undone in reverse if anything does. What goes, goes last; only
+nodes and processes that are recreated end before their successors begin, because two of a name, or
+of one device, cannot be.
 """
 
 from __future__ import annotations
@@ -9,77 +10,122 @@ from __future__ import annotations
 import copy
 from contextlib import suppress
 from functools import partial
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.errors import ComposerError
+from composer.errors import StartError
 from composer.planning.plan import Action
+from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Iterable
 
     from composer.language.specs import NodeSpec
     from composer.planning.plan import Operation, Plan
+    from composer.processes.supervisor import ProcessSupervisor
+    from composer.runtime.entities.actions import ActionServer
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import NodeStarter
 
-
-class RewiringError(ComposerError):
-    """A plan could not be applied; the system is as it was."""
+_POLL_SEC = 0.02
+_GOING = (Action.RECREATE, Action.REMOVE)
+_COMING = (Action.RECREATE, Action.ADD)
 
 
 class Rewiring:
     """One plan on its way into a running system.
 
     Args:
+        start: Starts nodes and processes that were created.
         old: What the system runs as.
         new: What it is to run as.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913, PLR0917 - the parts of a system
         self,
         nodes: dict[str, LiveNode],
+        processes: ProcessSupervisor,
         handle: SystemHandle,
         starter: NodeStarter,
         restarter: NodeRestarter,
+        start: Callable[[Collection[LiveNode], Collection[ExternalProcess]], None],
         old: Reading,
         new: Reading,
     ) -> None:
         self._nodes = nodes
+        self._processes = processes
         self._handle = handle
         self._starter = starter
         self._restarter = restarter
+        self._start = start
         self._old, self._new = old, new
-        self._undo: list[Callable[[], object]] = []
-        self._finish: list[Callable[[], object]] = []
         self._before = {node.full_name: node for node in old.spec.nodes.values()}
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
+        self._undo: list[Callable[[], object]] = []
+        self._finish: list[Callable[[], object]] = []
+
+    def wait_for_goals(self, plan: Plan, *, aborts: bool) -> None:
+        """Wait until no goal is in flight of an action that goes; it accepts no more.
+
+        Args:
+            aborts: Whether the goals are aborted.
+        """
+        servers = list(self._going_actions(plan))
+        for server in servers:
+            server.retire(is_retired=True, aborts=aborts)
+            self._undo.append(partial(server.retire, is_retired=False))
+        was_told = False
+        while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
+            if not was_told:
+                was_told = True
+                system_logger.info('reload: waiting for the goals in flight of actions that go…')
+            sleep(_POLL_SEC)
 
     def apply(self, plan: Plan) -> None:
         """Do all that a plan says.
 
         Raises:
-            RewiringError: Something failed, and everything is as before.
+            ComposerError: Something failed, and everything is as before.
         """
         try:
+            self._refuse_restart(plan)
             self._replace_reading()
-            self._apply_to_nodes(plan)
-            self._apply_to_entities(plan)
-        except BaseException as error:
+            self._exchange_nodes_and_processes(plan)
+            self._change_nodes(plan)
+        except BaseException:
             self._undo_all()
-            if isinstance(error, ComposerError):
-                raise RewiringError(str(error), help=error.help) from error
             raise
         for finish in self._finish:
             finish()
+
+    def _going_actions(self, plan: Plan) -> Iterable[ActionServer]:
+        for operation in plan.operations:
+            full_name, section, name = operation.target
+            node = self._nodes.get(full_name)
+            if (
+                node is None
+                or operation.action not in _GOING
+                or section not in ('nodes', 'actions')
+            ):
+                continue
+            actions: dict[str, Any] = node.entities['actions']
+            yield from actions.values() if section == 'nodes' else [actions[name]]
+
+    def _refuse_restart(self, plan: Plan) -> None:
+        for operation in plan.operations:
+            if operation.noun == 'system' and operation.action is Action.RECREATE:
+                changes = ' and '.join(sorted({each.key for each in operation.changes}))
+                message = f'{changes} cannot change while the system runs: {operation.reason}'
+                raise StartError(message, help='stop the system, and start it again')
 
     def _undo_all(self) -> None:
         for undo in reversed(self._undo):
@@ -96,49 +142,119 @@ class Rewiring:
             handle.positions = reading.positions
             handle.profiles = spec.qos
             handle.functions = reading.functions
-            handle.stop_timeout_sec = spec.shutdown_timeout_sec
             handle.without_parameter_services = spec.without_parameter_services
 
-        self._undo.append(lambda: put(self._old))
+        self._undo.append(partial(put, self._old))
         put(self._new)
 
-    def _apply_to_nodes(self, plan: Plan) -> None:
-        own = [each for each in plan.operations if each.target[1] == 'nodes']
-        for operation in own:
-            full_name = operation.target[0]
-            if operation.action is Action.REMOVE:
-                self._finish.append(partial(self._restarter.remove, full_name))
-            elif operation.action is Action.ADD:
-                self._undo.append(partial(self._restarter.remove, full_name))
-                self._restarter.add(self._after[full_name])
-            elif operation.action is Action.RECREATE:
-                self._recreate(self._nodes[full_name], self._after[full_name])
-        for full_name, spec in self._after.items():
-            self._change_node(self._nodes[full_name], spec)
+    def _exchange_nodes_and_processes(self, plan: Plan) -> None:
+        def targets(section: str, *actions: Action) -> list[str]:
+            which = 0 if section == 'nodes' else 2
+            return [
+                each.target[which]
+                for each in plan.operations
+                if each.target[1] == section and each.action in actions
+            ]
 
-    def _recreate(self, node: LiveNode, spec: NodeSpec) -> None:
-        before, state = node.spec, node.behaviour_node.state
-        self._restarter.replace(node, spec)
+        nodes = self._nodes
+        self._end_nodes(targets('nodes', Action.RECREATE))
+        self._end_processes(targets('processes', Action.RECREATE))
+        self._begin(targets('nodes', *_COMING), targets('processes', *_COMING))
+        for name in targets('processes', Action.CHANGE):
+            process = self._processes.by_name[name]
+            self._undo.append(partial(setattr, process, 'spec', process.spec))
+            process.spec = self._new.spec.processes[name]
+        for full_name in targets('nodes', Action.REMOVE):
+            self._finish.append(partial(self._restarter.remove, full_name))
+            self._finish.append(partial(nodes[full_name].forget_all))
+        for name in targets('processes', Action.REMOVE):
+            self._finish.append(partial(self._processes.remove, name))
 
-        def put_back() -> None:
-            self._restarter.replace(self._nodes[before.full_name], before)
-            self._nodes[before.full_name].behaviour_node.state.__dict__.update(state.__dict__)
+    def _end_nodes(self, names: Iterable[str]) -> None:
+        """End nodes that are recreated; to undo that, they begin again with their state."""
+        for full_name in names:
+            node = self._nodes[full_name]
+            if not self._restarter.remove(full_name):
+                message = f"node '{node.spec.key}' cannot be recreated, because it hangs"
+                raise StartError(message)
+            self._undo.append(partial(self._begin_again, node))
 
-        self._undo.append(put_back)
+    def _begin_again(self, node: LiveNode) -> None:
+        (again,) = self._starter.create([node.spec])
+        vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
+        self._start([again], [])
 
-    def _change_node(self, node: LiveNode, spec: NodeSpec) -> None:
-        """Let a node have another record, and the state that it declares."""
-        before = node.spec
-        if before is spec:
+    def _end_processes(self, names: Iterable[str]) -> None:
+        for name in names:
+            spec = self._processes.by_name[name].spec
+            self._processes.remove(name)
+            self._undo.append(partial(self._start_process, spec))
+
+    def _start_process(self, spec: Any) -> None:
+        self._processes.by_name[spec.name] = process = ExternalProcess(spec)
+        self._start([], [process])
+
+    def _begin(self, node_names: list[str], process_names: list[str]) -> None:
+        """Create and start nodes and processes; each waits for what its `wait_for` names."""
+        if not (node_names or process_names):
             return
-        state = vars(node.behaviour_node.state)
+
+        def remove_all() -> None:
+            for name in node_names:
+                if name in self._nodes:
+                    self._restarter.remove(name)
+            for name in process_names:
+                if name in self._processes.by_name:
+                    self._processes.remove(name)
+
+        self._undo.append(remove_all)
+        nodes = self._starter.create(self._after[name] for name in node_names)
+        processes = [ExternalProcess(self._new.spec.processes[name]) for name in process_names]
+        self._processes.by_name.update({each.spec.name: each for each in processes})
+        self._start(nodes, processes)
+
+    def _change_nodes(self, plan: Plan) -> None:
+        """Change what runs on: records, state, parameters and entities."""
+        changed = {each.target[0] for each in plan.operations if each.target[0]}
+        for full_name, spec in self._after.items():
+            node = self._nodes[full_name]
+            if node.spec is spec:
+                continue
+            if full_name in changed:
+                self._pause(node)
+            self._replace_record(node, spec)
+        for kind in ENTITY_KINDS:
+            for operation in plan.operations:
+                if operation.target[1] == kind.section:
+                    self._change_entity(operation)
+        for operation in plan.operations:
+            if operation.target[1] == 'nodes' and operation.action is Action.CHANGE:
+                self._change_node(self._nodes[operation.target[0]], operation)
+
+    def _pause(self, node: LiveNode) -> None:
+        """Let no behaviour of a node begin while its entities are exchanged."""
+
+        def go_on() -> None:
+            node.gate.is_paused = False
+            self._handle.executor.wake()
+
+        node.gate.is_paused = True
+        self._undo.append(go_on)
+        # Before nodes are removed, which may take long.
+        self._finish.insert(0, go_on)
+
+    def _replace_record(self, node: LiveNode, spec: NodeSpec) -> None:
+        """Let a node have another record, and the state that this declares."""
+        before, state = node.spec, vars(node.behaviour_node.state)
         gone = {
-            key: state.pop(key) for key in before.state if key not in spec.state if key in state
+            key: state.pop(key) for key in before.state if key not in spec.state and key in state
         }
-        come = {key: spec.state[key] for key in spec.state if key not in before.state}
-        state.update(
-            {key: copy.deepcopy(value) for key, value in come.items() if key not in state}
-        )
+        come = {
+            key: copy.deepcopy(value)
+            for key, value in spec.state.items()
+            if key not in before.state and key not in state
+        }
+        state.update(come)
         node.spec = spec
 
         def put_back() -> None:
@@ -149,92 +265,55 @@ class Rewiring:
 
         self._undo.append(put_back)
 
-    def _apply_to_entities(self, plan: Plan) -> None:
-        by_node: dict[str, list[Operation]] = {}
-        for operation in plan.operations:
-            full_name, section, _ = operation.target
-            if section not in ('system', 'processes'):
-                by_node.setdefault(full_name, []).append(operation)
-        for full_name, operations in by_node.items():
-            node = self._nodes.get(full_name)
-            if node is not None:
-                self._pause(node)
-                self._apply_to_node(node, {each.target: each for each in operations})
-
-    def _pause(self, node: LiveNode) -> None:
-        """Let no behaviour of a node begin while its entities are exchanged."""
-        gate = node.gate
-        before = gate.is_open, gate.serves
-
-        def go_on() -> None:
-            gate.is_open, gate.serves = before
-            self._handle.executor.wake()
-
-        gate.close()
-        self._undo.append(go_on)
-        self._finish.append(go_on)
-
-    def _apply_to_node(self, node: LiveNode, operations: Mapping[Any, Operation]) -> None:
-        own = operations.get((node.spec.full_name, 'nodes', ''))
-        if own is not None and own.action is Action.CHANGE:
-            self._change_own(node, own)
-        for kind in ENTITY_KINDS:
-            for target, operation in operations.items():
-                if target[1] != kind.section:
-                    continue
-                if kind.section == 'parameters':
-                    self._undo.append(self._change_parameter(node, operation))
-                else:
-                    self._apply_to_entity(node, operation)
-
-    def _change_parameter(self, node: LiveNode, operation: Operation) -> Callable[[], None]:
-        full_name = operation.target[0]
-        change = ParameterChange(node, self._before[full_name], self._after[full_name])
-        return change.apply(operation)
-
-    def _change_own(self, node: LiveNode, operation: Operation) -> None:
+    def _change_node(self, node: LiveNode, operation: Operation) -> None:
         keys = {each.top_key for each in operation.changes}
-        old = self._before[operation.target[0]]
+        old = self._before[node.full_name]
         if 'use_sim_time' in keys:
             value = node.spec.use_sim_time
-            node.ros.set_parameters([Parameter('use_sim_time', value=value)])
-            self._undo.append(
-                lambda: node.ros.set_parameters([Parameter('use_sim_time', value=not value)])
-            )
-        if keys & {'on_parameters', 'with', 'on_error', 'warn_after'} and node.parameters:
-            parameters = node.parameters
-            self._undo.append(lambda: parameters.ask(old.on_parameters))
-            parameters.ask(node.spec.on_parameters)
+            self._undo.append(partial(_set_sim_time, node, value=not value))
+            _set_sim_time(node, value=value)
         if 'log_level' in keys:
-            self._undo.append(lambda: set_level(old))
+            self._undo.append(partial(set_level, old))
             set_level(node.spec)
+        if keys & {'on_parameters', 'with', 'on_error', 'warn_after'} and node.parameters:
+            self._undo.append(partial(node.parameters.ask, old.on_parameters))
+            node.parameters.ask(node.spec.on_parameters)
 
-    def _apply_to_entity(self, node: LiveNode, operation: Operation) -> None:
+    def _change_entity(self, operation: Operation) -> None:
         full_name, section, name = operation.target
-        entities = node.entities[section]
-        spec = getattr(node.spec, section).get(name)
-        before = entities.get(name)
-        if operation.action is Action.CHANGE:
-            entity = entities[name]
-            old = getattr(self._before[full_name], section)[name]
-            self._undo.append(lambda: entity.change(old))
-            entity.change(spec)
+        node = self._nodes[full_name]
+        if section == 'parameters':
+            change = ParameterChange(node, self._before[full_name], self._after[full_name])
+            self._undo.append(change.apply(operation))
             return
-        if operation.action is Action.REMOVE:
-            del entities[name]
-        else:
-            entities[name] = created = create_entity(node, section, spec)
+        entities = node.entities[section]
+        before = entities.get(name)
+        spec = getattr(node.spec, section).get(name)
+        if operation.action is Action.CHANGE and before is not None:
+            old = getattr(self._before[full_name], section)[name]
+            self._undo.append(partial(before.change, old))
+            before.change(spec)
+            return
+        if operation.action in _COMING:
+            created = create_entity(node, section, spec)
             self._undo.append(created.destroy)
             if section == 'timers':
-                self._finish.append(lambda: _start(created))
-        if before is not None:
-            self._undo.append(lambda: entities.__setitem__(name, before))
-            self._finish.append(before.destroy)
-        elif operation.action is Action.ADD:
+                self._finish.append(partial(_start_timer, created))
             self._undo.append(partial(entities.pop, name, None))
+            entities[name] = created
+        if before is not None:
+            self._undo.append(partial(entities.__setitem__, name, before))
+            self._finish.append(before.destroy)
+        if operation.action is Action.REMOVE:
+            del entities[name]
+            self._finish.append(partial(node.forget, operation.noun, name))
 
 
-def _start(timer: Any) -> None:
+def _set_sim_time(node: LiveNode, *, value: bool) -> None:
+    node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+
+
+def _start_timer(timer: Any) -> None:
     with suppress(Exception):
         # A behaviour may have destroyed it.
         timer.ros.reset()
