@@ -20,6 +20,7 @@ from composer.cli.common.argument_types import (
     takes_settings,
     takes_system,
 )
+from composer.cli.running.declarations import COMMANDS as RUNNING_COMMANDS
 from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
 from composer.reports import FORMATS
@@ -83,6 +84,14 @@ def cli(context: click.Context) -> int:
     '--watch', 'watches', is_flag=True, help='Change the running system when its files change.'
 )
 @click.option(
+    '--no-control',
+    'is_asked',
+    is_flag=True,
+    default=True,
+    flag_value=False,
+    help="Leave out the services that 'composer reload', 'down' and the like use.",
+)
+@click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
 @click.pass_context
@@ -93,6 +102,7 @@ def up_command(
     log_levels: tuple[str, ...],
     *,
     watches: bool,
+    is_asked: bool,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run its system until it is stopped.
@@ -117,6 +127,7 @@ def up_command(
         log_levels,
         set_values,
         watches=watches,
+        is_asked=is_asked,
         ends_process=True,
     )
 
@@ -495,3 +506,7 @@ def interfaces_show_command(name: str) -> int:
     from composer.cli.interfaces import show
 
     return show(name)
+
+
+for _command in RUNNING_COMMANDS:
+    cli.add_command(_command)

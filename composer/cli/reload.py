@@ -9,17 +9,24 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import import_reading
+from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.language.paths import resolve_path
+from composer.planning.differences import compare
 from composer.planning.snapshot import take_snapshot
+from composer.planning.text import render_plan
+from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from composer.checks.context import CheckContext
-    from composer.cli.common.system_reader import SystemReader
+    from composer.cli.common.system_reader import Report, SystemReader
+    from composer.diagnostics import Diagnostic
     from composer.planning.plan import Plan
+    from composer.runtime.health.system_state import Outcome
     from composer.runtime.system import System
 
 # Changes of these files may change a system; parameter files may have any name.
@@ -27,6 +34,8 @@ _SUFFIXES = ('.yaml', '.yml', '.py', '.msg', '.srv', '.action')
 # An editor writes a file in several steps: the last one counts.
 _STEP_MS = 10
 _DEBOUNCE_MS = 100
+_RUNS_ON = 'the system runs on as it was'
+_NO_CHANGE = 'nothing has changed'
 
 
 class Reloader:
@@ -46,44 +55,78 @@ class Reloader:
         self._files = _list_files(reader, context)
         self._lock = threading.Lock()
 
-    def reload(self, system: System) -> Plan | None:
-        """Read the files, and rewire the system; return what was done, `None` if that failed.
+    def reload(self, system: System) -> Outcome:
+        """Read the files, and rewire the system; after errors it is as it was.
 
-        Errors are logged or printed; after one the system is as it was.
+        What was done is logged, and errors are printed.
         """
+        from composer.runtime.health.system_state import Outcome
         from composer.runtime.logs import system_logger
 
-        with self._lock:
+        with self._lock, system.state.reloading():
             begun = monotonic()
+            findings: list[Diagnostic] = []
             try:
-                plan = self._rewire(system)
+                plan = self._rewire(system, findings)
             except ComposerError as error:
-                system_logger.error(f'not reloaded: {error}')
-                return None
-            if plan is None:
-                system_logger.error('not reloaded: the system runs on as it was')
-            elif plan:
-                took_ms = (monotonic() - begun) * 1000
-                system_logger.info(f'reloaded in {took_ms:.0f} ms: {summarize(plan)}')
-            return plan
+                text = f'not reloaded: {error}'
+                system_logger.error(text)
+                errors = [
+                    f'{each.span or each.file}: {each.message}'
+                    for each in findings
+                    if has_errors([each])
+                ]
+                system.state.note_reload(Outcome(succeeded=False, text='; '.join(errors) or text))
+                return Outcome(succeeded=False, text=_with_findings(findings, text))
+            took_ms = (monotonic() - begun) * 1000
+            text = _NO_CHANGE
+            if plan:
+                text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}'
+                system_logger.info(text)
+            system.state.note_reload(Outcome(succeeded=True, text=text))
+            return Outcome(succeeded=True, text=_with_findings(findings, text))
 
-    def _rewire(self, system: System) -> Plan | None:
+    def plan(self, system: System) -> Outcome:
+        """Read the files, and tell what `reload` would do."""
+        from composer.runtime.health.system_state import Outcome
+
+        findings: list[Diagnostic] = []
+        with self._lock:
+            try:
+                context = self._check(findings.extend)
+                new = take_snapshot(context, self._prefixes)
+            except ComposerError as error:
+                return Outcome(succeeded=False, text=_with_findings(findings, str(error)))
+            text = render_plan(compare(system.snapshot, new)).rstrip('\n')
+        return Outcome(succeeded=True, text=_with_findings(findings, text))
+
+    def _rewire(self, system: System, findings: list[Diagnostic]) -> Plan:
         from composer.runtime.rewiring.fresh_modules import fresh_modules
 
-        context = self._reader.check()
-        if context is None:
-            return None
+        def report(found: list[Diagnostic]) -> None:
+            findings.extend(found)
+            show_findings(found)
+
+        context = self._check(report)
         self._files |= _list_files(self._reader, context)
         snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
-        with fresh_modules(stale, snapshot.sources) as put_back:
-            reading = import_reading(context, snapshot)
+        with fresh_modules(stale, snapshot.sources):
+            reading = import_reading(context, snapshot, report)
             if reading is None:
-                put_back()
-                return None
+                raise ComposerError(_RUNS_ON)
             plan = system.rewire(reading)
         self._files = _list_files(self._reader, context)
         return plan
+
+    def _check(self, report: Report) -> CheckContext:
+        if any(str(path) == '-' for path in self._reader.paths):
+            message = 'the system was read from standard input, which cannot be read again'
+            raise ComposerError(message)
+        context = self._reader.check(report)
+        if context is None:
+            raise ComposerError(_RUNS_ON)
+        return context
 
     @contextmanager
     def watching(self, system: System) -> Iterator[None]:
@@ -120,6 +163,11 @@ class Reloader:
 
     def _matters(self, path: str) -> bool:
         return path.endswith(_SUFFIXES) or Path(path) in self._files
+
+
+def _with_findings(findings: list[Diagnostic], text: str) -> str:
+    """Return a text after the findings that belong to it."""
+    return '\n'.join([*(render_finding(each) + '\n' for each in findings), text])
 
 
 def summarize(plan: Plan) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import click
 
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.system_reader import SystemReader, import_reading
-from composer.errors import ExitCode, RosNotFoundError
+from composer.errors import ExitCode
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.planning.snapshot import take_snapshot
@@ -22,12 +21,8 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
 
-_NO_ROS_HELP = (
-    "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
-)
 
-
-def up(
+def up(  # noqa: PLR0913 - one for each option
     paths: Sequence[Path],
     words: Sequence[str] = (),
     ros_arguments: Sequence[str] = (),
@@ -35,6 +30,7 @@ def up(
     set_values: Sequence[str] = (),
     *,
     watches: bool = False,
+    is_asked: bool = True,
     ends_process: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
@@ -46,6 +42,7 @@ def up(
         log_levels: `debug` for all nodes, `talker:=debug` for one.
         set_values: Values to change, as in `nodes.talker.log_level=debug`.
         watches: Whether edits of the files change the running system.
+        is_asked: Whether the system serves what `composer reload` and the like ask.
         ends_process: Whether the process exits afterwards.
 
     Raises:
@@ -57,18 +54,17 @@ def up(
     context = reader.check()
     if context is None:
         return ExitCode.FAILED
-    if importlib.util.find_spec('rclpy') is None:
-        message = 'cannot run without ROS 2: this Python has no rclpy'
-        raise RosNotFoundError(message, help=_NO_ROS_HELP)
     # These import nothing of ROS, which reads its environment when it is imported.
     from composer.runtime.environment import (
         check_log_folder,
         check_middleware,
+        check_ros,
         check_shell,
         environment_set,
         find_colour,
     )
 
+    check_ros()
     variables = context.spec.environment
     with environment_set({**find_colour(), **variables}):
         check_shell(variables)
@@ -80,6 +76,7 @@ def up(
             ros_arguments,
             log_levels,
             watches=watches,
+            is_asked=is_asked,
             ends_process=ends_process,
         )
 
@@ -91,6 +88,7 @@ def _run(
     log_levels: Sequence[str],
     *,
     watches: bool,
+    is_asked: bool,
     ends_process: bool,
 ) -> int:
     from composer.cli.reload import Reloader
@@ -107,9 +105,11 @@ def _run(
         reading = import_reading(context, take_snapshot(context, prefixes))
         if reading is None:
             return ExitCode.FAILED
+        reloader = Reloader(reader, context, prefixes)
         return run_system(
             reading,
-            watch=Reloader(reader, context, prefixes).watching if watches else None,
+            watch=reloader.watching if watches else None,
+            commands=reloader if is_asked else None,
             ros_arguments=ros_arguments,
             log_level_requests=log_levels,
             ends_process=ends_process,

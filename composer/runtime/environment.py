@@ -5,6 +5,7 @@ Those of the shell are checked as those of the file were.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import socket
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.checks.environment import find_environment_problems
-from composer.errors import StartError
+from composer.errors import RosNotFoundError, StartError
 from composer.terminal import colour_of
 
 if TYPE_CHECKING:
@@ -23,6 +24,20 @@ _COLOUR = 'RCUTILS_COLORIZED_OUTPUT'
 _PEERS = 'ROS_STATIC_PEERS'
 _KEYSTORE = 'ROS_SECURITY_KEYSTORE'
 _NO_LOG_FILES = '--disable-external-lib-logs'
+_NO_ROS_HELP = (
+    "install it (pip install 'rclpy-composer[ros]'), or source yours: . /opt/ros/jazzy/setup.sh"
+)
+
+
+def check_ros() -> None:
+    """Check that ROS 2 is there, without importing it.
+
+    Raises:
+        RosNotFoundError: There is no rclpy.
+    """
+    if importlib.util.find_spec('rclpy') is None:
+        message = 'cannot run without ROS 2: this Python has no rclpy'
+        raise RosNotFoundError(message, help=_NO_ROS_HELP)
 
 
 @contextmanager

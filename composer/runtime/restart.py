@@ -88,23 +88,31 @@ class NodeRestarter:
         self._system = system
         self._timeout_sec = timeout_sec
 
-    def restart(self, full_name: str) -> None:
+    def restart(self, full_name: str) -> str:
         """Rebuild a node: its entities, parameters and state are as at the start again.
 
         A node that hangs is left as it is. If the new one cannot start, that counts as an error of
         the node, after which it is restarted again.
+
+        Returns:
+            Why it was not restarted; empty if it was.
         """
         with self.lock:
-            old = self._nodes[full_name]
+            old = self._nodes.get(full_name)
+            if old is None:
+                return f"there is no node '{full_name}' any more"
             if self._system.stop.is_set or not self._end(old):
-                return
+                if self._system.stop.is_set:
+                    return 'the system stops'
+                return f"node '{old.spec.key}' hangs, and is left as it is: {_list_calls(old)}"
             try:
                 self._build(old)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
                 self._system.act_on_error(full_name, 'restart')
-                return
+                return str(error)
         system_logger.warning(f"node '{old.spec.key}' was restarted")
+        return ''
 
     def remove(self, full_name: str) -> bool:
         """Stop and remove a node; return whether it is gone: one that hangs stays."""
@@ -128,8 +136,7 @@ class NodeRestarter:
             return False
         if not has_ended:
             executor.wake()
-            hanging = ', '.join(str(call.owner) for call in node.running.calls())
-            system_logger.error(f"node '{name}' hangs, and is left as it is: {hanging}")
+            system_logger.error(f"node '{name}' hangs, and is left as it is: {_list_calls(node)}")
             return False
         executor.remove_node(node.ros)
         node.destroy()
@@ -139,3 +146,7 @@ class NodeRestarter:
                 'restart, so its log may be missing on /rosout'
             )
         return True
+
+
+def _list_calls(node: LiveNode) -> str:
+    return ', '.join(str(call.owner) for call in node.running.calls())

@@ -13,6 +13,7 @@ from composer.errors import ComposerError, ExitCode, StartError
 from composer.executor.after_fork import flush_output
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forked_children
+from composer.runtime.control.readiness import notify, take_notify_socket
 from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from composer.language.specs import SystemSpec
+    from composer.runtime.control.control_node import Commands
     from composer.runtime.rewiring.reading import Reading
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -40,6 +42,7 @@ def run_system(
     reading: Reading,
     *,
     watch: Callable[[System], AbstractContextManager[object]] | None = None,
+    commands: Commands | None = None,
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
     ends_process: bool = False,
@@ -55,6 +58,8 @@ def run_system(
     Args:
         reading: What it runs as.
         watch: Entered with the system once it is up; left before it stops.
+        commands: What the system does with its files when it is asked; `None` if it is not to be
+            asked.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it.
 
@@ -78,10 +83,15 @@ def run_system(
             ros_arguments,
             log_level_requests,
             stop_request=stop,
+            commands=commands,
         )
         guardian.wait_until_begun()
+        # A program that runs a system in itself tells its own parent.
+        notify_socket = take_notify_socket() if ends_process else None
         try:
             system.start()
+            if system.state.is_up:
+                notify(notify_socket, 'READY=1')
             try:
                 with watch(system) if watch else nullcontext():
                     system.wait()

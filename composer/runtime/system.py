@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from time import monotonic
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import ENTITY_KINDS
@@ -13,9 +12,10 @@ from composer.processes.guardian_client import end_marked
 from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
-from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
+from composer.runtime.control.control_node import ControlNode
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
+from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from composer.processes.external_process import ExternalProcess
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.running_calls import RunningCall
+    from composer.runtime.control.control_node import Commands
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
@@ -56,10 +57,12 @@ class System:
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line, for external processes.
         stop_request: The request to stop it; by default a new one.
+        commands: What it does with its files when it is asked; `None` if it is not to be asked.
 
     Attributes:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
             only the end of this process ends them.
+        state: What it says of itself.
     """
 
     def __init__(
@@ -70,12 +73,13 @@ class System:
         log_levels: Sequence[str] = (),
         *,
         stop_request: StopRequest | None = None,
+        commands: Commands | None = None,
     ) -> None:
         self._reading = reading
         spec = reading.spec
+        self.state = SystemState(spec.name, reading.positions.source.name)
         self._guardian = guardian
         self.has_ended = False
-        self._begun = monotonic()
         self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
@@ -98,7 +102,7 @@ class System:
             self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
         )
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
-        self._diagnostics_publisher: DiagnosticsPublisher | None = None
+        self._control = ControlNode(self, spec, self._handle.health, commands)
         self._processes = ProcessSupervisor(
             spec.processes.values(),
             system_logger,
@@ -152,10 +156,10 @@ class System:
             StartError: Something could not start; all the rest has been stopped again.
         """
         try:
+            self._control.start(self._context, self._handle.ros_arguments)
             self._starter.create(self._reading.spec.nodes.values())
             for node in self._nodes.values():
                 self._executor.add_node(node.ros)
-            self._publish_diagnostics()
             self._executor.start()
             self._hang_watcher.start()
             self._graph_watcher.start()
@@ -169,13 +173,16 @@ class System:
             raise
         if self.stop_requested:
             return
-        elapsed = monotonic() - self._begun
         parts = _describe_parts(self._nodes, self._processes.by_name)
         # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
-        system_logger.info(f'{self._reading.spec.name}: {parts} ready in {elapsed:.2f} s')
+        system_logger.info(
+            f'{self._reading.spec.name}: {parts} ready in {self.state.uptime_sec:.2f} s'
+        )
         self._starter.open(prompt)
         self._processes.tell_ends()
+        self.state.is_up = True
+        self._control.begin()
         self._parameter_services.begin()
 
     def wait(self) -> None:
@@ -215,7 +222,26 @@ class System:
             self._reading = new
             self._processes.is_alone = not new.spec.nodes
             self._hang_watcher.follow(_limits(new.spec))
+            self._control.follow(new.spec)
         return plan
+
+    def list_nodes(self) -> list[str]:
+        """Return the full names of its nodes."""
+        return list(self._nodes)
+
+    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
+        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
+        return [
+            (node.full_name, call)
+            for node in list(self._nodes.values())
+            for call in node.running.calls()
+            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
+        ]
+
+    def restart_node(self, full_name: str) -> Outcome:
+        """Build a node anew: its entities, parameters and state are as at the start again."""
+        failure = self._restarter.restart(full_name)
+        return Outcome(not failure, failure or f"node '{full_name}' was restarted")
 
     def stop(self) -> tuple[int, bool]:
         """Stop the system.
@@ -224,6 +250,7 @@ class System:
             The exit code, and whether all behaviours have ended. If not, their threads still
             run, and only the end of this process ends them.
         """
+        self.state.is_stopping = True
         is_guarded = self._guardian.begin_stop()
         if not is_guarded:
             self._on_broken('The descriptor of the guardian was closed.')
@@ -308,28 +335,6 @@ class System:
         if not self.stop_requested:
             self.request_stop(code)
 
-    def _publish_diagnostics(self) -> None:
-        health, period_sec = self._handle.health, self._reading.spec.diagnostics_period_sec
-        if health is None or period_sec is None:
-            return
-        publisher = DiagnosticsPublisher(
-            self._reading.spec.name, period_sec, health, self._overdue_calls
-        )
-        try:
-            publisher.start(self._context, self._handle.ros_arguments)
-        except ImportError as error:
-            system_logger.warning(f'/diagnostics is not published: {error}')
-        else:
-            self._diagnostics_publisher = publisher
-
-    def _overdue_calls(self) -> list[tuple[str, RunningCall]]:
-        return [
-            (node.full_name, call)
-            for node in list(self._nodes.values())
-            for call in node.running.calls()
-            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
-        ]
-
     def _endpoints(self) -> list[TopicEndpoint]:
         return [end for node in list(self._nodes.values()) for end in node.endpoints]
 
@@ -356,8 +361,7 @@ class System:
 
     def _end_graph(self) -> None:
         self._graph_watcher.stop()
-        if self._diagnostics_publisher is not None:
-            self._diagnostics_publisher.stop()
+        self._control.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._executor.stop(_EXECUTOR_STOP_SEC)
@@ -369,6 +373,8 @@ class System:
             self._nodes.clear()
         self._context.try_shutdown()
         self._context.destroy()
+        if not self._guardian.owns_process:
+            self._control.release_name()
 
 
 def _limits(spec: SystemSpec) -> Iterator[float | None]:

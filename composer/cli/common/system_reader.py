@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
@@ -14,13 +14,15 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.planning.snapshot import Snapshot
     from composer.runtime.rewiring.reading import Reading
+
+Report: TypeAlias = 'Callable[[list[Diagnostic]], None]'
 
 
 @record
@@ -37,31 +39,38 @@ class SystemReader:
     words: Sequence[str]
     set_values: Sequence[str]
 
-    def check(self) -> CheckContext | None:
-        """Return a system without errors; of one with errors these are printed.
+    def check(self, report: Report = show_findings) -> CheckContext | None:
+        """Return a system without errors; `None` if there are errors.
+
+        Args:
+            report: Takes the findings; by default they are printed.
 
         Raises:
             UsageError: The arguments do not fit the file.
         """
         system = load_given(self.paths, self.words, self.set_values)
         context = create_context(system, InterfaceCatalogue())
-        return None if _report(check_in_context(system, context)) else context
+        findings = check_in_context(system, context)
+        report(findings)
+        return None if has_errors(findings) else context
 
 
-def import_reading(context: CheckContext, snapshot: Snapshot) -> Reading | None:
-    """Import the behaviours of a system; if they have errors, print these and return `None`."""
+def import_reading(
+    context: CheckContext, snapshot: Snapshot, report: Report = show_findings
+) -> Reading | None:
+    """Import the behaviours of a system; return `None` if they have errors.
+
+    Args:
+        report: Takes the findings; by default they are printed.
+    """
     from composer.runtime.rewiring.reading import Reading
 
     system = context.system
     functions, findings = import_behaviours(context)
     # The check has already reported comments that silence nothing.
     comments = IgnoreComments(system.positions.source)
-    if _report([each for each in findings if not comments.silence(each)]):
+    shown = [each for each in findings if not comments.silence(each)]
+    report(shown)
+    if has_errors(shown):
         return None
     return Reading(snapshot.spec, system.positions, functions, snapshot)
-
-
-def _report(findings: list[Diagnostic]) -> bool:
-    """Print findings; return whether any is an error."""
-    show_findings(findings)
-    return has_errors(findings)

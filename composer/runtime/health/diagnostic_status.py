@@ -15,6 +15,7 @@ from composer.entity_kinds import KIND_OF_NOUN
 if TYPE_CHECKING:
     from composer.runtime.behaviours.running_calls import Owner
     from composer.runtime.health.statistics import EntityReport
+    from composer.runtime.health.system_state import SystemState
 
 _P99 = 0.99
 
@@ -38,7 +39,7 @@ class StatusWriter:
     def write(self, report: EntityReport) -> DiagnosticStatus:
         """Return the status; the message is the same one each time."""
         status = self._status
-        status.level, status.message = self._summarize(report)
+        status.level, status.message = summarize_report(report)
         times, calls = report.times, report.times.calls()
         self._set('calls', str(report.all_calls))
         self._set('errors', str(report.all_errors))
@@ -51,28 +52,53 @@ class StatusWriter:
             self._set(label, str(getattr(report.all_missed, attribute)))
         return status
 
-    def _summarize(self, report: EntityReport) -> tuple[bytes, str]:
-        missed, overdue_sec = report.missed, report.overdue_sec
-        problems = [
-            _count(report.errors, 'error', f', last: {report.last_error}'),
-            f'a call has been running for {overdue_sec:.1f} s' if overdue_sec else '',
-            _count(missed.overruns, 'message', ' dropped from the full queue'),
-            _count(missed.late_ticks, 'late tick'),
-            _count(missed.skipped_ticks, 'skipped tick'),
-        ]
-        text = '; '.join(filter(None, problems))
-        if report.errors:
-            return DiagnosticStatus.ERROR, text
-        if text:
-            return DiagnosticStatus.WARN, text
-        return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
-
     def _set(self, key: str, value: str) -> None:
         pair = self._values.get(key)
         if pair is None:
             pair = self._values[key] = KeyValue(key=key)
             self._status.values.append(pair)
         pair.value = value
+
+
+def summarize_report(report: EntityReport) -> tuple[bytes, str]:
+    """Return the level of `DiagnosticStatus` that a report has, and why."""
+    missed, overdue_sec = report.missed, report.overdue_sec
+    problems = [
+        _count(report.errors, 'error', f', last: {report.last_error}'),
+        f'a call has been running for {overdue_sec:.1f} s' if overdue_sec else '',
+        _count(missed.overruns, 'message', ' dropped from the full queue'),
+        _count(missed.late_ticks, 'late tick'),
+        _count(missed.skipped_ticks, 'skipped tick'),
+    ]
+    text = '; '.join(filter(None, problems))
+    if report.errors:
+        return DiagnosticStatus.ERROR, text
+    if text:
+        return DiagnosticStatus.WARN, text
+    return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
+
+
+def system_status(node: str, state: SystemState) -> DiagnosticStatus:
+    """Return the status of a system itself.
+
+    Args:
+        node: The full name of its control node.
+    """
+    last = state.last_reload
+    values = {
+        **{key: str(value) for key, value in state.who().items()},
+        'state': state.word,
+        'uptime (s)': f'{state.uptime_sec:.0f}',
+        'last reload': '' if last is None else last.outcome.text,
+        'last error': state.last_error,
+    }
+    return DiagnosticStatus(
+        name=f'{node}: system',
+        hardware_id=state.name,
+        level=DiagnosticStatus.WARN if state.last_error else DiagnosticStatus.OK,
+        message=f'{state.word}; the last reload failed' if state.last_error else state.word,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
 
 
 def _count(number: int, what: str, more: str = '') -> str:

@@ -1,6 +1,5 @@
 """What subscriptions and timers miss because callbacks take too long."""
 
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.qos import HistoryPolicy, QoSProfile
@@ -46,21 +45,32 @@ class MissedCounts:
         return self != MissedCounts()
 
 
-def count_missed(executor: Any, node: Any, entity: Any) -> Callable[[], MissedCounts]:
+class MissedNothing:
+    """Counts what an entity misses: by itself, none."""
+
+    def __call__(self) -> MissedCounts:
+        """Return what it has missed."""
+        return MissedCounts()
+
+    def queued(self) -> int:
+        """Return how many messages wait for it."""
+        return 0
+
+
+def count_missed(executor: Any, node: Any, entity: Any) -> MissedNothing:
     """Begin to count what an entity of `node` misses in `executor`; returns what tells it."""
-    counter: Any
+    counter: MissedNothing
     if isinstance(entity, Subscription):
         counter = QueueOverruns(entity.qos_profile)
     elif isinstance(entity, Timer):
         counter = MissedTicks()
     else:
-        return MissedCounts
+        return MissedNothing()
     executor.observe(node, entity, counter)
-    counts: Callable[[], MissedCounts] = counter.counts
-    return counts
+    return counter
 
 
-class MissedTicks:
+class MissedTicks(MissedNothing):
     """Counts the late and skipped ticks of a timer.
 
     A tick is late if it begins more than a tenth of its period, and more than 1 ms, after its
@@ -72,7 +82,7 @@ class MissedTicks:
         self._late = 0
         self._skipped = 0
 
-    def counts(self) -> MissedCounts:
+    def __call__(self) -> MissedCounts:
         """Return what it has missed."""
         return MissedCounts(late_ticks=self._late, skipped_ticks=self._skipped)
 
@@ -84,7 +94,7 @@ class MissedTicks:
         self._skipped += max(0, next_ns // period_ns - 1)
 
 
-class QueueOverruns:
+class QueueOverruns(MissedNothing):
     """Counts the messages that were pushed out of the queue of a subscription.
 
     If fewer messages can be taken than came, newer ones have pushed the others out of the queue.
@@ -100,12 +110,17 @@ class QueueOverruns:
         self._overruns = 0
         self._is_counting = True
 
-    def counts(self) -> MissedCounts:
+    def __call__(self) -> MissedCounts:
         """Return what it has missed."""
         if self._depth:
             # A queue that never runs empty: the middleware holds no more than its depth.
             self._note_overruns(self._arrived - self._taken - self._depth)
         return MissedCounts(overruns=self._overruns)
+
+    def queued(self) -> int:
+        """Return how many messages wait to be taken, as far as that is known."""
+        waiting = self._arrived - self._taken - self._overruns if self._is_counting else 0
+        return max(0, min(waiting, self._depth or waiting))
 
     def on_announced(self, count: int | None) -> None:
         """Note that `count` messages came; None: nobody knows how many."""

@@ -285,7 +285,8 @@ class LiveNode:
         """Count in the health of an entity what its ROS entity has missed."""
         health = self._health(owner)
         if health is not None:
-            health.follow(count_missed(self.system.executor, self.ros, entity))
+            counter = count_missed(self.system.executor, self.ros, entity)
+            health.follow(counter, counter.queued)
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""

@@ -9,6 +9,7 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Empty, Int32
+from std_srvs.srv import Trigger
 
 pytestmark = pytest.mark.ros
 
@@ -146,7 +147,7 @@ def test_counts_survive_restarts_of_the_node(compose, listener, wait_for):
 
 
 def test_it_can_be_turned_off(compose, peer, wait_for):
-    child = compose(SYSTEM.replace('{period: 0.2}', 'false'), BEHAVIOURS)
+    child = compose(SYSTEM.replace('{period: 0.2}', 'false'), BEHAVIOURS, '--no-control')
     child.wait_until_ready()
     wait_for(lambda: peer.node.count_publishers('/numbers') == 0 and seen(peer, 'sticky'), 'it')
     peer.advertise(Int32, '/numbers').publish(Int32(data=-1))
@@ -176,7 +177,7 @@ def test_it_comes_as_often_as_declared(compose, peer, listener, wait_for):
 
 
 def test_its_node_is_hidden_and_has_nothing_but_the_topic(compose, peer, listener, wait_for):
-    child = compose(SYSTEM, BEHAVIOURS)
+    child = compose(SYSTEM, BEHAVIOURS, '--no-control')
     child.wait_until_ready()
     wait_for(lambda: seen(peer, '_composer_system'), 'the node')
     wait_for(lambda: listener.messages, 'a message')
@@ -187,4 +188,34 @@ def test_its_node_is_hidden_and_has_nothing_but_the_topic(compose, peer, listene
     # An end may be found before the name of its node.
     wait_for(lambda: publishers() == ['_composer_system'], 'its publisher')
     assert peer.node.get_service_names_and_types_by_node('_composer_system', '/') == []
+    assert child.stop() == 0
+
+
+def test_the_system_itself_has_a_status(compose, peer, listener, wait_for):
+    child = compose(SYSTEM, BEHAVIOURS)
+    child.wait_until_ready()
+    name = '/_composer_system: system'
+    wait_for(lambda: listener.values(name).get('state') == 'running', 'its state')
+    path = compose.folder / 'system.yaml'
+    assert listener.values(name) | {'uptime (s)': '', 'host': ''} == {
+        'name': 'system',
+        'file': str(path),
+        'host': '',
+        'pid': str(child.pid),
+        'state': 'running',
+        'uptime (s)': '',
+        'last reload': '',
+        'last error': '',
+    }
+    assert listener.statuses(name)[-1].level == DiagnosticStatus.OK
+    path.write_text(path.read_text().replace('rate: 50', 'rate: none'))
+    answer = peer.call(Trigger, '/_composer_system/reload')
+    assert not answer.success
+    assert 'error[' in answer.message
+    wait_for(lambda: 'system.yaml:13' in listener.values(name)['last error'], 'the error')
+    assert listener.statuses(name)[-1].level == DiagnosticStatus.WARN
+    path.write_text(path.read_text().replace('rate: none', 'rate: 51'))
+    assert peer.call(Trigger, '/_composer_system/reload').success
+    wait_for(lambda: listener.values(name)['last error'] == '', 'its end')
+    assert 'reloaded in' in listener.values(name)['last reload']
     assert child.stop() == 0

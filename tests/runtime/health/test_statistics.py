@@ -12,8 +12,8 @@ from rclpy.validate_node_name import validate_node_name
 
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall
 from composer.runtime.behaviours.running_calls import Owner, RunningCall, RunningCalls
+from composer.runtime.control.protocol import node_name
 from composer.runtime.health.diagnostic_status import StatusWriter
-from composer.runtime.health.diagnostics_publisher import node_name
 from composer.runtime.health.missed import MissedCounts
 from composer.runtime.health.statistics import CallTimes, EntityHealth, HealthRegistry
 

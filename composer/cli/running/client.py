@@ -1,0 +1,258 @@
+"""Finds the systems that run on this ROS graph, and asks them."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Self
+
+from composer.errors import ComposerError, UsageError
+from composer.records import record
+from composer.runtime.control import protocol
+from composer.runtime.control.name_claim import list_claims
+from composer.runtime.environment import check_middleware, check_ros, check_shell
+from composer.runtime.health.system_state import Outcome
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+# How long systems on other hosts may take to be found, and those that are on this one for sure.
+_SEARCH_SEC = 1.0
+_LOCAL_SEARCH_SEC = 10.0
+_POLL_SEC = 0.05
+STATUS_SEC = 5.0
+
+
+@record
+class RunningSystem:
+    """A system that was found.
+
+    Attributes:
+        name: As it says itself.
+        node: The full name of its control node.
+        status: What it says of itself; `None` if it does not answer.
+    """
+
+    name: str
+    node: str
+    status: dict[str, Any] | None
+
+
+class Client:
+    """A node beside those of the systems, while it is entered.
+
+    Raises:
+        RosNotFoundError: There is no rclpy.
+        StartError: ROS cannot start.
+    """
+
+    def __init__(self) -> None:
+        check_ros()
+        check_shell({})
+        check_middleware(os.environ)
+        self._exit = ExitStack()
+
+    def __enter__(self) -> Self:
+        from rclpy.context import Context
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+        from rclpy.parameter import Parameter
+
+        context = Context()
+        # No log file: it logs nothing.
+        context.init([], initialize_logging=False)
+        self._exit.callback(context.try_shutdown)
+        self._domain_id: int = context.get_domain_id()
+        self._node = Node(
+            f'_composer_client_{os.getpid()}',
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter('start_type_description_service', value=False)],
+        )
+        self._exit.callback(self._node.destroy_node)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self._node)
+        self._exit.callback(self._executor.shutdown)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._exit.close()
+
+    def find_all(self) -> list[RunningSystem]:
+        """Return the systems on this ROS graph, by their names; what is far may need a second."""
+        self._search(lambda _found: False)
+        found = self._list_control_nodes()
+        systems = [
+            RunningSystem(str(status['name']) if status else _name_of(node), node, status)
+            for node, status in zip(found, self._ask_status(found), strict=True)
+        ]
+        return sorted(systems, key=lambda each: (each.name, each.node))
+
+    def find(self, name: str | None) -> RunningSystem:
+        """Return the system of this name; without one, the only system that there is.
+
+        Raises:
+            ComposerError: There is none, or it cannot be asked.
+            UsageError: There are several.
+        """
+        if name is not None:
+            wanted = protocol.node_name(name)
+            self._search(lambda found: any(_last(node) == wanted for node in found))
+            for node in self._list_control_nodes():
+                if _last(node) == wanted:
+                    (status,) = self._ask_status([node])
+                    return RunningSystem(name, node, status)
+        systems = self.find_all()
+        if name is None and len(systems) == 1:
+            return systems[0]
+        raise self._explain(name, [each.name for each in systems])
+
+    def ask(
+        self, system: RunningSystem, command: str, timeout_sec: float, node: str | None = None
+    ) -> Outcome:
+        """Give a system a command, and return its answer.
+
+        Args:
+            node: The full name of the node that it is about, for `restart`.
+
+        Raises:
+            ComposerError: It did not answer in time, or ended before it did.
+        """
+        from rcl_interfaces.msg import Parameter as ParameterMessage
+        from rcl_interfaces.msg import ParameterType, ParameterValue
+        from rcl_interfaces.srv import SetParametersAtomically
+        from std_srvs.srv import Trigger
+
+        request: Any = Trigger.Request()
+        service: Any = Trigger
+        if node is not None:
+            service = SetParametersAtomically
+            value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=node)
+            request = service.Request(parameters=[ParameterMessage(name='node', value=value)])
+        client = self._node.create_client(service, f'{system.node}/{command}')
+        try:
+            response = self._call(client, request, system, timeout_sec)
+        finally:
+            self._node.destroy_client(client)
+        if node is not None:
+            return Outcome(response.result.successful, response.result.reason)
+        return Outcome(response.success, response.message)
+
+    def wait_until_gone(self, system: RunningSystem, timeout_sec: float) -> bool:
+        """Wait until a system has left the graph, and its process has ended if it is local."""
+        name = _last(system.node)
+        return self._wait(
+            lambda: (
+                system.node not in self._list_control_nodes() and name not in self._list_local()
+            ),
+            timeout_sec,
+        )
+
+    def _call(self, client: Any, request: Any, system: RunningSystem, timeout_sec: float) -> Any:
+        deadline = time.monotonic() + timeout_sec
+        if not client.wait_for_service(min(timeout_sec, STATUS_SEC)):
+            message = f"system '{system.name}' does not answer"
+            raise ComposerError(message)
+        future = client.call_async(request)
+        while not future.done():
+            self._executor.spin_until_future_complete(future, _SEARCH_SEC / 2)
+            if future.done():
+                break
+            if not client.service_is_ready():
+                message = f"system '{system.name}' ended before it answered"
+                raise ComposerError(message)
+            if time.monotonic() > deadline:
+                message = f"system '{system.name}' did not answer within {timeout_sec:g} s"
+                raise ComposerError(message, help='it may do it yet; --timeout waits longer')
+        return future.result()
+
+    def _ask_status(self, nodes: Iterable[str]) -> list[dict[str, Any] | None]:
+        """Return what systems say of themselves, asked all at the same time."""
+        from std_srvs.srv import Trigger
+
+        names = [f'{node}/{protocol.STATUS}' for node in nodes]
+        clients = [self._node.create_client(Trigger, name) for name in names]
+        self._wait(lambda: all(each.service_is_ready() for each in clients), STATUS_SEC)
+        calls = [each.call_async(Trigger.Request()) for each in clients]
+        deadline = time.monotonic() + STATUS_SEC
+        for call in calls:
+            self._executor.spin_until_future_complete(call, max(0.0, deadline - time.monotonic()))
+        answers = [call.result().message if call.done() else '' for call in calls]
+        for client in clients:
+            self._node.destroy_client(client)
+        return [read_answer(each) if each else None for each in answers]
+
+    def _search(self, is_enough: Callable[[list[str]], bool]) -> None:
+        """Wait until systems had the time to be found."""
+        begun = time.monotonic()
+        local = self._list_local()
+
+        def is_over() -> bool:
+            found = self._list_control_nodes()
+            if is_enough(found):
+                return True
+            has_all = local <= {_last(node) for node in found}
+            return has_all and time.monotonic() > begun + _SEARCH_SEC
+
+        self._wait(is_over, _LOCAL_SEARCH_SEC)
+
+    def _list_local(self) -> set[str]:
+        """Return the names of the control nodes of the systems on this host that can be asked."""
+        claims = list_claims(self._domain_id)
+        return {protocol.node_name(str(each['name'])) for each in claims if each.get('is_asked')}
+
+    def _list_control_nodes(self) -> list[str]:
+        services = (name for name, _ in self._node.get_service_names_and_types())
+        return sorted(filter(None, map(protocol.find_control_node, services)))
+
+    def _explain(self, name: str | None, names: list[str]) -> ComposerError:
+        domain = f'ROS_DOMAIN_ID {self._domain_id}'
+        if name is None and names:
+            message = f'several systems run on this ROS graph ({domain})'
+            return UsageError(message, help=f'name one of them: {", ".join(names)}')
+        claims = list_claims(self._domain_id)
+        if name in [each.get('name') for each in claims if not each.get('is_asked', True)]:
+            message = f"system '{name}' was started with --no-control, and cannot be asked"
+            return ComposerError(message)
+        if name is None:
+            return ComposerError(f'no system runs on this ROS graph ({domain})')
+        message = f"there is no system '{name}' on this ROS graph ({domain})"
+        return ComposerError(message, help=suggest(name, names, 'there are'))
+
+    @staticmethod
+    def _wait(condition: Callable[[], bool], timeout_sec: float) -> bool:
+        deadline = time.monotonic() + timeout_sec
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(_POLL_SEC)
+        return True
+
+
+def read_answer(text: str) -> dict[str, Any]:
+    """Return the data of an answer.
+
+    Raises:
+        ComposerError: It is of another version of Composer, or of somebody else.
+    """
+    try:
+        data = json.loads(text)
+    except ValueError:
+        data = None
+    if not isinstance(data, dict) or data.get('version') != protocol.VERSION:
+        message = 'a system answers in a form that this version of Composer does not know'
+        raise ComposerError(message, help='use the version that the system runs with')
+    return data
+
+
+def _last(node: str) -> str:
+    return node.rpartition('/')[2]
+
+
+def _name_of(node: str) -> str:
+    return _last(node).removeprefix(protocol.node_name(''))

@@ -1,0 +1,79 @@
+"""Declare the commands that ask running systems: see `composer.cli.commands`."""
+
+from __future__ import annotations
+
+import click
+
+_LONGEST_SEC = 60.0
+
+_system = click.argument('system', required=False)
+_timeout = click.option(
+    '--timeout',
+    'timeout_sec',
+    type=click.FloatRange(min=0, min_open=True),
+    default=_LONGEST_SEC,
+    show_default=True,
+    metavar='SEC',
+    help='How long to wait for the end of it.',
+)
+_format = click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(['text', 'json']),
+    default='text',
+    show_default=True,
+    help='The output format.',
+)
+
+
+@click.command('ps')
+@_format
+def ps_command(format_name: str) -> int:
+    """List the systems that run on this ROS graph."""
+    from composer.cli.running.ps import list_running
+
+    return list_running(format_name=format_name)
+
+
+@click.command('reload')
+@_system
+@_timeout
+def reload_command(system: str | None, timeout_sec: float) -> int:
+    """Let SYSTEM read its files again, and become what they say.
+
+    SYSTEM is its name, that of its file without the ending; if only one runs, it need not be
+    named. If the files have errors, it runs on as it was.
+    """
+    from composer.cli.running.commanding import reload
+
+    return reload(system, timeout_sec)
+
+
+@click.command('restart')
+@click.argument('node')
+@_timeout
+def restart_command(node: str, timeout_sec: float) -> int:
+    """Build NODE of a running system anew.
+
+    Its entities, parameters and state are as at the start again. NODE is its full name, or what
+    follows the last slash of it.
+    """
+    from composer.cli.running.commanding import restart
+
+    return restart(node, timeout_sec)
+
+
+@click.command('down')
+@_system
+@_timeout
+def down_command(system: str | None, timeout_sec: float) -> int:
+    """Stop SYSTEM, and wait until it has stopped.
+
+    SYSTEM is its name; if only one runs, it need not be named.
+    """
+    from composer.cli.running.commanding import down
+
+    return down(system, timeout_sec)
+
+
+COMMANDS = (ps_command, reload_command, restart_command, down_command)

@@ -1,0 +1,78 @@
+"""`composer ps`: list the systems that run on this ROS graph."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+from composer.cli.running.client import Client
+from composer.cli.running.tables import format_duration, render_table
+from composer.errors import ExitCode
+
+if TYPE_CHECKING:
+    from composer.cli.running.client import RunningSystem
+
+_HEADER = ('NAME', 'STATE', 'HEALTH', 'NODES', 'UPTIME', 'LAST RELOAD', 'HOST', 'PID', 'FILE')
+_LONGEST_NOTE = 200
+
+
+def list_running(*, format_name: str) -> int:
+    """Print the systems that run; return the exit code."""
+    with Client() as client:
+        systems = client.find_all()
+    if format_name == 'json':
+        documents = [_document(each) for each in systems]
+        click.echo(json.dumps({'version': 1, 'systems': documents}, indent=2))
+        return ExitCode.DONE
+    if not systems:
+        click.echo('no system runs on this ROS graph', err=True)
+        return ExitCode.DONE
+    notes = [note for each in systems for note in _notes(each)]
+    click.echo('\n'.join([*render_table(_HEADER, map(_row, systems)), *notes]))
+    return ExitCode.DONE
+
+
+def _document(system: RunningSystem) -> dict[str, object]:
+    if system.status is None:
+        return {'name': system.name, 'state': 'no answer'}
+    return {key: value for key, value in system.status.items() if key != 'version'}
+
+
+def _row(system: RunningSystem) -> tuple[str, ...]:
+    status = system.status
+    if status is None:
+        return (system.name, 'no answer', *[''] * (len(_HEADER) - 2))
+    health, last = status['health'], status['last_reload']
+    reload = ''
+    if last is not None:
+        ago = format_duration(max(0.0, time.time() - last['time']))
+        reload = f'{ago} ago' if last['succeeded'] else f'failed {ago} ago'
+    return (
+        system.name,
+        status['state'],
+        '-' if health is None else health['level'],
+        str(len(status['nodes'])),
+        format_duration(status['uptime_sec']),
+        reload,
+        status['host'],
+        str(status['pid']),
+        status['file'],
+    )
+
+
+def _notes(system: RunningSystem) -> list[str]:
+    """Return what is wrong with a system, in lines below the table."""
+    from composer.terminal import escape
+
+    status = system.status
+    if status is None:
+        return []
+    told = {
+        'health': (status['health'] or {}).get('message', ''),
+        'last reload': status['last_error'],
+    }
+    texts = {key: escape(' '.join(text.split())) for key, text in told.items() if text}
+    return [f'{system.name}: {key}: {text[:_LONGEST_NOTE]}' for key, text in texts.items()]

@@ -1,0 +1,43 @@
+"""Tables of text, and how their figures are written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.terminal import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+_GAP = '  '
+_MINUTE_SEC, _HOUR_SEC, _DAY_SEC = 60, 3600, 86400
+
+
+def render_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table; columns of which all cells are numbers stand to the right."""
+    body = [[escape(cell) for cell in row] for row in rows]
+    columns = list(zip(header, *body, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    rights = [bool(body) and all(map(_is_number, column[1:])) for column in columns]
+    return [
+        _GAP.join(
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(row, widths, rights, strict=True)
+        ).rstrip()
+        for row in [header, *body]
+    ]
+
+
+def format_duration(seconds: float) -> str:
+    """Return `12 s`, `5 min`, `3 h` or `2 d`."""
+    if seconds < _MINUTE_SEC:
+        return f'{seconds:.0f} s'
+    if seconds < _HOUR_SEC:
+        return f'{seconds / _MINUTE_SEC:.0f} min'
+    if seconds < _DAY_SEC:
+        return f'{seconds / _HOUR_SEC:.0f} h'
+    return f'{seconds / _DAY_SEC:.0f} d'
+
+
+def _is_number(cell: str) -> bool:
+    return cell in ('', '-') or cell.rstrip('%').replace('.', '', 1).isdigit()

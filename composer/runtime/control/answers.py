@@ -1,0 +1,102 @@
+"""What a running system answers as JSON: its state, and the health of its entities."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from composer.runtime.control.protocol import VERSION
+from composer.runtime.health.system_state import Outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
+    from composer.runtime.health.statistics import EntityKey, EntityReport
+    from composer.runtime.health.system_state import SystemState
+
+_LEVELS = ('ok', 'warn', 'error')
+_P99 = 0.99
+_NS_PER_MS = 1e6
+_NS_PER_SEC = 1e9
+
+
+def status_answer(
+    state: SystemState, nodes: Sequence[str], diagnostics: DiagnosticsPublisher | None
+) -> Outcome:
+    """Return what a system says of itself.
+
+    Args:
+        nodes: Their full names.
+        diagnostics: What measures the health of the entities; `None` if nothing does.
+    """
+    health = None if diagnostics is None else _summarize(diagnostics)
+    return _answer({**state.document(), 'nodes': list(nodes), 'health': health})
+
+
+def top_answer(state: SystemState, diagnostics: DiagnosticsPublisher | None) -> Outcome:
+    """Return the health of each entity in the last period, and have more measured in the next."""
+    if diagnostics is None:
+        text = "the system measures nothing: its file says 'diagnostics: false'"
+        return Outcome(succeeded=False, text=text)
+    diagnostics.watch()
+    latest = diagnostics.latest
+    return _answer(
+        {
+            'name': state.name,
+            'period': latest.number,
+            'period_sec': diagnostics.period_sec,
+            'entities': [
+                _describe_entity(key, report, has_cpu=latest.has_cpu)
+                for key, report in latest.by_entity.items()
+            ],
+        }
+    )
+
+
+def _answer(data: dict[str, Any]) -> Outcome:
+    return Outcome(succeeded=True, text=json.dumps({'version': VERSION, **data}))
+
+
+def _summarize(diagnostics: DiagnosticsPublisher) -> dict[str, str]:
+    """Return the worst level of all entities, and the one that has it."""
+    worst, message = 0, ''
+    for (node, owner), report in diagnostics.latest.by_entity.items():
+        level, text = _find_level(report)
+        if level > worst:
+            worst, message = level, f'{node}: {owner}: {text}'
+    return {'level': _LEVELS[worst], 'message': message}
+
+
+def _describe_entity(key: EntityKey, report: EntityReport, *, has_cpu: bool) -> dict[str, Any]:
+    node, owner = key
+    times, missed = report.times, report.all_missed
+    calls = times.calls()
+    level, message = _find_level(report)
+    return {
+        'node': node,
+        'kind': owner.kind,
+        'name': owner.name,
+        'key': owner.key,
+        'level': _LEVELS[level],
+        'message': message,
+        'rate_hz': calls / report.period_sec,
+        'mean_ms': times.mean_ns() / _NS_PER_MS if calls else None,
+        'p99_ms': times.percentile_ns(_P99) / _NS_PER_MS if calls else None,
+        'max_ms': times.most_ns / _NS_PER_MS if calls else None,
+        'cpu': times.cpu_ns / _NS_PER_SEC / report.period_sec if has_cpu else None,
+        'queued': report.queued,
+        'calls': report.all_calls,
+        'errors': report.all_errors,
+        'dropped': missed.overruns,
+        'late': missed.late_ticks,
+        'skipped': missed.skipped_ticks,
+    }
+
+
+def _find_level(report: EntityReport) -> tuple[int, str]:
+    # What is reported at all was measured for the messages of diagnostics.
+    from composer.runtime.health.diagnostic_status import summarize_report
+
+    level, message = summarize_report(report)
+    return level[0], message

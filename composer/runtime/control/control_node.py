@@ -1,0 +1,247 @@
+"""The node of a system itself: `/diagnostics`, and services by which the system is asked.
+
+It needs nothing of the executor of the system, so hanging behaviours stop neither. It is created
+when the system is up, or takes long to come up, and so delays no start.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.node import Node as RosNode
+from rclpy.parameter import Parameter
+
+from composer.errors import ExitCode, StartError
+from composer.runtime.control import protocol
+from composer.runtime.control.answers import status_answer, top_answer
+from composer.runtime.control.name_claim import NameClaim
+from composer.runtime.control.rivals import Rivals
+from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
+from composer.runtime.health.system_state import Outcome, SystemState
+from composer.runtime.logs import system_logger
+from composer.runtime.system_executor import SystemExecutor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rclpy.callback_groups import CallbackGroup
+    from rclpy.context import Context
+
+    from composer.language.specs import SystemSpec
+    from composer.planning.snapshot import Snapshot
+    from composer.runtime.behaviours.running_calls import RunningCall
+    from composer.runtime.health.statistics import HealthRegistry
+
+# The node is created then even if the system is not up.
+_LATEST_SEC = 0.5
+_STOP_SEC = 1.0
+
+
+class ControlledSystem(Protocol):
+    """A system that is asked."""
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What it runs as."""
+
+    @property
+    def state(self) -> SystemState:
+        """Its state."""
+
+    def list_nodes(self) -> list[str]:
+        """Return the full names of its nodes."""
+
+    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
+        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
+
+    def restart_node(self, full_name: str) -> Outcome:
+        """Build a node anew."""
+
+    def request_stop(self, code: int = ExitCode.DONE) -> None:
+        """Let it stop."""
+
+
+class Commands(Protocol):
+    """What is done with the files of a running system."""
+
+    def reload(self, system: Any) -> Outcome:
+        """Read the files, and let the system become what they say."""
+
+    def plan(self, system: Any) -> Outcome:
+        """Read the files, and tell what `reload` would do."""
+
+
+class ControlNode:
+    """The node of a system itself, from `start` to `stop`.
+
+    Args:
+        health: The health of the system's entities; `None` if it is not measured.
+        commands: `None` if the system is not to be asked over ROS.
+    """
+
+    def __init__(
+        self,
+        system: ControlledSystem,
+        spec: SystemSpec,
+        health: HealthRegistry | None,
+        commands: Commands | None,
+    ) -> None:
+        self._system = system
+        self._commands = commands
+        self._diagnostics: DiagnosticsPublisher | None = None
+        if health is not None and spec.diagnostics_period_sec is not None:
+            self._diagnostics = DiagnosticsPublisher(
+                system.state, spec.diagnostics_period_sec, health, system.overdue_calls
+            )
+        self._node: RosNode | None = None
+        self._executor: SystemExecutor | None = None
+        self._claim: NameClaim | None = None
+        self._may_begin = threading.Event()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='composer-control', daemon=True)
+
+    def start(self, context: Context, ros_arguments: Sequence[str]) -> None:
+        """Take the system's name, and create the node soon.
+
+        Args:
+            ros_arguments: The arguments after `--ros-args` of the command line.
+
+        Raises:
+            StartError: Another system has the name.
+        """
+        self._context, self._ros_arguments = context, ros_arguments
+        state = self._system.state
+        self._claim = NameClaim(protocol.node_name(state.name), context.get_domain_id())
+        about = {**state.who(), 'is_asked': self._commands is not None}
+        owner = self._claim.take(about)
+        if owner is not None:
+            advice = f"stop it with 'composer down {state.name}', or use another ROS_DOMAIN_ID"
+            raise StartError(self._describe_rival(owner), help=advice)
+        if self._diagnostics is not None or self._commands is not None:
+            self._thread.start()
+
+    def begin(self) -> None:
+        """Create the node now, as the system is up."""
+        self._may_begin.set()
+
+    def follow(self, spec: SystemSpec) -> None:
+        """Do from now on what a system says that was edited."""
+        if self._diagnostics is not None and spec.diagnostics_period_sec is not None:
+            self._diagnostics.period_sec = spec.diagnostics_period_sec
+
+    def stop(self) -> None:
+        """Answer no more, and destroy the node, if it was created."""
+        self._ended.set()
+        self._may_begin.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+        if self._diagnostics is not None:
+            self._diagnostics.stop()
+        if self._executor is not None:
+            self._executor.stop(_STOP_SEC)
+        if self._node is not None:
+            self._node.destroy_node()
+
+    def release_name(self) -> None:
+        """Let another system have the name, as this one has left the graph."""
+        if self._claim is not None:
+            self._claim.release()
+
+    def _run(self) -> None:
+        self._may_begin.wait(_LATEST_SEC)
+        if self._ended.is_set():
+            return
+        try:
+            self._node = self._create_node()
+            self._publish_diagnostics()
+            self._serve()
+        except Exception as error:  # noqa: BLE001 - rclpy and the middleware raise many kinds
+            system_logger.error(f'the system cannot be asked over ROS: {error}')
+
+    def _create_node(self) -> RosNode:
+        return RosNode(
+            protocol.node_name(self._system.state.name),
+            context=self._context,
+            cli_args=['--ros-args', *self._ros_arguments],
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[
+                Parameter('start_type_description_service', value=False),
+                # Nothing that it does depends on `/clock`.
+                Parameter('use_sim_time', value=False),
+            ],
+        )
+
+    def _publish_diagnostics(self) -> None:
+        if self._diagnostics is None or self._node is None:
+            return
+        try:
+            self._diagnostics.start(self._node)
+        except ImportError as error:
+            system_logger.warning(f'/diagnostics is not published: {error}')
+
+    def _serve(self) -> None:
+        if self._commands is None or self._node is None:
+            return
+        self._create_services(self._node, self._commands)
+        self._executor = SystemExecutor(self._context, None, log=system_logger.error)
+        self._executor.add_node(self._node)
+        self._executor.start()
+
+    def _create_services(self, node: RosNode, commands: Commands) -> None:
+        from rcl_interfaces.srv import SetParametersAtomically
+        from std_srvs.srv import Trigger
+
+        system, state = self._system, self._system.state
+        queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
+
+        def serve(name: str, answer: Callable[[], Outcome], group: CallbackGroup) -> None:
+            def callback(_request: Any, response: Any) -> Any:
+                outcome = answer()
+                response.success, response.message = outcome.succeeded, outcome.text
+                return response
+
+            node.create_service(Trigger, f'~/{name}', callback, callback_group=group)
+
+        def restart(request: Any, response: Any) -> Any:
+            names = {each.name: each.value.string_value for each in request.parameters}
+            outcome = self._restart(names.get('node', ''))
+            response.result.successful, response.result.reason = outcome.succeeded, outcome.text
+            return response
+
+        def status() -> Outcome:
+            return status_answer(state, system.list_nodes(), self._diagnostics)
+
+        serve(protocol.STATUS, status, queries)
+        serve(protocol.TOP, lambda: top_answer(state, self._diagnostics), queries)
+        serve(protocol.DOWN, self._stop_system, queries)
+        serve(protocol.PLAN, lambda: commands.plan(system), changes)
+        serve(protocol.RELOAD, lambda: commands.reload(system), changes)
+        node.create_service(
+            SetParametersAtomically, f'~/{protocol.RESTART}', restart, callback_group=changes
+        )
+        Rivals(node, queries, state.who(), state.begun, self._give_way)
+
+    def _restart(self, name: str) -> Outcome:
+        if not self._system.state.is_up:
+            return Outcome(succeeded=False, text='the system is still starting')
+        if name not in self._system.list_nodes():
+            return Outcome(succeeded=False, text=f"the system has no node '{name}'")
+        return self._system.restart_node(name)
+
+    def _stop_system(self) -> Outcome:
+        self._system.request_stop()
+        return Outcome(succeeded=True, text=f'{self._system.state.name} stops')
+
+    def _give_way(self, rival: Mapping[str, Any]) -> None:
+        system_logger.error(f'{self._describe_rival(rival)}; so this one ends')
+        self._system.request_stop(ExitCode.FAILED)
+
+    def _describe_rival(self, rival: Mapping[str, Any]) -> str:
+        what = f"a system '{self._system.state.name}' runs already on this ROS graph"
+        known = [f'{key} {rival[key]}' for key in ('host', 'pid', 'file') if key in rival]
+        domain = f'ROS_DOMAIN_ID {self._context.get_domain_id()}'
+        return f'{what} ({", ".join([domain, *known])})'

@@ -1,0 +1,160 @@
+"""The commands that ask running systems, and what these answer."""
+
+import json
+import os
+import re
+import socket
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.cli.main import run
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """
+version: 1
+executor: {threads: 1}
+nodes:
+  arm:
+    namespace: robot
+    state: {count: 0}
+    timers:
+      tick: {period: 0.05, behaviour: parts:tick, warn_after: 0.2}
+  stuck:
+    subscriptions:
+      trigger: {type: std_msgs/msg/Empty, external: true, behaviour: parts:stick}
+"""
+CODE = """
+import time
+
+def tick(node):
+    node.state.count += 1
+    if node.state.count % 20 == 1:
+        node.logger.info(f'count {node.state.count}')
+
+def stick(node, message):
+    time.sleep(3600)
+"""
+
+
+@pytest.fixture
+def composer(capsys, monkeypatch, domain_id):
+    """Run a command in the test's domain; return its exit code, output and errors."""
+
+    def call(*words):
+        code = run(list(words))
+        return (code, *capsys.readouterr())
+
+    return call
+
+
+def test_a_running_system_answers(compose, composer, wait_for):
+    """Ask it all, in the order in which a user might."""
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    path = compose.folder / 'system.yaml'
+
+    code, output, _ = composer('ps')
+    assert code == 0
+    header, row = output.splitlines()
+    assert header.split()[:4] == ['NAME', 'STATE', 'HEALTH', 'NODES']
+    assert row.startswith('system  running  ')
+    assert row.endswith(f'{socket.gethostname()}  {child.pid}  {path}')
+
+    code, output, _ = composer('ps', '--format', 'json')
+    (told,) = json.loads(output)['systems']
+    assert told['nodes'] == ['/robot/arm', '/stuck']
+    assert told['last_reload'] is None
+
+    assert composer('reload') == (0, 'system: nothing has changed\n', '')
+    path.write_text(SYSTEM.replace('0.05', '0.04'))
+    code, output, _ = composer('reload', 'system')
+    assert (code, re.sub(r'\d+ ms', '_', output)) == (0, 'system: reloaded in _: ~1 timer\n')
+    path.write_text(SYSTEM.replace('0.05', 'often'))
+    code, output, errors = composer('reload')
+    assert (code, output) == (1, '')
+    assert 'error[' in errors
+    assert errors.endswith('system: not reloaded: the system runs on as it was\n')
+    assert 'system: last reload: ' in composer('ps')[1]
+    path.write_text(SYSTEM)
+
+    child.wait_for_line('count 21')
+    started = len(child.matching('count 1'))
+    assert composer('restart', 'arm') == (0, "system: node '/robot/arm' was restarted\n", '')
+    child.wait_for_line('count 1', times=started + 1)
+
+    assert composer('down', 'system') == (0, 'system: stopped\n', '')
+    assert child.wait() == 0
+
+
+ABSENT = 'on this ROS graph (ROS_DOMAIN_ID {domain})'
+WRONG = {
+    'no system': (('reload',), 1, f'error: no system runs {ABSENT}\n'),
+    'no such system': (('down', 'robot'), 1, f"error: there is no system 'robot' {ABSENT}\n"),
+    'no node': (('restart', 'arm'), 1, "error: no system on this ROS graph has a node 'arm'\n"),
+    'no time': (('reload', '--timeout', '0'), 2, 'error: '),
+}
+
+
+@pytest.mark.parametrize('name', WRONG)
+def test_what_cannot_be_asked_is_told(composer, domain_id, name):
+    words, code, message = WRONG[name]
+    found, output, errors = composer(*words)
+    assert (found, output) == (code, '')
+    assert errors.startswith(message.format(domain=domain_id))
+
+
+def test_several_systems_are_told_apart(compose, composer):
+    for name in ('first', 'second', 'third'):
+        text = SYSTEM.replace('arm:', f'arm_{name}:').replace('stuck:', f'stuck_{name}:')
+        words = ['--no-control'] if name == 'third' else []
+        compose.run(compose.write(text, CODE, name).name, *words).wait_until_ready()
+    code, _, errors = composer('reload')
+    assert code == 2
+    assert errors.endswith('name one of them: first, second\n')
+    code, _, errors = composer('reload', 'secnd')
+    assert (code, errors.splitlines()[-1]) == (1, "  help: did you mean 'second'?")
+    code, _, errors = composer('down', 'third')
+    assert (code, errors) == (
+        1,
+        "error: system 'third' was started with --no-control, and cannot be asked\n",
+    )
+    code, _, errors = composer('restart', 'arm_frist')
+    assert (code, errors.splitlines()[-1]) == (1, "  help: did you mean 'arm_first'?")
+    assert composer('restart', '/robot/arm_second')[:2] == (
+        0,
+        "second: node '/robot/arm_second' was restarted\n",
+    )
+
+
+def test_a_behaviour_that_hangs_stops_no_answer(compose, composer, peer, wait_for):
+    from std_msgs.msg import Empty
+
+    child = compose(SYSTEM + 'diagnostics: {period: 0.1}\n', CODE)
+    child.wait_until_ready()
+    peer.advertise(Empty, '/trigger').publish(Empty())
+
+    def is_told():
+        (told,) = json.loads(composer('ps', '--format', 'json')[1])['systems']
+        return told['health'] if told['health']['level'] != 'ok' else None
+
+    wait_for(is_told, 'that it hangs')
+    code, _, errors = composer('restart', 'stuck')
+    assert code == 1
+    assert errors == "system: node 'stuck' hangs, and is left as it is: subscription 'trigger'\n"
+
+
+def test_a_system_that_cannot_answer_is_told_of(compose, composer, monkeypatch):
+    monkeypatch.setattr('composer.cli.running.client.STATUS_SEC', 0.5)
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    composer('ps')
+    child.send(19)  # SIGSTOP
+    try:
+        code, _, errors = composer('reload', 'system', '--timeout', '0.5')
+        assert code == 1
+        assert errors.startswith("error: system 'system' did")
+    finally:
+        os.kill(child.pid, 18)  # SIGCONT

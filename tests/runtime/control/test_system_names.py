@@ -1,0 +1,139 @@
+"""One system of a name on one graph: on one host at once, on several as soon as they meet."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+
+from composer.executor import ComposerExecutor
+from composer.runtime.control.name_claim import NameClaim, list_claims
+from composer.runtime.control.rivals import Rivals
+from tests.running import DEADLINE_SEC
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """
+version: 1
+nodes:
+  lonely:
+    timers: {tick: {period: 1.0, behaviour: parts:tick}}
+"""
+CODE = """
+def tick(node):
+    pass
+"""
+
+
+def test_a_name_is_had_once_and_told_of(domain_id):
+    first, second = (NameClaim('_composer_a', domain_id) for _ in range(2))
+    assert first.take({'name': 'a', 'file': 'a.yaml'}) is None
+    assert second.take({'name': 'a'}) == {'name': 'a', 'file': 'a.yaml', 'pid': os.getpid()}
+    assert NameClaim('_composer_a', domain_id + 100).take({}) is None
+    assert [each['name'] for each in list_claims(domain_id)] == ['a']
+    first.release()
+    assert list_claims(domain_id) == []
+    assert second.take({'name': 'a'}) is None
+    second.release()
+
+
+def test_a_process_that_is_killed_or_stopped_has_a_name_no_longer_than_it_lives(domain_id):
+    code = f"""
+import os, signal
+from composer.runtime.control.name_claim import NameClaim
+NameClaim('_composer_a', {domain_id}).take({{}})
+print('taken', flush=True)
+if os.fork():
+    os.kill(os.getpid(), signal.SIGSTOP)
+os.close(1)
+signal.pause()
+"""
+    child = subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True)
+    own = NameClaim('_composer_a', domain_id)
+    try:
+        assert child.stdout.readline() == 'taken\n'
+        os.waitpid(child.pid, os.WUNTRACED)
+        # It cannot answer.
+        assert own.take({}) in ({'pid': child.pid}, {})
+    finally:
+        forked = subprocess.run(
+            ['pgrep', '-P', str(child.pid)], capture_output=True, text=True, check=False
+        )
+        child.kill()
+        child.communicate()
+    # Its own child has inherited the socket, and lives.
+    try:
+        assert own.take({}) is None
+    finally:
+        own.release()
+        os.kill(int(forked.stdout), 9)
+
+
+def test_of_two_that_start_together_one_comes_up(compose):
+    path = compose.write(SYSTEM, CODE)
+    children = [compose.run(path.name) for _ in range(2)]
+    deadline = time.monotonic() + DEADLINE_SEC
+    while not (done := [each for each in children if each.matching('runs already')]):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    (refused,) = done
+    (other,) = (each for each in children if each is not refused)
+    assert refused.wait() == 1
+    line = refused.wait_for_line("error: a system 'system' runs already on this ROS graph")
+    assert f'pid {other.pid}, file {path}' in line
+    assert not refused.matching(' ready in ')
+    other.wait_until_ready()
+    assert other.stop() == 0
+
+
+class Host:
+    """A control node without the claim of its host, as if it were on another one."""
+
+    def __init__(self, name, domain_id, age_sec):
+        self.refused_by = []
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=domain_id)
+        self._node = rclpy.create_node('_composer_a', context=self._context)
+        self._executor = ComposerExecutor(context=self._context)
+        begun = time.monotonic() - age_sec
+        group = ReentrantCallbackGroup()
+        Rivals(self._node, group, {'host': name}, begun, self.refused_by.append)
+        self._executor.add_node(self._node)
+        self._executor.create_task(lambda: None)
+
+    def spin(self):
+        self._executor.spin_once(0.01)
+
+    def close(self):
+        self._executor.shutdown(DEADLINE_SEC)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+@pytest.mark.parametrize('ages', [(0.0, 0.0, 0.0), (9.0, 100.0, 0.0), (100.0, 50.0, 20.0)])
+def test_of_systems_on_several_hosts_the_one_that_was_there_first_stays(domain_id, wait_for, ages):
+    hosts = [Host(f'host {index}', domain_id, age) for index, age in enumerate(ages)]
+    try:
+
+        def one_is_left():
+            for host in hosts:
+                host.spin()
+            return sum(not host.refused_by for host in hosts) == 1
+
+        wait_for(one_is_left, 'two of three to be refused')
+        for _ in range(50):
+            for host in hosts:
+                host.spin()
+        left = [index for index, host in enumerate(hosts) if not host.refused_by]
+        assert len(left) == 1
+        if max(ages):
+            assert left == [ages.index(max(ages))]
+    finally:
+        for host in hosts:
+            host.close()
