@@ -4,7 +4,7 @@ import copy
 import json
 import random
 
-MODULE = '''
+MODULE = """
 LEVEL = 1
 
 
@@ -46,21 +46,21 @@ def follow(node, feedback):
 
 
 def begin(node):
-    node.state.begun = True
+    node.logger.debug('begun')
 
 
 def decide(node, changes):
     return 'no' if changes.get('speed') == 99.0 else None
-'''
+"""
 
-PEER = '''
+PEER = """
 def tick(node, text='y'):
     return text
 
 
 def hear(node, message, prefix='p'):
     return None
-'''
+"""
 
 PARAMETERS = '/**:\n  ros__parameters:\n    limit: {limit}\n'
 
@@ -227,7 +227,9 @@ class Project:
 
     def edit(self):
         """Make one to three edits; return what they are."""
-        done = [self._random.choice(self._edits())() for _ in range(self._random.choice([1, 1, 2, 3]))]
+        done = [
+            self._random.choice(self._edits())() for _ in range(self._random.choice([1, 1, 2, 3]))
+        ]
         self._write()
         return done
 
@@ -293,7 +295,9 @@ class Project:
     def _edit_state(self):
         node = self._choose(self.data['nodes'])
         state = self.data['nodes'][node].setdefault('state', {})
-        return f'{node}.state.{self._set(state, {"begun": [False, None], "extra": [1, [2], None]})}'
+        return (
+            f'{node}.state.{self._set(state, {"begun": [False, None], "extra": [1, [2], None]})}'
+        )
 
     def _edit_limit(self):
         limit = self._random.choice(['5', '8', '1.5', 'many'])
