@@ -53,6 +53,8 @@ def describe(system):
 
 def describe_node(node):
     ros = node.ros
+    if ros._late_events is not None:
+        ros._late_events.create()  # It comes with the first event.
     subscriptions = [
         (each.topic_name, each.msg_type, describe_qos(each.qos_profile), describe_group(each))
         for each in ros.subscriptions
