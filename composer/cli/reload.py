@@ -34,6 +34,7 @@ _SUFFIXES = ('.yaml', '.yml', '.py', '.msg', '.srv', '.action')
 # An editor writes a file in several steps: the last one counts.
 _STEP_MS = 10
 _DEBOUNCE_MS = 100
+_LOOK_MS = 500
 _RUNS_ON = 'the system runs on as it was'
 _NO_CHANGE = 'nothing has changed'
 
@@ -53,6 +54,7 @@ class Reloader:
         self._reader = reader
         self._prefixes = prefixes
         self._files = _list_files(reader, context)
+        self._seen = _stamps(self._files)
         self._lock = threading.Lock()
 
     def reload(self, system: System) -> Outcome:
@@ -107,8 +109,9 @@ class Reloader:
             findings.extend(found)
             show_findings(found)
 
+        self._seen = _stamps(self._files)
         context = self._check(report)
-        self._files |= _list_files(self._reader, context)
+        self._note_files(self._files | _list_files(self._reader, context))
         snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         with fresh_modules(stale, snapshot.sources):
@@ -116,7 +119,7 @@ class Reloader:
             if reading is None:
                 raise ComposerError(_RUNS_ON)
             plan = system.rewire(reading)
-        self._files = _list_files(self._reader, context)
+        self._note_files(_list_files(self._reader, context))
         return plan
 
     def _check(self, report: Report) -> CheckContext:
@@ -127,6 +130,11 @@ class Reloader:
         if context is None:
             raise ComposerError(_RUNS_ON)
         return context
+
+    def _note_files(self, files: set[Path]) -> None:
+        """Watch these files; those that are new were read just now."""
+        self._seen.update(_stamps(files - self._files))
+        self._files = files
 
     @contextmanager
     def watching(self, system: System) -> Iterator[None]:
@@ -153,11 +161,14 @@ class Reloader:
                 stop_event=ended,
                 step=_STEP_MS,
                 debounce=_DEBOUNCE_MS,
-                rust_timeout=500,
+                rust_timeout=_LOOK_MS,
+                yield_on_timeout=True,
                 recursive=False,
             )
-            for _ in changes:
-                self.reload(system)
+            for changed in changes:
+                # Nothing tells of edits before the watch began, or on some network drives.
+                if changed or any(self._seen.get(p) != s for p, s in _stamps(self._files).items()):
+                    self.reload(system)
                 if folders != {path.parent for path in self._files}:
                     break
 
@@ -177,6 +188,19 @@ def summarize(plan: Plan) -> str:
         f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
         for (action, noun), count in counts.items()
     )
+
+
+def _stamps(files: set[Path]) -> dict[Path, tuple[int, ...] | None]:
+    """Return what changes when a file is written or replaced; `None` for no file."""
+    stamps: dict[Path, tuple[int, ...] | None] = {}
+    for path in files:
+        try:
+            status = path.stat()
+        except OSError:
+            stamps[path] = None
+        else:
+            stamps[path] = status.st_mtime_ns, status.st_size, status.st_ino
+    return stamps
 
 
 def _list_files(reader: SystemReader, context: CheckContext) -> set[Path]:

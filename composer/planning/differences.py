@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
-    *('path', 'name', 'namespace', 'description', 'external', 'parameter_files', 'state'),
+    *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
     *(kind.section for kind in ENTITY_KINDS),
 }
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
@@ -68,7 +68,7 @@ _NODES = _Rules(
     'node',
     'its state, parameters set while it ran, all that is queued',
     dict.fromkeys(
-        ('remap', 'rosout', 'type_description_service', 'logger_services'),
+        ('remap', 'rosout', 'parameter_services', 'type_description_service', 'logger_services'),
         'ROS reads this when the node is created',
     ),
 )

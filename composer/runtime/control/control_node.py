@@ -14,6 +14,7 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
 from composer.errors import ExitCode, StartError
+from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control import protocol
 from composer.runtime.control.answers import status_answer, top_answer
 from composer.runtime.control.name_claim import NameClaim
@@ -200,7 +201,7 @@ class ControlNode:
 
         def serve(name: str, answer: Callable[[], Outcome], group: CallbackGroup) -> None:
             def callback(_request: Any, response: Any) -> Any:
-                outcome = answer()
+                outcome = _attempt(answer)
                 response.success, response.message = outcome.succeeded, outcome.text
                 return response
 
@@ -208,7 +209,7 @@ class ControlNode:
 
         def restart(request: Any, response: Any) -> Any:
             names = {each.name: each.value.string_value for each in request.parameters}
-            outcome = self._restart(names.get('node', ''))
+            outcome = _attempt(lambda: self._restart(names.get('node', '')))
             response.result.successful, response.result.reason = outcome.succeeded, outcome.text
             return response
 
@@ -245,3 +246,12 @@ class ControlNode:
         known = [f'{key} {rival[key]}' for key in ('host', 'pid', 'file') if key in rival]
         domain = f'ROS_DOMAIN_ID {self._context.get_domain_id()}'
         return f'{what} ({", ".join([domain, *known])})'
+
+
+def _attempt(answer: Callable[[], Outcome]) -> Outcome:
+    """Return an answer whatever happens: without one, who asked would wait in vain."""
+    try:
+        return answer()
+    except Exception as error:  # noqa: BLE001 - a bug in Composer, or a behaviour that broke it
+        system_logger.error(format_internal_error(error))
+        return Outcome(succeeded=False, text=f'it failed: {error!r}')

@@ -197,6 +197,7 @@ class _Behaviours:
             if behaviour is not None
         }
         if not self._calls:
+            self.destroy()
             return
         are_async = any(call.is_async for call in self._calls.values())
         drain = self._drain_async if are_async else self._drain
@@ -208,6 +209,7 @@ class _Behaviours:
         """Call no behaviour any more."""
         if self._guard is not None:
             self._node.ros.destroy_guard_condition(self._guard)
+            self._guard = None
 
     def put(self, key: str, item: Any) -> None:
         """Let the behaviour under a key, if there is one, be called with an item."""

@@ -71,6 +71,7 @@ class NodeParameters:
         if self._asking is not None:
             ros.remove_on_set_parameters_callback(self._asking)
             self._asking = None
+            self._node.drop_limits('on_parameters')
         if behaviour is not None:
             # rclpy calls the callback first that was added last, and a behaviour is not asked
             # about what is refused anyway.

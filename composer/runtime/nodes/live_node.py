@@ -37,7 +37,7 @@ from composer.runtime.reserved_methods import release, reserve
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from rclpy.callback_groups import CallbackGroup
     from rclpy.task import Future
@@ -108,6 +108,8 @@ class LiveNode:
         waits: How its behaviours wait.
         background: A callback group without behaviours: its responses are always taken.
         serving: The callback group of requests to action servers.
+        functions: The behaviours, by their names, as they were when the node was created or
+            changed: one that goes calls those that it has known.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
         suspended: Behaviours that are ended before `on_stop`.
@@ -125,6 +127,7 @@ class LiveNode:
     background: CallbackGroup
     gate: Gate
     serving: CallbackGroup
+    functions: Mapping[str, Callable[..., Any]]
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
     suspended: list[Suspended] = field(default_factory=list)
@@ -172,7 +175,7 @@ class LiveNode:
         node = self.behaviour_node
         if owner is not None:
             node = self._views.setdefault(owner, node.with_own_state())
-        return partial(self.system.functions[behaviour.name], node, **behaviour.arguments)
+        return partial(self.functions[behaviour.name], node, **behaviour.arguments)
 
     def call(
         self,
@@ -301,8 +304,19 @@ class LiveNode:
         for end in self.endpoints:
             end.losses.flush()
 
+    def change(self, noun: str, spec: Any, entity: LiveEntity) -> None:
+        """Let an entity do as `spec` says from now on."""
+        self.drop_limits(noun, spec.name)
+        entity.change(spec)
+
+    def drop_limits(self, noun: str, name: str = '') -> None:
+        """Forget how long behaviours of an entity, or of the node itself, may run."""
+        for owner in list(self.limits):
+            if (owner.kind, owner.name) == (noun, name):
+                del self.limits[owner]
+
     def forget(self, noun: str, name: str) -> None:
-        """Forget what is known of an entity that is gone: its `own_state`, limit and health."""
+        """Forget what is known of an entity that is gone: its `own_state`, limits and health."""
 
         def owns(owner: Owner) -> bool:
             return (owner.kind, owner.name) == (noun, name)
@@ -366,4 +380,5 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         background=background,
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),
+        functions=system.functions,
     )

@@ -98,7 +98,7 @@ class Rewiring:
         """
         try:
             self._refuse_restart(plan)
-            self._replace_reading()
+            self._read_as(self._new)
             self._exchange_nodes_and_processes(plan)
             self._change_nodes(plan)
         except BaseException:
@@ -128,24 +128,20 @@ class Rewiring:
                 raise StartError(message, help='stop the system, and start it again')
 
     def _undo_all(self) -> None:
+        self._read_as(self._old)
         for undo in reversed(self._undo):
             try:
                 undo()
             except Exception as error:  # noqa: BLE001 - the rest must be undone
                 system_logger.error(f'reload: something could not be undone: {error}')
 
-    def _replace_reading(self) -> None:
-        """Let what is created from now on, and what errors tell of places, be of the new files."""
-
-        def put(reading: Reading) -> None:
-            handle, spec = self._handle, reading.spec
-            handle.positions = reading.positions
-            handle.profiles = spec.qos
-            handle.functions = reading.functions
-            handle.without_parameter_services = spec.without_parameter_services
-
-        self._undo.append(partial(put, self._old))
-        put(self._new)
+    def _read_as(self, reading: Reading) -> None:
+        """Let what is created from now on, and what errors tell of places, be of these files."""
+        handle, spec = self._handle, reading.spec
+        handle.positions = reading.positions
+        handle.profiles = spec.qos
+        handle.functions = reading.functions
+        handle.without_parameter_services = spec.without_parameter_services
 
     def _exchange_nodes_and_processes(self, plan: Plan) -> None:
         def targets(section: str, *actions: Action) -> list[str]:
@@ -255,10 +251,10 @@ class Rewiring:
             if key not in before.state and key not in state
         }
         state.update(come)
-        node.spec = spec
+        node.spec, node.functions = spec, self._new.functions
 
         def put_back() -> None:
-            node.spec = before
+            node.spec, node.functions = before, self._old.functions
             for key in come:
                 state.pop(key, None)
             state.update(gone)
@@ -278,6 +274,13 @@ class Rewiring:
         if keys & {'on_parameters', 'with', 'on_error', 'warn_after'} and node.parameters:
             self._undo.append(partial(node.parameters.ask, old.on_parameters))
             node.parameters.ask(node.spec.on_parameters)
+        if keys & {'on_error', 'warn_after'}:
+            # Their behaviours have no such keys of their own.
+            for name, spec in node.spec.action_clients.items():
+                client = node.entities['action_clients'][name]
+                before = old.action_clients.get(name, spec)
+                self._undo.append(partial(node.change, 'action client', before, client))
+                node.change('action client', spec, client)
 
     def _change_entity(self, operation: Operation) -> None:
         full_name, section, name = operation.target
@@ -291,10 +294,11 @@ class Rewiring:
         spec = getattr(node.spec, section).get(name)
         if operation.action is Action.CHANGE and before is not None:
             old = getattr(self._before[full_name], section)[name]
-            self._undo.append(partial(before.change, old))
-            before.change(spec)
+            self._undo.append(partial(node.change, operation.noun, old, before))
+            node.change(operation.noun, spec, before)
             return
         if operation.action in _COMING:
+            node.drop_limits(operation.noun, name)
             created = create_entity(node, section, spec)
             self._undo.append(created.destroy)
             if section == 'timers':

@@ -1,0 +1,204 @@
+"""`composer up --watch`: what edits do to a system that runs, as its user sees it."""
+
+import signal
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from std_msgs.msg import Int64
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """\
+version: 1
+nodes:
+  counter:
+    parameters: {step: 1}
+    state: {count: 0}
+    publishers: {count: {type: std_msgs/msg/Int64, external: true}}
+    timers:
+      tick: {period: 0.02, behaviour: parts:tick, publish: count}
+  talker:
+    publishers: {words: std_msgs/msg/String}
+    timers:
+      say: {period: 0.05, behaviour: parts:say, publish: words}
+  listener:
+    subscriptions:
+      words: {type: std_msgs/msg/String, behaviour: parts:hear}
+"""
+CODE = """\
+import time
+
+WORD = 'one'
+
+
+def tick(node):
+    node.state.count += node.parameters.step
+    return node.state.count
+
+
+def say(node):
+    node.own_state['said'] = node.own_state.get('said', 0) + 1
+    return f'{WORD} {node.own_state["said"]}'
+
+
+def hear(node, message):
+    node.logger.info(f'heard {message.data}')
+
+
+def fail(node):
+    raise OSError('no such device')
+
+
+def farewell(node):
+    node.logger.info('farewell')
+
+
+def hang(node):
+    time.sleep(100)
+"""
+
+
+@pytest.fixture
+def running(compose):
+    child = compose(SYSTEM, CODE, '--watch')
+    child.wait_until_ready()
+    return Edited(compose.folder, child)
+
+
+class Edited:
+    """A running system, and edits of its files."""
+
+    def __init__(self, folder, child):
+        self._folder = folder
+        self.child = child
+        self._reloads = 0
+
+    def edit(self, old, new, name='system.yaml'):
+        """Replace a text in a file, as editors do: write beside it, and rename."""
+        path = self._folder / name
+        text = path.read_text()
+        assert old in text
+        beside = path.with_suffix('.new')
+        beside.write_text(text.replace(old, new))
+        beside.replace(path)
+
+    def reloaded(self):
+        self._reloads += 1
+        return self.child.wait_for_line('reloaded in ', times=self._reloads)
+
+
+def test_edits_change_just_what_they_say(running, peer, wait_for):
+    counts = []
+    peer.node.create_subscription(
+        Int64, '/count', lambda message: counts.append(message.data), 1000
+    )
+    wait_for(lambda: counts, 'a count')
+
+    def gids():
+        found = peer.node.get_publishers_info_by_topic('/count')
+        return [bytes(each.endpoint_gid) for each in found]
+
+    before = gids()
+    edits = (
+        ('period: 0.05', 'period: 0.1', 'system.yaml', '~1 timer', 'heard one '),
+        ("WORD = 'one'", "WORD = 'two'", 'parts.py', '~2 timers, ~1 subscription', 'heard two '),
+        (
+            'behaviour: parts:hear}',
+            'behaviour: parts:hear, qos: {depth: 3}}',
+            'system.yaml',
+            '±1 subscription',
+            'heard two ',
+        ),
+        (
+            '  listener:',
+            '  other:\n    subscriptions:\n      words: '
+            '{type: std_msgs/msg/String, behaviour: parts:hear}\n  listener:',
+            'system.yaml',
+            '+1 node',
+            '[other]: heard two ',
+        ),
+        (
+            'state: {count: 0}',
+            'state: {count: 5, more: []}',
+            'system.yaml',
+            '~1 node',
+            'heard two',
+        ),
+    )
+    for old, new, name, summary, heard in edits:
+        running.edit(old, new, name)
+        assert running.reloaded().endswith(summary)
+        running.child.wait_for_line(heard, times=len(running.child.matching(heard)) + 1)
+    # The counter's node was named by edits of its code and state, but nothing of it was lost.
+    wait_for(lambda: len(counts) > 50, 'more counts')
+    assert counts == list(range(counts[0], counts[0] + len(counts)))
+    assert gids() == before
+    heard = [line.split()[-1] for line in running.child.matching('[listener]: heard')]
+    assert heard == [str(number) for number in range(int(heard[0]), int(heard[0]) + len(heard))]
+
+
+def test_what_cannot_be_applied_changes_nothing(running):
+    edits = (
+        ('system.yaml', 'parts:say', 'parts:sya', "did you mean 'say'?"),
+        ('system.yaml', 'period: 0.05', 'perid: 0.05', "did you mean 'period'?"),
+        ('system.yaml', 'timers:\n      say:', 'timers: [', 'error['),
+        ('parts.py', 'import time\n', 'import time\n1 / 0\n', 'ZeroDivisionError'),
+        ('parts.py', 'def say(node):', 'def say(node:', 'error['),
+        (
+            'system.yaml',
+            '  listener:',
+            '  late:\n    on_start: parts:fail\n  listener:',
+            'on_start raised OSError',
+        ),
+    )
+    for number, (name, old, new, told) in enumerate(edits, 1):
+        running.edit(old, new, name)
+        running.child.wait_for_line('not reloaded: ', times=number)
+        assert running.child.matching(told), running.child.output
+        said = len(running.child.matching('heard one'))
+        running.child.wait_for_line('heard one', times=said + 2)
+        running.edit(new, old, name)
+        # What is as it was needs no reload.
+        time.sleep(0.2)
+    assert not running.child.matching('reloaded in')
+    assert 'Traceback' not in running.child.output.replace('Traceback', '', 1)
+
+
+def test_removed_nodes_stop(running):
+    running.edit('  listener:', '  brief:\n    on_stop: parts:farewell\n  listener:')
+    running.reloaded()
+    running.edit('  brief:\n    on_stop: parts:farewell\n', '')
+    running.reloaded()
+    running.child.wait_for_line('[brief]: farewell')
+
+
+def test_values_set_live_stay(running, peer, wait_for):
+    counts = []
+    peer.node.create_subscription(
+        Int64, '/count', lambda message: counts.append(message.data), 1000
+    )
+    running.edit('{step: 1}', '{step: 10}')
+    running.reloaded()
+    wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == 10, 'steps of 10')
+    running.edit('{step: 10}', '{step: {default: 10, description: how far}}')
+    running.reloaded()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
+def test_a_signal_during_a_reload_leaves_nothing(running, number):
+    running.edit('  listener:', '  slow:\n    on_start: parts:hang\n  listener:')
+    time.sleep(0.3)
+    code = running.child.stop(number)
+    assert code in (0, -signal.SIGKILL)
+
+
+def test_ten_saves_a_second_end_at_the_last(running):
+    for number in range(20):
+        running.edit(f'period: {0.05 + number / 100:.2f}', f'period: {0.06 + number / 100:.2f}')
+        time.sleep(0.1)
+    running.edit('period: 0.25', 'period: 0.01')
+    said = len(running.child.matching('heard one'))
+    running.child.wait_for_line('heard one', times=said + 50)
