@@ -47,9 +47,12 @@ ROOMS = (
 SHARED_NAMES = {
     '__init__.py',
     'environment.py',  # variables, and their checks
+    'differences.py',  # between definitions, and between systems
     'names.py',  # the rules for names, and their checks
     'parameters.py',  # their checks, and their life in a node
+    'plan.py',  # what an edit does, and the command that shows it
     'qos.py',  # profiles and policies, and their checks
+    'reading.py',  # what was read: of a behaviour, and of a system
     'json_document.py',  # the same form, of findings, plans and drawings
     'text.py',  # the same
 }

@@ -7,6 +7,7 @@ Imports go one way through its rooms:
 - `health`: what is measured of behaviours, and reported.
 - `nodes`: a node without its entities, and what behaviours see of it.
 - `entities`: a file for each kind of entity.
+- `control`: the system's name, and the services by which it is asked.
 
 The modules of this folder use them all: `run` makes a `system`, whose nodes `start`, `restart` and
 `stop`. Except for these, which lie below the rooms: `forked_children`, `logs`,

@@ -219,10 +219,12 @@ class Client:
         if name in [each.get('name') for each in claims if not each.get('is_asked', True)]:
             message = f"system '{name}' was started with --no-control, and cannot be asked"
             return ComposerError(message)
-        if name is None:
-            return ComposerError(f'no system runs on this ROS graph ({domain})')
-        message = f"there is no system '{name}' on this ROS graph ({domain})"
-        return ComposerError(message, help=suggest(name, names, 'there are'))
+        silent = [str(each['pid']) for each in claims if 'name' not in each]
+        advice = suggest(name, names, 'there are') if name else None
+        if silent:
+            advice = f'process {silent[0]} runs a system, and does not answer'
+        what = f"there is no system '{name}'" if name else 'no system runs'
+        return ComposerError(f'{what} on this ROS graph ({domain})', help=advice)
 
     @staticmethod
     def _wait(condition: Callable[[], bool], timeout_sec: float) -> bool:

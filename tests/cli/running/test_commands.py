@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import socket
 
 import pytest
@@ -15,7 +16,7 @@ pytestmark = pytest.mark.ros
 
 SYSTEM = """
 version: 1
-executor: {threads: 1}
+executor: {threads: 1, shutdown_timeout: 0.5}
 nodes:
   arm:
     namespace: robot
@@ -58,10 +59,11 @@ def test_a_running_system_answers(compose, composer, wait_for):
 
     code, output, _ = composer('ps')
     assert code == 0
-    header, row = output.splitlines()
+    # The machine may be busy, and ticks be late: that is noted below the table.
+    header, row, *_ = output.splitlines()
     assert header.split()[:4] == ['NAME', 'STATE', 'HEALTH', 'NODES']
     assert row.startswith('system  running  ')
-    assert row.endswith(f'{socket.gethostname()}  {child.pid}  {path}')
+    assert row.split()[-3:] == [socket.gethostname(), str(child.pid), str(path)]
 
     code, output, _ = composer('ps', '--format', 'json')
     (told,) = json.loads(output)['systems']
@@ -123,10 +125,6 @@ def test_several_systems_are_told_apart(compose, composer):
     )
     code, _, errors = composer('restart', 'arm_frist')
     assert (code, errors.splitlines()[-1]) == (1, "  help: did you mean 'arm_first'?")
-    assert composer('restart', '/robot/arm_second')[:2] == (
-        0,
-        "second: node '/robot/arm_second' was restarted\n",
-    )
 
 
 def test_a_behaviour_that_hangs_stops_no_answer(compose, composer, peer, wait_for):
@@ -147,14 +145,12 @@ def test_a_behaviour_that_hangs_stops_no_answer(compose, composer, peer, wait_fo
 
 
 def test_a_system_that_cannot_answer_is_told_of(compose, composer, monkeypatch):
-    monkeypatch.setattr('composer.cli.running.client.STATUS_SEC', 0.5)
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
-    composer('ps')
-    child.send(19)  # SIGSTOP
+    os.kill(child.pid, signal.SIGSTOP)
     try:
-        code, _, errors = composer('reload', 'system', '--timeout', '0.5')
-        assert code == 1
-        assert errors.startswith("error: system 'system' did")
+        code, _, errors = composer('reload', 'system')
     finally:
-        os.kill(child.pid, 18)  # SIGCONT
+        os.kill(child.pid, signal.SIGCONT)
+    assert code == 1
+    assert errors.endswith(f'process {child.pid} runs a system, and does not answer\n')
