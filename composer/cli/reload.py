@@ -141,7 +141,7 @@ class Reloader:
         """Reload the system whenever a file changes, until the block ends."""
         ended = threading.Event()
         thread = threading.Thread(
-            target=self._watch, args=(system, ended), name='composer-watch-files', daemon=True
+            target=self._watch, args=(system, ended), name='watch files', daemon=True
         )
         thread.start()
         try:
