@@ -323,7 +323,7 @@ def show_command(
 
 @cli.command('plan', context_settings=NUMBERS_ARE_VALUES)
 @click.argument(
-    'words', nargs=-1, type=click.UNPROCESSED, metavar='OLD NEW [NAME:=VALUE]...', required=True
+    'words', nargs=-1, type=click.UNPROCESSED, metavar='[OLD] NEW [NAME:=VALUE]...', required=True
 )
 @click.option(
     '--layer',
@@ -356,7 +356,7 @@ def plan_command(
     *,
     tells_difference: bool,
 ) -> int:
-    """Show what turns the system of OLD into that of NEW.
+    """Show what turns the system of OLD, or the running one of its name, into that of NEW.
 
     There is a line for each operation: + added, ~ changed in place, ± recreated, - removed; with
     old and new values, why something must be recreated, and what is lost.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -16,12 +17,13 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.planning import json_document, text
 from composer.planning.differences import compare
 from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
-    from composer.planning.snapshot import Snapshot
+    from composer.checks.context import CheckContext
+    from composer.planning.plan import Plan
 
 
 def plan(
@@ -36,7 +38,8 @@ def plan(
     """Print what turns one system into another; return the exit code.
 
     Args:
-        paths: The file of the old system, and that of the new one.
+        paths: The file of the old system, and that of the new one; one file is that of the new
+            one, and the old one is the running system of its name.
         words: Values for the arguments that both files declare.
         set_values: Values to change in both.
         layers: Files that change both.
@@ -44,21 +47,24 @@ def plan(
         tells_difference: Whether the exit code is 2 if there is any.
 
     Raises:
-        UsageError: There are not two files, or the arguments or `--set` do not fit them.
+        UsageError: There are more files, or the arguments or `--set` do not fit them.
+        ComposerError: No such system runs.
     """
-    if len(paths) != 2:  # noqa: PLR2004
+    if len(paths) > 2:  # noqa: PLR2004
         message = f'a plan compares two files, not {len(paths)}'
         raise UsageError(message, help='give layers with --layer')
-    snapshots = []
+    contexts = []
     hidden: dict[str, str] = {}
     for path in paths:
-        snapshots.append(_read([path, *layers], words, set_values))
+        contexts.append(_read([path, *layers], words, set_values))
         hidden |= confidential.hidden_values()
     confidential.hide_again(hidden)
-    old, new = snapshots
-    if old is None or new is None:
+    if any(each is None for each in contexts):
         return ExitCode.FAILED
-    result = compare(old, new)
+    old, *more = filter(None, contexts)
+    result = (
+        compare(take_snapshot(old), take_snapshot(more[0])) if more else _compare_with_running(old)
+    )
     if format_name == 'json':
         click.echo(json_document.render_plan(result), nl=False, color=False)
     else:
@@ -67,14 +73,24 @@ def plan(
     return ExitCode.USAGE if result and tells_difference else ExitCode.DONE
 
 
+def _compare_with_running(context: CheckContext) -> Plan:
+    from composer.cli.running.client import ask_snapshot
+    from composer.runtime.environment import environment_set
+
+    # They say on which graph it runs.
+    with environment_set(context.spec.environment):
+        old = ask_snapshot(context.spec.name)
+    new = take_snapshot(context, [Path(each) for each in old.prefixes])
+    # What was left out of the one is left out of the other.
+    return compare(old, decode_snapshot(encode_snapshot(new)))
+
+
 def _read(
     paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
-) -> Snapshot | None:
-    """Return the snapshot of a system; without one, its errors have been printed."""
+) -> CheckContext | None:
+    """Return the context of a system; without one, its errors have been printed."""
     system = load_given(paths, words, set_values)
     context = create_context(system, InterfaceCatalogue())
     findings = check_in_context(system, context)
     show_findings(findings)
-    if has_errors(findings) or context is None:
-        return None
-    return take_snapshot(context)
+    return None if has_errors(findings) else context

@@ -168,8 +168,8 @@ class _Comparison:
 
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""
-        before = self._old.overrides(old).get(name)
-        after = self._new.overrides(new).get(name)
+        before = self._old.overrides.get(old.full_name, {}).get(name)
+        after = self._new.overrides.get(new.full_name, {}).get(name)
         old_value, old_span = (before.value, before.value_span) if before else (None, None)
         new_value, new_span = (after.value, after.value_span) if after else (None, None)
         if repr(old_value) != repr(new_value):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,9 @@ class Snapshot:
         sources: The texts of these modules.
         definitions: The text of each definition file of the declared interface packages, by the
             package and the path in its folder.
+        overrides: What the parameter files of nodes say of their parameters, by the nodes' full
+            names and the parameters' names.
+        prefixes: Where the interface packages are that were built for the system.
     """
 
     spec: SystemSpec
@@ -43,16 +46,8 @@ class Snapshot:
     code: Mapping[str, str]
     sources: Mapping[str, str]
     definitions: Mapping[tuple[str, str], str]
-    _files: dict[tuple[str, ...], MergedFiles] = field(default_factory=dict)
-
-    def overrides(self, node: NodeSpec) -> Mapping[str, ParameterEntry]:
-        """Return what the parameter files of a node say of its parameters, by their names."""
-        files = node.parameter_files
-        if not files:
-            return {}
-        if files not in self._files:
-            self._files[files] = MergedFiles(map(_read, files))
-        return self._files[files].find_overrides(node.full_name)
+    overrides: Mapping[str, Mapping[str, ParameterEntry]]
+    prefixes: tuple[str, ...] = ()
 
     def stale_modules(self, other: Snapshot) -> set[str]:
         """Return the modules whose source, or what they import, differs from `other`'s."""
@@ -76,16 +71,15 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         for name, text in package.sources.items()
     }
     reachable = sources.reachable(modules)
-    snapshot = Snapshot(
+    return Snapshot(
         spec,
         context.system.positions,
         {name: sources.digest(name) for name in reachable},
         {name: sources.text(name) for name in reachable},
         definitions,
+        _read_overrides(nodes),
+        tuple(map(str, prefixes)),
     )
-    for node in nodes:
-        snapshot.overrides(node)
-    return snapshot
 
 
 class _Sources:
@@ -147,6 +141,17 @@ def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
                 parts = [*base, *(node.module.split('.') if node.module else ())]
                 yield '.'.join(parts)
                 yield from ('.'.join([*parts, alias.name]) for alias in node.names)
+
+
+def _read_overrides(nodes: Iterable[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:
+    merged: dict[tuple[str, ...], MergedFiles] = {}
+    overrides = {}
+    for node in nodes:
+        if files := node.parameter_files:
+            if files not in merged:
+                merged[files] = MergedFiles(map(_read, files))
+            overrides[node.full_name] = merged[files].find_overrides(node.full_name)
+    return overrides
 
 
 def _read(path: str) -> ParameterFile:

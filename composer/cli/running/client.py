@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError, UsageError
+from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
 from composer.runtime.control import protocol
 from composer.runtime.control.name_claim import list_claims
@@ -19,11 +20,14 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from composer.planning.snapshot import Snapshot
+
 # How long systems on other hosts may take to be found, and those that are on this one for sure.
 _SEARCH_SEC = 1.0
 _LOCAL_SEARCH_SEC = 10.0
 _POLL_SEC = 0.05
 STATUS_SEC = 5.0
+_SNAPSHOT_SEC = 30.0
 
 
 @record
@@ -234,6 +238,17 @@ class Client:
                 return False
             time.sleep(_POLL_SEC)
         return True
+
+
+def ask_snapshot(name: str) -> Snapshot:
+    """Return what a running system runs as.
+
+    Raises:
+        ComposerError: There is no such system, or it does not answer.
+    """
+    with Client() as client:
+        outcome = client.ask(client.find(name), protocol.SNAPSHOT, _SNAPSHOT_SEC)
+    return decode_snapshot(read_answer(outcome.text))
 
 
 def read_answer(text: str) -> dict[str, Any]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from composer.planning.snapshot_data import encode_snapshot
 from composer.runtime.control.protocol import VERSION
 from composer.runtime.health.system_state import Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from composer.planning.snapshot import Snapshot
     from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
     from composer.runtime.health.statistics import EntityKey, EntityReport
     from composer.runtime.health.system_state import SystemState
@@ -52,6 +54,11 @@ def top_answer(state: SystemState, diagnostics: DiagnosticsPublisher | None) -> 
             ],
         }
     )
+
+
+def snapshot_answer(snapshot: Snapshot) -> Outcome:
+    """Return what a system runs as."""
+    return _answer(encode_snapshot(snapshot))
 
 
 def _answer(data: dict[str, Any]) -> Outcome:

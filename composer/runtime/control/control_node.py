@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 from composer.errors import ExitCode, StartError
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control import protocol
-from composer.runtime.control.answers import status_answer, top_answer
+from composer.runtime.control.answers import snapshot_answer, status_answer, top_answer
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
@@ -218,6 +218,7 @@ class ControlNode:
 
         serve(protocol.STATUS, status, queries)
         serve(protocol.TOP, lambda: top_answer(state, self._diagnostics), queries)
+        serve(protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries)
         serve(protocol.DOWN, self._stop_system, queries)
         serve(protocol.PLAN, lambda: commands.plan(system), changes)
         serve(protocol.RELOAD, lambda: commands.reload(system), changes)

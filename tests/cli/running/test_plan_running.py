@@ -1,0 +1,94 @@
+"""`composer plan NEW`: what an edit would do to the running system of that name."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.checks.checker import create_context
+from composer.cli.main import run
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+from composer.planning.differences import compare
+from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
+from tests.running import ROOT
+
+SYSTEM = """
+version: 1
+nodes:
+  arm:
+    state: {poses: {first: [0.5, null]}}
+    parameters: {speed: 1.5, token: "{{ env('COMPOSER_SECRET') }}"}
+    parameter_files: [arm.yaml.params]
+    timers:
+      tick: {period: 0.05, behaviour: parts:tick, with: {times: 3}}
+"""
+CODE = """
+def tick(node, times):
+    print(node.state.poses, node.parameters.speed, node.parameters.token)
+"""
+
+
+def snapshot_of(path):
+    system = load_system(path)
+    return take_snapshot(create_context(system, InterfaceCatalogue()))
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'configs').glob('*.yaml')), ids=lambda p: p.stem)
+def test_a_snapshot_is_the_same_after_its_journey(path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    snapshot = snapshot_of(Path('configs', path.name))
+    sent = json.loads(json.dumps(encode_snapshot(snapshot)))
+    here = decode_snapshot(sent)
+    again = decode_snapshot(encode_snapshot(snapshot_of(Path('configs', path.name))))
+    assert not compare(here, again)
+    assert repr(here.spec.nodes) == repr(snapshot.spec.nodes)
+    assert [*here.spec.nodes] == [*snapshot.spec.nodes]
+    assert {at: span.place for at, span in here.positions.keys.items()} == {
+        at: span.place for at, span in snapshot.positions.keys.items()
+    }
+
+
+@pytest.mark.parametrize('data', [{}, {'files': []}, {'files': [['a', None]], 'spec': ['os', {}]}])
+def test_what_is_no_snapshot_is_refused(data):
+    from composer.errors import ComposerError
+
+    with pytest.raises(ComposerError, match='in a form that is not known here'):
+        decode_snapshot(data)
+
+
+@pytest.mark.ros
+def test_files_are_compared_with_the_running_system(compose, capsys, monkeypatch, peer):
+    from std_srvs.srv import Trigger
+
+    def plan(*words):
+        code = run(['plan', str(path), *words])
+        output, errors = capsys.readouterr()
+        return code, output.replace(f'{compose.folder}/', ''), errors
+
+    path = compose.folder / 'system.yaml'
+    (compose.folder / 'arm.yaml.params').write_text('arm: {ros__parameters: {speed: 2.5}}')
+    monkeypatch.setenv('COMPOSER_SECRET', 'swordfish')
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    assert plan('--exit-code') == (0, 'system: no difference\n', '')
+    path.write_text(SYSTEM.replace('0.05', '0.1').replace('times: 3', 'times: 4'))
+    (compose.folder / 'arm.yaml.params').write_text('arm: {ros__parameters: {speed: 3.5}}')
+    code, output, _ = plan('--exit-code')
+    assert code == 2
+    assert re.sub(r'yaml\S*:\d+', 'yaml', output) == (
+        "~ parameter 'speed' of 'arm': value 2.5 → 3.5 (arm.yaml)\n"
+        "~ timer 'tick' of 'arm': period 0.05 → 0.1 (system.yaml), with.times 3 → 4 (system.yaml)\n"
+        'system: 2 to change\n'
+    )
+    answer = peer.call(Trigger, '/_composer_system/snapshot')
+    assert 'swordfish' not in answer.message
+    assert 'def tick' not in answer.message
+    assert child.stop() == 0
+    code, _, errors = plan()
+    assert code == 1
+    assert errors.startswith("error: there is no system 'system' on this ROS graph")
