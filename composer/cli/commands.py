@@ -84,6 +84,13 @@ def cli(context: click.Context) -> int:
     '--watch', 'watches', is_flag=True, help='Change the running system when its files change.'
 )
 @click.option(
+    '--detach',
+    '-d',
+    'detaches',
+    is_flag=True,
+    help="Give the terminal back once all of it is up. 'composer logs' shows what it says.",
+)
+@click.option(
     '--no-control',
     'is_asked',
     is_flag=True,
@@ -95,13 +102,14 @@ def cli(context: click.Context) -> int:
     '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
 @click.pass_context
-def up_command(
+def up_command(  # noqa: PLR0913 - one for each option
     context: click.Context,
     words: tuple[str, ...],
     set_values: tuple[str, ...],
     log_levels: tuple[str, ...],
     *,
     watches: bool,
+    detaches: bool,
     is_asked: bool,
     wants_help: bool,
 ) -> int:
@@ -120,6 +128,13 @@ def up_command(
             click.echo(f'\n{escape(str(paths[0]))}: {describe_file_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
+    if detaches:
+        from composer.cli.running.detach import start_detached
+
+        options = [f'--set={each}' for each in set_values]
+        options += [f'--log-level={each}' for each in log_levels]
+        options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
+        return start_detached(paths[0], [*options, *words, '--ros-args', *context.obj, '--'])
     return up(
         paths,
         arguments,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+import sys
 from typing import TYPE_CHECKING
 
 import click
@@ -50,6 +52,9 @@ def up(  # noqa: PLR0913 - one for each option
         StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
+    if ends_process and isinstance(sys.stdout, io.TextIOWrapper):
+        # What behaviours print is shown at once, in a file, too.
+        sys.stdout.reconfigure(line_buffering=True)
     reader = SystemReader(paths, words, set_values)
     context = reader.check()
     if context is None:

@@ -99,10 +99,9 @@ def check_log_folder(ros_arguments: Sequence[str]) -> None:
     if _NO_LOG_FILES in ros_arguments:
         return
     name, text = _find_log_folder()
-    home = os.environ.get('HOME')
     problem: str | None = 'HOME is not set'
-    if home or not text.startswith('~'):
-        folder = Path(text.replace('~', home or '', 1) if text.startswith('~') else text)
+    if os.environ.get('HOME') or not text.startswith('~'):
+        folder = find_log_folder()
         try:
             folder.mkdir(parents=True, exist_ok=True)
             problem = None if os.access(folder, os.W_OK | os.X_OK) else 'it cannot be written to'
@@ -111,6 +110,13 @@ def check_log_folder(ros_arguments: Sequence[str]) -> None:
     if problem:
         message = f"ROS cannot keep its log files in '{text}' ({name}): {problem}"
         raise StartError(message, help='set ROS_LOG_DIR to a folder that can be written to')
+
+
+def find_log_folder() -> Path:
+    """Return the folder of ROS's log files."""
+    _, text = _find_log_folder()
+    home = os.environ.get('HOME', '')
+    return Path(text.replace('~', home, 1) if text.startswith('~') else text)
 
 
 def _find_log_folder() -> tuple[str, str]:

@@ -76,4 +76,17 @@ def down_command(system: str | None, timeout_sec: float) -> int:
     return down(system, timeout_sec)
 
 
-COMMANDS = (ps_command, reload_command, restart_command, down_command)
+@click.command('logs')
+@_system
+@click.option('--follow', '-f', 'follows', is_flag=True, help='Go on until the system ends.')
+def logs_command(system: str | None, *, follows: bool) -> int:
+    """Print what SYSTEM has said, if it runs on this host and writes to a file.
+
+    That is what 'composer up --detach' does. Of one that has ended, the last log is printed.
+    """
+    from composer.cli.running.logs import show_logs
+
+    return show_logs(system, follows=follows)
+
+
+COMMANDS = (ps_command, logs_command, reload_command, restart_command, down_command)

@@ -20,7 +20,7 @@ from composer.runtime.control.answers import snapshot_answer, status_answer, top
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
-from composer.runtime.health.system_state import Outcome, SystemState
+from composer.runtime.health.system_state import Outcome, SystemState, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
 
@@ -115,7 +115,7 @@ class ControlNode:
         self._context, self._ros_arguments = context, ros_arguments
         state = self._system.state
         self._claim = NameClaim(protocol.node_name(state.name), context.get_domain_id())
-        about = {**state.who(), 'is_asked': self._commands is not None}
+        about = {**state.who(), 'is_asked': self._commands is not None, 'log': find_log()}
         owner = self._claim.take(about)
         if owner is not None:
             advice = f"stop it with 'composer down {state.name}', or use another ROS_DOMAIN_ID"

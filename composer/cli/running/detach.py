@@ -1,0 +1,117 @@
+"""`composer up --detach`: start a system, and give the terminal back once all of it is up."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+from composer import signals
+from composer.errors import ComposerError, ExitCode
+from composer.runtime.control.readiness import VARIABLE
+from composer.runtime.environment import check_ros, find_log_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+_MOST_BYTES = 4096
+
+
+def start_detached(path: Path, arguments: Sequence[str]) -> int:
+    """Start a system in a session of its own, and wait until it is up; return the exit code.
+
+    If it does not come up, all that it has printed is printed here.
+
+    Args:
+        path: Its file.
+        arguments: Those after `composer up`.
+
+    Raises:
+        RosNotFoundError: There is no rclpy.
+        ComposerError: Its log cannot be written.
+    """
+    check_ros()
+    log = _log_path(path)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ready:
+        # The kernel finds a free name.
+        ready.bind('')
+        address = f'@{ready.getsockname()[1:].decode()}'
+        with signals.interrupting():
+            process = _start(path, arguments, log, address)
+            try:
+                is_up = _wait(process, ready)
+            except KeyboardInterrupt:
+                # It has a session of its own, so the terminal does not tell it.
+                process.send_signal(signal.SIGINT)
+                process.wait()
+                raise
+    text = log.read_text(encoding='utf-8', errors='backslashreplace')
+    click.echo(text, nl=False, err=True)
+    if is_up:
+        click.echo(f'process {process.pid}, log {log}', err=True)
+        return ExitCode.DONE
+    log.unlink()
+    code = process.wait()
+    return code if code > 0 else ExitCode.FAILED
+
+
+def _start(
+    path: Path, arguments: Sequence[str], log: Path, address: str
+) -> subprocess.Popen[bytes]:
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        stream = log.open('xb')
+    except OSError as error:
+        message = f'the log cannot be written to {log}: {error.strerror}'
+        raise ComposerError(message) from error
+    with stream:
+        return subprocess.Popen(  # noqa: S603 - ourselves
+            [*_own_command(), 'up', *arguments],
+            stdin=None if str(path) == '-' else subprocess.DEVNULL,
+            stdout=stream,
+            stderr=stream,
+            start_new_session=True,
+            env={**os.environ, VARIABLE: address},
+        )
+
+
+def _wait(process: subprocess.Popen[bytes], ready: socket.socket) -> bool:
+    """Wait until a process says that it is up, or ends; return whether it is up."""
+    ended = os.pidfd_open(process.pid)
+    try:
+        while True:
+            readable, _, _ = select.select([ready.fileno(), ended], [], [])
+            if ready.fileno() in readable:
+                if b'READY=1' in ready.recv(_MOST_BYTES).split(b'\n'):
+                    return True
+            elif ended in readable:
+                return False
+    finally:
+        os.close(ended)
+
+
+def _own_command() -> list[str]:
+    """Return the command by which this process was started, without its arguments."""
+    count = len(sys.argv) - 1
+    options = sys.orig_argv[1 : len(sys.orig_argv) - count]
+    return [sys.executable, *options]
+
+
+def _log_path(path: Path) -> Path:
+    name = '<stdin>' if str(path) == '-' else path.stem
+    stamp = time.strftime('%Y%m%d-%H%M%S')
+    return find_log_folder() / f'{log_prefix(name)}{stamp}_{os.getpid()}.log'
+
+
+def log_prefix(name: str) -> str:
+    """Return what the names of the logs begin with that a system of this name writes."""
+    safe = ''.join(each if each.isalnum() or each in '-.' else '-' for each in name)
+    return f'composer_{safe}_'

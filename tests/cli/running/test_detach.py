@@ -1,0 +1,120 @@
+"""`composer up --detach` gives the terminal back; `composer logs` shows what the system says."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.cli.main import run
+from tests.running import DEADLINE_SEC, ROOT, Child
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """
+version: 1
+args: {word: hello}
+nodes:
+  talker:
+    on_start: {behaviour: parts:start, with: {word: '{{ word }}'}}
+"""
+CODE = """
+import time
+
+def start(node, word):
+    print(f'printed {word}')
+    node.logger.info(f'logged {word}')
+    if word == 'never':
+        time.sleep(3600)
+"""
+
+
+@pytest.fixture
+def detached(compose, monkeypatch, capfd):
+    """Run `composer up --detach`; return its exit code and what it printed. All ends in the end."""
+    monkeypatch.setenv('ROS_LOG_DIR', str(compose.folder / 'log'))
+    pids = []
+
+    def start(*words):
+        command = [sys.executable, '-m', 'composer', 'up', '--detach', *words]
+        environment = os.environ | {
+            'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
+        }
+        done = subprocess.run(
+            command,
+            cwd=compose.folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_SEC,
+            check=False,
+        )
+        found = re.search(r'^process (\d+), log (.*)\n\Z', done.stderr, re.MULTILINE)
+        pids.extend([int(found[1])] if found else [])
+        return done.returncode, done.stderr
+
+    yield start
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def test_the_terminal_comes_back_when_all_is_up(compose, detached, capfd):
+    path = compose.write(SYSTEM, CODE)
+    code, output = detached(str(path), 'word:=hi')
+    assert code == 0
+    assert ' ready in ' in output
+    assert run(['logs']) == 0
+    text, _ = capfd.readouterr()
+    assert 'printed hi' in text
+    assert 'logged hi' in text
+    follower = Child(['logs', '-f', 'system'], compose.folder, compose.domain_id, compose.folder)
+    follower.wait_for_line('logged hi')
+    code, output = detached(str(path))
+    assert code == 1
+    assert "error: a system 'system' runs already on this ROS graph" in output
+    assert run(['down']) == 0
+    assert follower.wait() == 0
+    follower.end()
+    capfd.readouterr()
+    # It has ended, and its log is still there.
+    assert run(['logs', 'system']) == 0
+    assert capfd.readouterr()[0] == text
+    assert run(['logs']) == 1
+    assert capfd.readouterr()[1] == (
+        f'error: no system runs on this host (ROS_DOMAIN_ID {compose.domain_id})\n'
+    )
+
+
+def test_what_does_not_come_up_is_told_where_it_was_started(compose, detached):
+    code, output = detached(str(compose.write(SYSTEM.replace(':start', ':strat'), CODE)))
+    assert code == 1
+    assert 'error[unused-argument]' in output or 'error' in output
+    assert not list((compose.folder / 'log').glob('composer_*'))
+
+
+def test_an_interrupt_ends_what_has_not_come_up(compose, wait_for):
+    path = compose.write(SYSTEM, CODE)
+    child = compose.run(path.name, '--detach', 'word:=never')
+
+    def said():
+        return [each.read_text() for each in (compose.folder / 'log').glob('composer_*')]
+
+    wait_for(lambda: any('logged never' in text for text in said()), 'its start')
+    assert child.stop() == 130
+    assert run(['down', '--timeout', '1']) == 1
+
+
+def test_a_log_that_is_no_file_is_told_of(compose, capfd):
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    assert run(['logs', 'system']) == 1
+    assert capfd.readouterr()[1] == (
+        f"error: system 'system' (pid {child.pid}) does not write to a file\n"
+        "  help: 'composer up --detach' writes to a file\n"
+    )
