@@ -84,7 +84,7 @@ def logs_command(system: str | None, *, follows: bool) -> int:
 
     That is what 'composer up --detach' does. Of one that has ended, the last log is printed.
     """
-    from composer.cli.running.logs import show_logs
+    from composer.cli.running.log_files import show_logs
 
     return show_logs(system, follows=follows)
 
