@@ -135,11 +135,16 @@ class Awaitable:
 
 @dataclass(frozen=True, slots=True)
 class Generated:
-    """A generator, by what it yields and what it returns."""
+    """A generator, by what it yields and what it returns.
+
+    Attributes:
+        items: What it yields one after the other, if that is known.
+    """
 
     yielded: Value
     returned: Value
     is_async: bool = False
+    items: tuple[Value, ...] | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -186,6 +191,11 @@ class Sequence:
     def is_whole(self) -> bool:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether its first item comes first, in whatever runs."""
+        return self.kind not in (set, frozenset) or len(self.items) < 2  # noqa: PLR2004
 
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""

@@ -12,7 +12,8 @@ from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
-from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.library.library_calls import LibraryCalls
+from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
 from composer.inference.evaluation.project_classes import Classes
@@ -76,6 +77,7 @@ class Evaluator:
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
         self.library = LibraryCalls(self)
+        self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
         self.imports = Imports(self)

@@ -14,6 +14,8 @@ from composer.inference.values import (
     NONE,
     UNKNOWN,
     Alternatives,
+    Argument,
+    Arguments,
     Awaitable,
     Class,
     Constant,
@@ -134,10 +136,21 @@ class Statements(Part):
             if isinstance(target, ast.Name):
                 scope.set(target.id, UNKNOWN)
             elif isinstance(target, ast.Subscript):
-                self._evaluator.read_target(target, scope)
-                self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
+                self._delete_item(target, scope)
             elif isinstance(target, ast.Attribute):
-                self._evaluator.evaluate(target.value, scope)
+                self._evaluator.evaluate(target, scope)
+
+    def _delete_item(self, target: ast.Subscript, scope: Scope) -> None:
+        self._evaluator.read_target(target, scope)
+        owner = self._evaluator.evaluate(target.value, scope)
+        with self._evaluator.run.silence():
+            index = self._evaluator.evaluate(target.slice, scope)
+        if isinstance(owner, Mapping | Sequence) and isinstance(index, Constant):
+            given = Argument(index, Place(scope.module, target.slice))
+            place = Place(scope.module, target)
+            self._evaluator.methods.call(owner, 'pop', Arguments((given,)), place)
+        else:
+            self._evaluator.escape(owner)
 
     # Definitions
 
