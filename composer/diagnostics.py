@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
 from composer.confidential import conceal
+from composer.records import record
 from composer.rules import Severity, load_rule
 from composer.terminal import escape
 
@@ -47,7 +48,7 @@ class SourceFile:
         return self.lines[number - 1] if 0 < number <= len(self.lines) else ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Span:
     """A part of one line.
 
@@ -88,7 +89,7 @@ class Span:
         return f'{self.source.name}:{self.line}:{self.column}'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Related:
     """Another place that a finding mentions."""
 
@@ -100,7 +101,7 @@ class Related:
         object.__setattr__(self, 'message', conceal(self.message))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Diagnostic:
     """One finding.
 

@@ -6,8 +6,10 @@ and a row in `runtime/entities`, and its part of the schema; all else follows fr
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +22,7 @@ PUBLISHED = 'published'
 TYPE_FOLDERS: dict[ChannelKind, str] = {'topic': 'msg', 'service': 'srv', 'action': 'action'}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BehaviourKey:
     """A key that names a behaviour, and how this is called.
 
@@ -42,7 +44,7 @@ class BehaviourKey:
     may_yield: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class EntityKind:
     """A kind of entity.
 

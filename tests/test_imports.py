@@ -19,6 +19,7 @@ ROOMS = (
         'spelling',
         'terminal',
         'input_limits',
+        'records',
         'names',
         'ament',
         'programs',

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
+from composer.records import record
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True)
+@record
 class CheckContext:
     """A system, and what its checks compare it with.
 

@@ -7,7 +7,6 @@ value does not suit its declaration.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from composer.input_limits import MAX_VALUES
 from composer.language.paths import PathError, list_neighbours, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
+from composer.records import record
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import PatternIndex
 from composer.ros_parameters.overrides import MergedFiles
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _User:
     """A node or process with the parameter files that it uses.
 

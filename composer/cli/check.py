@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -22,6 +21,7 @@ from composer.cli.output import wants_colour, write_file
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_combinations, load_system
+from composer.records import record
 from composer.reports import render_report
 from composer.reports.report import CheckedFile, Report, name_combinations
 from composer.reports.text import count, render_files, summarize
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from composer.stubs.types_check import TypesCheck
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class CheckOptions:
     """The options of `composer check`.
 

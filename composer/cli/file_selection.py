@@ -7,7 +7,7 @@ import glob
 import os
 import re
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from composer.diagnostics import Diagnostic
 from composer.entity_kinds import WORK_KEYS
 from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, read_file
 from composer.language.pipeline import load_system
+from composer.records import record
 from composer.schema.structure import known_keys
 from composer.yaml_text.reader import read_document
 
@@ -40,7 +41,7 @@ _LIST = re.compile(r'\s*(#[^\n]*\n\s*)*(-\s|\[)')
 _ENTITIES = re.compile(rf'^\s+({"|".join(sorted(WORK_KEYS))})\s*:', re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SelectedSystem:
     """A system to check, as `composer up` would be given it.
 
@@ -55,7 +56,7 @@ class SelectedSystem:
     arguments: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Selection:
     """The systems to check.
 

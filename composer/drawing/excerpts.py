@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.confidential import may_show_lines
+from composer.records import record
 from composer.reports.report import relative_path
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ _NODE = 2
 _MOST_EXCERPTS = 8
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Excerpt:
     """Successive lines of a file.
 

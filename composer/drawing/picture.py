@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.drawing.finding_places import FindingPlaces
 from composer.drawing.qos_labels import differing_policies
 from composer.names import expand_name, expand_namespace, join_names
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ NodeKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeBox:
     """A node or a process.
 
@@ -42,7 +42,7 @@ class NodeBox:
     findings: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ChannelBox:
     """A topic, service or action.
 
@@ -65,7 +65,7 @@ class ChannelBox:
     findings: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Edge:
     """A publisher, subscription, server or client: it connects a node with a channel.
 
@@ -94,7 +94,7 @@ class Edge:
         return (self.node, self.channel) if self.begins_at_node else (self.channel, self.node)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Wait:
     """A node or process that starts only when something else is ready.
 
@@ -108,7 +108,7 @@ class Wait:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Picture:
     """A system as it is drawn, in the order of the file."""
 

@@ -6,11 +6,12 @@ Shapes have short tokens instead of names: no name can clash with a keyword of a
 from __future__ import annotations
 
 import textwrap
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from composer.drawing.picture import sends
 from composer.drawing.qos_labels import describe_policies
+from composer.records import record
 from composer.rules import Severity
 from composer.terminal import escape
 
@@ -24,7 +25,7 @@ _REMARK_WIDTH = 44
 _MOST_REMARKS = 2
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Shape:
     """A node, process or channel as it is drawn; all of its texts are printable.
 
@@ -45,7 +46,7 @@ class Shape:
     mark: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Line:
     """An arrow between two shapes.
 
@@ -67,7 +68,7 @@ class Line:
     mark: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Region:
     """A namespace, with the shapes in it that are in no deeper one."""
 
@@ -89,7 +90,7 @@ class Region:
         return region
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Arrangement:
     """All shapes and lines; shapes without a namespace are in `root` itself."""
 

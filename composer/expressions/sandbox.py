@@ -5,7 +5,6 @@ This file lists what an expression can reach. Limits on time and memory stand in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import StrictUndefined, TemplateRuntimeError, TemplateSyntaxError, Undefined, nodes
@@ -16,6 +15,7 @@ from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 
 from composer.expressions import limits
 from composer.expressions.functions import FUNCTIONS
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -62,7 +62,7 @@ _METHOD_LIMITS: dict[str, Callable[..., None]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Method:
     """A method of a value that an expression may call."""
 

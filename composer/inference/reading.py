@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import USED_KINDS
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -23,7 +24,7 @@ SENDING_METHODS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeUse:
     """A use of an entity of the node by its name, as in `node.publish('status', …)`.
 
@@ -50,7 +51,7 @@ class NodeUse:
     is_change: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Problem:
     """Something wrong in a behaviour, whatever its node declares.
 
@@ -67,7 +68,7 @@ class Problem:
     used_at: Span | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class StateUse:
     """A name of `node.state` or `node.own_state` that is read.
 
@@ -80,7 +81,7 @@ class StateUse:
     is_guarded: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RemoteParameter:
     """A parameter that `node.set_parameters` or `node.get_parameters` names.
 

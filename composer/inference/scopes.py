@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.values import UNKNOWN, Value, join
 from composer.python_source.local_names import list_arguments, nested_names, stored_names
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -28,7 +29,10 @@ class Scope:
         local: All names of its own, stored anywhere in it.
         unsure: Those that inner functions may store, too.
         names: What its names stand for where the reading is; `None` where it never comes to.
-        jumps: What they stood for at each `break` and `continue` of the innermost loop.
+        broken: What they stood for at each `break` of the innermost loop; `continued` is of
+            each `continue`.
+        looped: Of each loop around that is followed round by round, the names that it stores, and
+            what its targets stand for in any round.
         returned: What it returns, and where.
         yielded: What it yields, and where.
         inner: The functions defined in it.
@@ -43,7 +47,9 @@ class Scope:
     local: frozenset[str] = frozenset()
     unsure: frozenset[str] = frozenset()
     names: Names | None = field(default_factory=dict)
-    jumps: list[Names] = field(default_factory=list)
+    broken: list[Names] = field(default_factory=list)
+    continued: list[Names] = field(default_factory=list)
+    looped: list[tuple[frozenset[str], Names]] = field(default_factory=list)
     returned: list[tuple[Value, Place]] = field(default_factory=list)
     yielded: list[tuple[Value, Place]] = field(default_factory=list)
     inner: list[Function] = field(default_factory=list)
@@ -84,7 +90,7 @@ def join_names(several: Iterable[Names | None]) -> Names | None:
     return {name: join(names.get(name, UNKNOWN) for names in ways) for name in every}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LocalNames:
     """The names that a function stores.
 

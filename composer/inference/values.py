@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.records import record
+
 if TYPE_CHECKING:
     import ast
     from collections.abc import Iterable, Iterator
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 _MOST_ALTERNATIVES = 16
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Place:
     """An expression or statement of a module."""
 
@@ -29,7 +31,7 @@ class Place:
     node: ast.AST
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Unknown:
     """Anything.
 
@@ -41,7 +43,7 @@ class Unknown:
     is_chosen: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Constant:
     """A number, a text, bytes, a truth value or `None`.
 
@@ -57,7 +59,7 @@ class Constant:
     origin: Place | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Scalar:
     """A number, text or the like of a type of Python, as in `float`."""
 
@@ -66,7 +68,7 @@ class Scalar:
     origin: Place | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Message:
     """A message, request, response, goal, result or feedback, by its type's full name.
 
@@ -78,26 +80,26 @@ class Message:
     is_made: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MessageClass:
     """The class of messages of a type."""
 
     type: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ArrayField:
     """The value of a field that is an array."""
 
     type: FieldType
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeValue:
     """The node that a behaviour is called with."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PartOfNode:
     """`parameters`, `state`, `own_state` or `logger` of the node, and what comes out of it.
 
@@ -111,7 +113,7 @@ class PartOfNode:
     type: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BoundMethod:
     """A method of something, not called yet."""
 
@@ -119,21 +121,21 @@ class BoundMethod:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class External:
     """What an import gives that is not of the project: a module, or something in one."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Awaitable:
     """A coroutine that has not been awaited."""
 
     result: Value
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Generated:
     """A generator, by what it yields and what it returns.
 
@@ -262,19 +264,19 @@ class Partial:
     arguments: Arguments
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ProjectModule:
     """A module of the project."""
 
     module: ModuleSource
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Never:
     """What a call gives that always raises."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Alternatives:
     """One of several values.
 
@@ -286,7 +288,7 @@ class Alternatives:
     is_direct: bool = field(default=False, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Argument:
     """An argument of a call, and where it is written."""
 
@@ -294,7 +296,7 @@ class Argument:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Arguments:
     """The arguments of a call.
 

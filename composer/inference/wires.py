@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import PUBLISHED
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.inference.node_facts import NodeFacts
     from composer.language.bindings import Binding
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Wire:
     """The types of what a behaviour gets and of what it gives; `None` for none, or unknown.
 

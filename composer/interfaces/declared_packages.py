@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class DeclaredPackages:
     """The interface packages that a file declares, and the types that its system can use.
 

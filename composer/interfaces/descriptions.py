@@ -6,13 +6,14 @@ wherever a description comes from, and need neither ROS nor any message package.
 See https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html for the notation.
 """
 
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
+
+from composer.records import record
 
 ArrayKind: TypeAlias = Literal['fixed', 'bounded', 'unbounded']
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FieldType:
     """The type of a field; `str()` of it is in `.msg` notation, such as `string<=10[<=3]`.
 
@@ -54,7 +55,7 @@ class FieldType:
                 return f'{name}{bound}[]'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FieldDescription:
     """One field of a message.
 
@@ -72,7 +73,7 @@ class FieldDescription:
     comment: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ConstantDescription:
     """One constant of a message."""
 
@@ -82,7 +83,7 @@ class ConstantDescription:
     comment: str = ''
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MessageDescription:
     """A message, or one part of a service or an action.
 
@@ -109,7 +110,7 @@ class MessageDescription:
         return next((field for field in self.fields if field.name == name), None)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ServiceDescription:
     """A service, such as `std_srvs/srv/SetBool`."""
 
@@ -124,7 +125,7 @@ class ServiceDescription:
         return (self.request, self.response)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ActionDescription:
     """An action, such as `example_interfaces/action/Fibonacci`."""
 

@@ -5,7 +5,6 @@ the rules of `composer.interfaces.field_values`. It needs no message class, and 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import FieldType, MessageDescription
@@ -17,9 +16,10 @@ from composer.interfaces.field_errors import (
     unknown_field,
 )
 from composer.interfaces.field_values import check_length, read_items, scalar_reader
+from composer.records import record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FieldFinding:
     """One error in the data of a message.
 
@@ -52,7 +52,7 @@ def check_payload(
     yield from _Walk(description.name, catalogue).message(description, data, _Place())
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Place:
     """A place in the data and in the message, which has a name for the field of a bare value."""
 
@@ -66,7 +66,7 @@ class _Place:
         return _Place(self.data, (*self.fields, field))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Walk:
     root: str
     catalogue: InterfaceCatalogue

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.ament import PACKAGE_INDEX
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Entries:
     """What to add to a variable that holds a list of paths.
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
 from composer.expressions import is_variable_name
+from composer.records import record
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_problem,
@@ -27,7 +28,7 @@ _SAMPLES: dict[str, Any] = {'bool': True, 'integer': 1, 'double': 1.0, 'string':
 ARGUMENT_TYPES = tuple(_SAMPLES)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ArgumentSpec:
     """An argument of a file.
 
@@ -64,7 +65,7 @@ class ArgumentSpec:
         return f'{text}: {escape(self.description)}' if self.description else text
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ArgumentValues:
     """The values of a file's arguments.
 

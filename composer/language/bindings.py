@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import NODE_BEHAVIOURS
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Binding:
     """A behaviour and the place that it is bound to.
 

@@ -5,7 +5,6 @@ They stand under `check:` in the system itself, or in a file of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from composer.language.includes.include_entry import locate_file, shown_path
 from composer.language.layers import merge_documents
 from composer.language.paths import PathError
 from composer.language.set_option import Setting, SettingError, apply_setting
+from composer.records import record
 from composer.ros_parameters.parameter_types import convert_parameter_value
 from composer.spelling import suggest
 from composer.yaml_text.document import Document
@@ -33,7 +33,7 @@ SECTION = 'check'
 _FORM = "name the combinations, as in 'fast: {args: {speed: 2.0}}'"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Combination:
     """One combination.
 

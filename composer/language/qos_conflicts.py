@@ -9,10 +9,10 @@ liveliness is left to the middleware has an automatic one, as in DDS.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.language.qos import INFINITE, NANOSECONDS, format_policy_value
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ CONFLICTS = {
 MATCHED_DURATIONS = ('deadline', 'liveliness_lease_duration')
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class QosConflict:
     """A policy for which a publisher offers less than a subscription requests."""
 

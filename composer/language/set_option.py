@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import SourceFile, Span
 from composer.entity_kinds import KIND_OF_SECTION
 from composer.errors import ComposerError, UsageError
 from composer.language.layers import is_null_a_value
+from composer.records import record
 from composer.spelling import suggest
 from composer.yaml_text.document import Document
 from composer.yaml_text.reader import parse_document
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos'))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Setting:
     """A change of a single value.
 

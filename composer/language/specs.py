@@ -6,11 +6,12 @@ Every record carries the path of its data, under which a `SourceMap` knows where
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY  # noqa: TC003 - `dataclass` looks for it
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS
 from composer.names import join_names
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -34,7 +35,7 @@ DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BehaviourSpec:
     """A Python function by name, with constant keyword arguments."""
 
@@ -49,7 +50,7 @@ class BehaviourSpec:
         return f'{self.module}:{self.function}'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class QosSpec:
     """QoS as written: a profile's name and the policies that differ from it.
 
@@ -62,7 +63,7 @@ class QosSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ParameterSpec:
     """A ROS parameter.
 
@@ -84,7 +85,7 @@ class ParameterSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PublisherSpec:
     """A publisher.
 
@@ -100,7 +101,7 @@ class PublisherSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SubscriptionSpec:
     """A subscription.
 
@@ -124,7 +125,7 @@ class SubscriptionSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TimerSpec:
     """A timer.
 
@@ -145,7 +146,7 @@ class TimerSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ServiceSpec:
     """A service that the node serves.
 
@@ -164,7 +165,7 @@ class ServiceSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ServiceClientSpec:
     """A service that behaviours call.
 
@@ -180,7 +181,7 @@ class ServiceClientSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ActionSpec:
     """An action that the node serves.
 
@@ -199,7 +200,7 @@ class ActionSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ActionClientSpec:
     """An action that behaviours send goals to.
 
@@ -227,7 +228,7 @@ EndSpec: TypeAlias = TopicEndSpec | ServiceSpec | ServiceClientSpec | ActionSpec
 EntitySpec: TypeAlias = ParameterSpec | TimerSpec | EndSpec
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ConditionSpec:
     """Something that must be there before a node or process starts.
 
@@ -243,7 +244,7 @@ class ConditionSpec:
     path: DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ProcessSpec:
     """A program that runs beside the nodes.
 
@@ -290,7 +291,7 @@ class ProcessSpec:
         return self.package is not None or any((*given, self.remap, self.log_level))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class NodeSpec:
     """A node and all that it has.
 
@@ -308,6 +309,7 @@ class NodeSpec:
         parameter_files: In ROS's own format; later ones win.
     """
 
+    _: KW_ONLY
     name: str
     namespace: str
     description: str = ''
@@ -373,7 +375,7 @@ class NodeSpec:
         return entities.values()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SystemSpec:
     """A whole system.
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +25,7 @@ _PARTS = {
 _LENGTH = 3
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Annotation:
     """What is known of an annotation; nothing if it can mean anything.
 

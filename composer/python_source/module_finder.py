@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,13 +12,14 @@ from typing import TYPE_CHECKING
 from composer.confidential import list_lineage
 from composer.input_limits import MAX_TOKENS_OF_MODULES
 from composer.python_source.modules import ModuleSource, read_module
+from composer.records import record
 from composer.spelling import find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MissingModule:
     """A module that does not exist.
 
@@ -34,7 +34,7 @@ class MissingModule:
     hidden_by: Path | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Location:
     """Where a module is.
 

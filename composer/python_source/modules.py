@@ -6,7 +6,7 @@ import ast
 import inspect
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,7 @@ from composer.python_source.syntax import (
     count_tokens,
     parse_source,
 )
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -48,7 +49,7 @@ class FunctionKind(Enum):
         return self in (FunctionKind.GENERATOR, FunctionKind.ASYNC_GENERATOR)
 
 
-@dataclass(frozen=True)
+@record
 class FunctionSource:
     """A function of a module.
 
@@ -80,7 +81,7 @@ class FunctionSource:
         return read_signature(self.definition.args) if self.definition else None
 
 
-@dataclass(frozen=True)
+@record
 class ModuleSource:
     """The names that a module defines.
 
@@ -278,6 +279,9 @@ class _ModuleReader:
         for target in targets:
             if not isinstance(target, ast.Name):
                 self._read_stores(target)
+            # Of something that may be this module: `sys.modules[__name__].run = walk`.
+            if isinstance(target, ast.Attribute) and target.attr in self.functions:
+                self._bind(target.attr, FunctionSource())
         for target in targets:
             for node in ast.walk(target):
                 if not isinstance(node, ast.Name):

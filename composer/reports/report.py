@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.diagnostics import has_errors
+from composer.records import record
 from composer.rules import Severity
 from composer.terminal import escape
 
@@ -22,7 +23,7 @@ FindingKey: TypeAlias = 'tuple[str, int, int, str, str]'
 _MOST_NAMED = 5
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CheckedFile:
     """A file and its findings.
 
@@ -46,7 +47,7 @@ class CheckedFile:
         return ', '.join(filter(None, (self.given, self.combination)))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Report:
     """All that a run of `composer check` found.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
 from composer.input_limits import MAX_FINDINGS, MAX_VALUES
+from composer.records import record
 from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader, flatten_list
@@ -63,7 +64,7 @@ class ParameterEntry:
         return '.'.join(self.keys)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ParameterFile:
     """The readable part of a parameter file, in the order of its text, and the findings.
 

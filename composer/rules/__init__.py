@@ -11,7 +11,7 @@ To add a rule, add a folder with its name:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from composer.records import record
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -29,7 +29,7 @@ class Severity(Enum):
     WARNING = 'warning'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Rule:
     """A rule, as its `rule.yaml` describes it.
 
@@ -55,7 +55,7 @@ class Rule:
     source: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Family:
     """Rules that check the same things.
 

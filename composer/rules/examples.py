@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from composer.records import record
 from typing import TYPE_CHECKING
 
 from composer.rules import RULES_FOLDER
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _OWN = ('rule.yaml', 'bad.yaml', 'bad.txt', 'good.yaml')
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Example:
     """An example of a rule.
 

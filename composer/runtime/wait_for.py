@@ -6,7 +6,6 @@ The graph is only queried while something waits, at most twenty times a second.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from composer.ament import remaps_actions
 from composer.errors import StartError
 from composer.names import expand_name, remap_name
+from composer.records import record
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
@@ -42,7 +42,7 @@ _REASONS = {
 _AWAITED = {'topic': 'a publisher of', 'action': 'action server'}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Waiter:
     """A node or process that starts when its conditions hold.
 

@@ -6,12 +6,12 @@ The schema (JSON Schema 2020-12) is the one description of the structure, for ed
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from functools import cache
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
 from composer.input_limits import MAX_FINDINGS
+from composer.records import record
 from composer.schema import schema_path
 from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain
@@ -220,7 +220,7 @@ def _child(data: Any, key: Key) -> Any:
     return data[key] if is_item else None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Schema:
     document: dict[str, Any]
     compiler: SchemaCompiler

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +33,7 @@ _STAND_INS: dict[str, Mapping[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Violation:
     """One violation of the schema.
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.python_source.modules import FunctionKind, FunctionSource
+from composer.records import record
 from composer.stubs.field_types import StubImports
 from composer.stubs.received_values import changed_names, payload_of
 
@@ -37,7 +38,7 @@ class _Edit:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class AnnotatedCopy:
     """A module with annotations.
 

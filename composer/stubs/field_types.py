@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,7 +71,7 @@ class StubImports:
         return f'{alias}.{name}'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FieldTypes:
     """Writes types of fields in a stub.
 

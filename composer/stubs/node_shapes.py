@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,7 +30,7 @@ _OWN_PARAMETERS = {'use_sim_time': 'bool', 'start_type_description_service': 'bo
 _ANYTHING = 'Any'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NodeShape:
     """What a node declares; equal ones need one stub.
 

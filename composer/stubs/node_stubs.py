@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from composer.records import record
 from composer.stubs.field_types import StubImports, is_writable
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
     yield from lines
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Writer:
     """Writes the classes of one node."""
 

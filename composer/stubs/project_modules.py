@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule, project_search_path
 from composer.python_source.syntax import UnreadModuleError, parse_source
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MOST_MODULES = 300
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ProjectModule:
     """A module of the project.
 

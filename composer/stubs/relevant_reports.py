@@ -9,11 +9,11 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.python_source.local_names import stored_names
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -73,7 +73,7 @@ _GUESSES = re.compile(
 )
 
 
-@dataclass(frozen=True)
+@record
 class RelevantReports:
     """Tells the reports in a module that matter.
 

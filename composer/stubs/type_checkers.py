@@ -9,11 +9,11 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.errors import ComposerError
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ class TypeCheckerError(ComposerError):
     """No type checker is installed, or it does not work."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TypeChecker:
     """A type checker that is installed.
 
@@ -48,7 +48,7 @@ class TypeChecker:
     command: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TypeReport:
     """What a type checker says about a place.
 

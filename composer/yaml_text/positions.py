@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from composer.diagnostics import SourceFile, Span
+from composer.records import record
 
 Key: TypeAlias = str | int
 DataPath: TypeAlias = tuple[Key, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Branch:
     """The positions of one entry and of all below it, by their paths from there."""
 

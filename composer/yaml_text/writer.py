@@ -6,9 +6,9 @@ import json
 import math
 import re
 import sys
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from composer.records import record
 from composer.yaml_text.scalars import ScalarError, format_scalar, parse_plain_scalar
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Dialect:
     """What a reader of YAML needs.
 

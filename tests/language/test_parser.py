@@ -295,11 +295,9 @@ def test_remapping_rules_keep_their_order():
     assert load_node('{remap: {b: c, a: ~/d}}').remap == (('b', 'c'), ('a', '~/d'))
 
 
-def test_specs_cannot_be_changed():
+def test_the_mappings_of_specs_cannot_be_changed():
     node = load_node('{state: {a: 1}, publishers: {a: p/msg/T}}')
     with pytest.raises(TypeError):
         node.publishers['b'] = None
     with pytest.raises(TypeError):
         node.state['a'] = 2
-    with pytest.raises(AttributeError):
-        node.namespace = '/other'

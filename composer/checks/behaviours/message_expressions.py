@@ -6,7 +6,6 @@ unknown fields.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from jinja2 import TemplateError, nodes
@@ -14,6 +13,7 @@ from jinja2 import TemplateError, nodes
 from composer.expressions.sandbox import Sandbox
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
+from composer.records import record
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _FOR_UNDEFINED = ('d', 'default', 'defined', 'undefined')
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ExpressionFinding:
     """One error in an expression.
 
@@ -39,7 +39,7 @@ class ExpressionFinding:
     help: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ExpressionValue:
     """What is known of the value of an expression.
 
@@ -110,7 +110,7 @@ def check_expression(
             yield finding
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Walk:
     sandbox: Sandbox
     types: dict[str, FieldType]
@@ -191,7 +191,7 @@ _OF_FILTERS: dict[str, object] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Samples:
     """Values of the types that expressions have; `None` where nobody knows."""
 

@@ -17,6 +17,7 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
+from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
         yield from walk.findings
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Importer:
     """A module with an import, and the first behaviour that needs it."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS, PUBLISHED
@@ -11,6 +10,7 @@ from composer.interfaces.payload_checks import check_payload
 from composer.language.bindings import node_bindings
 from composer.python_source.annotations import Annotation, read_annotation
 from composer.python_source.modules import FunctionKind, ModuleSource
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,7 +31,7 @@ _RULE = 'wrong-annotation'
 _SAMPLES: dict[str, object] = {'bool': False, 'float': 0.5, 'int': 1, 'str': 'a'}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Wire:
     """The types of what a behaviour gets and of what it gives.
 

@@ -7,7 +7,6 @@ gives up its thread while it waits, so there are never too few threads for those
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from composer.checks.connections.cycles import find_knots, find_way
 from composer.diagnostics import Related
 from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator
@@ -33,7 +33,7 @@ _MOST_SHOWN = 8
 Group = tuple[str, str]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Wait:
     """A behaviour waits for a service.
 

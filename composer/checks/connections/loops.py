@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.cycles import find_cycles
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.return_values import always_answers
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from composer.language.specs import BehaviourSpec
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Relay:
     """A subscription that publishes something for every message that it hears.
 

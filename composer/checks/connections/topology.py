@@ -6,13 +6,14 @@ Jazzy does not remap the names of actions, only those of the topics and services
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.ament import remaps_actions
 from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
 from composer.language.specs import NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -64,7 +65,7 @@ _SERVICES_OF_ROS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Endpoint:
     """One end of a channel."""
 
@@ -92,7 +93,7 @@ class Endpoint:
         return f"{self.kind.noun} '{self.entity.name}' of node '{self.node.name}'"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Channel:
     """A topic, service or action, and its ends.
 
@@ -112,7 +113,7 @@ class Channel:
         return [*self.providers, *self.users]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Topology:
     """All channels of a system.
 

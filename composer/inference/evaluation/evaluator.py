@@ -17,10 +17,13 @@ from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
 from composer.inference.evaluation.project_classes import Classes
-from composer.inference.evaluation.statement_flow import Statements
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
+from composer.inference.statements.loop_rounds import Loops
+from composer.inference.statements.match_cases import MatchCases
+from composer.inference.statements.narrowing import Narrowing
+from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
     CHOSEN,
@@ -35,7 +38,6 @@ from composer.inference.values import (
     Generated,
     Instance,
     Mapping,
-    Message,
     NodeValue,
     Partial,
     PartOfNode,
@@ -46,7 +48,6 @@ from composer.inference.values import (
     alternatives,
     constant,
     is_chosen,
-    is_none,
     join,
     truth_of,
 )
@@ -73,6 +74,9 @@ class Evaluator:
         self.lasting_doubts: list[int] = [0]
         self.expressions = Expressions(self)
         self.statements = Statements(self)
+        self.loops = Loops(self)
+        self.match_cases = MatchCases(self)
+        self.narrowing = Narrowing(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
@@ -186,45 +190,6 @@ class Evaluator:
                 break
             scope = scope.outer
         return scope
-
-    def narrow(self, test: ast.expr, scope: Scope, *, is_true: bool) -> None:
-        """Use what is known after a test."""
-        match test:
-            case ast.UnaryOp(op=ast.Not()):
-                self.narrow(test.operand, scope, is_true=not is_true)
-            case ast.BoolOp():
-                if isinstance(test.op, ast.And) == is_true:
-                    for each in test.values:
-                        self.narrow(each, scope, is_true=is_true)
-            case ast.Name():
-                self._drop_none(test, scope, has_value=is_true)
-            case ast.Compare(
-                left=ast.Name() as name, ops=[sign], comparators=[ast.Constant(None)]
-            ):
-                if isinstance(sign, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
-                    is_none = isinstance(sign, ast.Is | ast.Eq)
-                    self._drop_none(name, scope, has_value=is_none != is_true)
-            case ast.Call(func=ast.Name(id=function), args=[ast.Name() as name, *_]):
-                if function in ('isinstance', 'hasattr', 'callable', 'issubclass'):
-                    with self.run.silence():
-                        is_known = truth_of(self.evaluate(test, scope)) is not None
-                    if not is_known:
-                        self._forget(name, scope, is_true=is_true)
-            case ast.Compare(left=ast.Call(func=ast.Name(id='type'), args=[ast.Name() as name])):
-                self._forget(name, scope, is_true=True)
-
-    def _drop_none(self, name: ast.Name, scope: Scope, *, has_value: bool) -> None:
-        value = scope.names.get(name.id) if scope.names is not None else None
-        if isinstance(value, Alternatives) and has_value:
-            kept = [each for each in value.values if not is_none(each)]
-            scope.set(name.id, join(kept) if kept else UNKNOWN)
-
-    def _forget(self, name: ast.Name, scope: Scope, *, is_true: bool) -> None:
-        """Forget what a name stands for, as the test of its type is not decided by that."""
-        value = scope.names.get(name.id) if scope.names is not None else None
-        is_sure = isinstance(value, NodeValue) or (isinstance(value, Message) and not is_true)
-        if value is not None and not is_sure:
-            scope.set(name.id, UNKNOWN)
 
     def item_of(self, value: Value) -> Value:
         """Return what an item of something iterated is."""

@@ -44,6 +44,9 @@ _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set:
 _UNREAD = (ast.Slice,)
 # Expressions that make a value, rather than find one.
 _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
+_NO_CONVERSION = -1
+# Of more texts, none is known.
+_MOST_TEXTS = 16
 
 
 class Expressions(Part):
@@ -79,24 +82,25 @@ class Expressions(Part):
         return self._evaluator.look_up(node, scope)
 
     def _joinedstr(self, node: ast.JoinedStr, scope: Scope) -> Value:
-        text: str | None = ''
+        texts = ['']
         chosen = 0
         for part in node.values:
-            if isinstance(part, ast.Constant):
-                value: Value = constant(part.value)
-            elif isinstance(part, ast.FormattedValue):
+            value: Value = constant(getattr(part, 'value', None))
+            if isinstance(part, ast.FormattedValue):
                 value = self._evaluator.awaited(part.value, scope)
                 if part.format_spec is not None:
                     self.evaluate(part.format_spec, scope)
+                if part.format_spec is not None or part.conversion != _NO_CONVERSION:
                     value = Scalar(str, is_chosen(value))
-            else:
-                value = UNKNOWN
             chosen = max(chosen, is_chosen(value))
-            simple = isinstance(value, Constant) and isinstance(value.value, str | int | bool)
-            text = f'{text}{value.value}' if text is not None and simple else None  # type: ignore[union-attr]
-        if text is None:
+            several = [each for each in alternatives(value) if isinstance(each, Constant)]
+            simple = all(isinstance(each.value, str | int) for each in several)
+            is_known = simple and len(several) == len(alternatives(value))
+            texts = [f'{text}{each.value}' for text in texts for each in several if is_known]
+        if not 0 < len(texts) <= _MOST_TEXTS:
             return Scalar(str, chosen)
-        return constant(text, Place(scope.module, node), is_chosen=chosen)
+        place = Place(scope.module, node)
+        return join(constant(text, place, is_chosen=chosen) for text in texts)
 
     def _list(self, node: ast.List | ast.Tuple | ast.Set, scope: Scope) -> Value:
         items: list[tuple[Value, Place]] = []
@@ -196,7 +200,7 @@ class Expressions(Part):
                 if is_reached and (truth is None or truth != goes_on or is_last):
                     found.append(value)
                 if not is_last:
-                    evaluator.narrow(each, scope, is_true=goes_on)
+                    evaluator.narrowing.narrow(each, scope, value, is_true=goes_on)
                     is_reached = is_reached and truth in (None, goes_on)
                     branch = evaluator.branch(value, is_taken=goes_on)
                     conditions.enter_context(branch)
@@ -216,7 +220,7 @@ class Expressions(Part):
         found: list[Value] = []
         before = scope.copy_names()
         for branch, taken in ((node.body, True), (node.orelse, False)):
-            evaluator.narrow(node.test, scope, is_true=taken)
+            evaluator.narrowing.narrow(node.test, scope, test, is_true=taken)
             with evaluator.branch(test, is_taken=taken):
                 value = evaluator.evaluate(branch, scope)
             if truth is None or truth == taken:
@@ -337,49 +341,42 @@ class Expressions(Part):
 
     def _listcomp(self, node: ast.ListComp | ast.SetComp, scope: Scope) -> Value:
         kind = list if isinstance(node, ast.ListComp) else set
-        inner, iterated = self._loop_over(node.generators, scope)
-        with self._evaluator.run.condition():
-            value = self.evaluate(node.elt, inner)
-        place = Place(scope.module, node)
-        items = [(value, Place(scope.module, node.elt))]
-        is_plain = len(node.generators) == 1 and not node.generators[0].ifs and kind is list
-        if is_plain and isinstance(iterated, Sequence) and iterated.is_whole:
-            return Sequence(items * len(iterated.items), kind, origin=place)
-        return Sequence(items, kind, is_open=True, origin=place)
+        items, is_whole = self._items(node.elt, node.generators, scope)
+        return Sequence(items, kind, not is_whole, origin=Place(scope.module, node))
 
     _setcomp = _listcomp
 
     def _generatorexp(self, node: ast.GeneratorExp, scope: Scope) -> Value:
-        inner, _ = self._loop_over(node.generators, scope)
-        with self._evaluator.run.condition():
-            return Generated(self.evaluate(node.elt, inner), NONE)
+        items, is_whole = self._items(node.elt, node.generators, scope)
+        values = tuple(value for value, _ in items)
+        return Generated(join(values), NONE, items=values if is_whole else None)
+
+    def _items(
+        self, element: ast.expr, generators: list[ast.comprehension], scope: Scope
+    ) -> tuple[list[tuple[Value, Place]], bool]:
+        """Return the items that a comprehension makes, and whether these are all."""
+        items: list[tuple[Value, Place]] = []
+        is_whole = True
+        for inner, is_certain in self._evaluator.loops.rounds(generators, scope):
+            items.append((self.evaluate(element, inner), Place(scope.module, element)))
+            is_whole = is_whole and is_certain
+        if not is_whole and len(generators) == len(items) == 1 and not generators[0].ifs:
+            with self._evaluator.run.silence():
+                iterated = self.evaluate(generators[0].iter, scope)
+            if isinstance(iterated, Sequence) and iterated.is_whole:
+                return items * len(iterated.items), True
+        return items, is_whole
 
     def _dictcomp(self, node: ast.DictComp, scope: Scope) -> Value:
-        inner, _ = self._loop_over(node.generators, scope)
-        made = Mapping({}, is_open=True, depth=self._evaluator.run.conditions)
-        with self._evaluator.run.condition():
+        run = self._evaluator.run
+        made = Mapping({}, depth=run.conditions)
+        for inner, is_certain in self._evaluator.loops.rounds(node.generators, scope):
             keys = self.evaluate(node.key, inner)
             value = self.evaluate(node.value, inner)
-        for key in alternatives(keys):
-            if isinstance(key, Constant):
-                made.set(key.value, value, Place(scope.module, node.key), made.depth)
+            made.is_open |= not is_certain
+            for key in alternatives(keys):
+                if isinstance(key, Constant):
+                    made.set(key.value, value, Place(scope.module, node.key), run.conditions)
+                else:
+                    made.is_open = True
         return made
-
-    def _loop_over(self, generators: list[ast.comprehension], scope: Scope) -> tuple[Scope, Value]:
-        """Return the scope of a comprehension, in which its names stand for its items.
-
-        Also returns what it iterates over, first of all.
-        """
-        inner = Scope(scope.module, scope.function, outer=scope, waits=scope.waits)
-        first: list[Value] = []
-        for generator in generators:
-            iterated = self._evaluator.iterated(generator.iter, inner, generator.is_async)
-            first.append(iterated)
-            names = {each.id for each in ast.walk(generator.target) if isinstance(each, ast.Name)}
-            inner.local |= names
-            item = self._evaluator.item_of(iterated)
-            self._evaluator.statements.store(generator.target, item, inner)
-            for test in generator.ifs:
-                self._evaluator.tested(test, inner)
-                self._evaluator.narrow(test, inner, is_true=True)
-        return inner, first[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
@@ -65,8 +66,10 @@ class NodeCalls(Part):
                 results.append(UNKNOWN)
                 continue
             waited = waits_here and method in ('call', 'call_async')
-            # Of several names, conditions may leave out some.
-            with self._evaluator.run.condition(is_doubt=isinstance(name.value, Alternatives)):
+            # Of several names, conditions may leave out some, unless they are chosen right here.
+            is_doubt = isinstance(name.value, Alternatives)
+            is_doubt = is_doubt and not isinstance(name.place.node, ast.IfExp)
+            with self._evaluator.run.condition(is_doubt=is_doubt):
                 self._evaluator.run.use(kind, each.value, name_place(name, each), waits=waited)
             type_name = self._evaluator.run.facts.type_of(section, each.value)
             results.append(self._send(method, type_name, payload, arguments))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.evaluation.part import Part
@@ -35,6 +35,7 @@ from composer.interfaces.field_values import (
     read_items,
     scalar_reader,
 )
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -46,7 +47,7 @@ _FLOATS = ('float32', 'float64')
 _TEXTS = ('string', 'wstring')
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Misfit(Part):
     """A value that does not fit, and where it is written.
 

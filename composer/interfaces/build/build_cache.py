@@ -18,7 +18,6 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,6 +27,7 @@ from composer.errors import ComposerError
 from composer.input_limits import UnreadableFileError, read_file
 from composer.interfaces.build.manifest import is_intact, read_manifest, write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions
+from composer.records import record
 from composer.signals import interrupting
 
 # Raise it whenever the builder builds something else from the same definitions.
@@ -53,7 +53,7 @@ class CacheError(ComposerError):
     """The cache cannot be written."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BuildFolder:
     """An empty folder to build in, while its lock is held.
 

@@ -11,7 +11,6 @@ import os
 import py_compile
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.ament import INTERFACE_INDEX, PACKAGE_INDEX, find_package
@@ -23,6 +22,7 @@ from composer.interfaces.build.jobs import JobError, run_jobs
 from composer.interfaces.build.toolchain import find_toolchain
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.packages import used_packages
+from composer.records import record
 
 _SHOWN_LINES = 20
 # With less space left on a disk, a program that failed may have failed for that: not all say so.
@@ -65,7 +65,7 @@ class DependencyMissingError(ComposerError):
     """An interface package that every service or action needs is not installed."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Dependencies:
     """The packages that a package is built on.
 

@@ -8,13 +8,13 @@ the order in which they use each other. A package is laid out as a ROS prefix: `
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer.ament import find_path
 from composer.interfaces.build import generation
 from composer.interfaces.build.jobs import Job
 from composer.interfaces.build.toolchain import Toolchain
+from composer.records import record
 
 # -w: nobody can fix warnings in generated code. NDEBUG leaves out comparisons of constants.
 _COMPILE_FLAGS = ('-fPIC', '-O1', '-w', '-pipe', '-DNDEBUG')
@@ -37,7 +37,7 @@ _HEADER_PACKAGES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Library:
     """A library of an interface package.
 
@@ -109,7 +109,7 @@ _EXTENSION = Library(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class BuildPlan:
     """What to build, and where.
 

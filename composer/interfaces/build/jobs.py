@@ -6,9 +6,10 @@ import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
+
+from composer.records import record
 
 
 class JobError(Exception):
@@ -26,7 +27,7 @@ class JobError(Exception):
         self.output = output
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Job:
     """A program to run.
 

@@ -4,7 +4,6 @@ import importlib
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -21,6 +20,7 @@ from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.packages import (
     used_packages,
 )
+from composer.records import record
 
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
@@ -29,7 +29,7 @@ class ModuleTakenError(ComposerError):
     """Another Python module has the name of an interface package."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ProvidedPackage:
     """An interface package that is built.
 

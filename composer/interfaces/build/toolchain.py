@@ -5,12 +5,12 @@ import shlex
 import shutil
 import sysconfig
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
 from composer.ament import find_path
 from composer.errors import ComposerError
+from composer.records import record
 
 # In the order of their work; the last five write sources that are compiled.
 GENERATORS = (
@@ -41,7 +41,7 @@ class BuildToolsMissingError(ComposerError):
         self.missing = tuple(missing)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Toolchain:
     """The programs and files to build with.
 

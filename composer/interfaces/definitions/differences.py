@@ -6,7 +6,6 @@ may have more interfaces than the folder.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import unified_diff
 from pathlib import Path
 
@@ -15,12 +14,13 @@ from composer.interfaces.definitions.installed_definitions import describe_packa
 from composer.interfaces.definitions.package_folder import PackageDefinitions
 from composer.interfaces.definitions.rendering import render_definition
 from composer.interfaces.descriptions import InterfaceDescription
+from composer.records import record
 
 # Type descriptions have no char: they describe such a field as the uint8 that it is.
 _CHAR_FIELD = re.compile(r'^char(?!\S* \w+=)')
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Difference:
     """An interface that a folder defines differently from the installed package.
 

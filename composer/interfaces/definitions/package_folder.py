@@ -39,6 +39,7 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
+from composer.records import record
 from composer.spelling import did_you_mean
 
 PARTS: Final = {
@@ -52,7 +53,7 @@ _WHAT_IS_SEPARATED: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TypeReference:
     """A field whose type is a message.
 
@@ -67,7 +68,7 @@ class TypeReference:
     message: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PackageDefinitions:
     """The definitions in a folder.
 

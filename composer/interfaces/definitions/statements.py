@@ -6,10 +6,10 @@ inside quotes, the type ends at the first space, and a line with `=` after its t
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from composer.diagnostics import SourceFile, Span
+from composer.records import record
 
 SEPARATOR: Final = '---'
 _NEAR_SEPARATOR: Final = re.compile(r'\s*-[-\s]*-\s*(#.*)?')
@@ -17,7 +17,7 @@ _NEAR_SEPARATOR: Final = re.compile(r'\s*-[-\s]*-\s*(#.*)?')
 StatementKind: TypeAlias = Literal['field', 'constant', 'unfinished']
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Statement:
     """One line that defines something.
 
@@ -36,7 +36,7 @@ class Statement:
     value: Span | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Section:
     """The lines between two separators.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from composer.language.paths import (
     resolve_path,
 )
 from composer.names import find_namespace_problem
+from composer.records import record
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class IncludeEntry:
     """An include of a file.
 

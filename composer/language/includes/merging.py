@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
@@ -18,6 +17,7 @@ from composer.language.namespaces import (
     split_node_name,
 )
 from composer.language.parsing.process_parser import takes_ros_arguments, with_waits
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.language.includes.include_entry import IncludeEntry
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Inclusion:
     """A file that was read for an include.
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from time import monotonic
 from typing import TYPE_CHECKING, Any
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +20,7 @@ def _keep(_future: Future) -> None:
     """Let an answer come that nobody waits for."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Requests:
     """Sends requests to one server, each as soon as it is there, and waits for the answers.
 

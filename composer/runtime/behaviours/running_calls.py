@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import threading
-from dataclasses import dataclass
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.records import record
 from composer.runtime.behaviours.stacks import (
     coroutine_codes,
     format_coroutine,
@@ -39,7 +39,7 @@ class Progress:
         self.resumed_ns = monotonic_ns()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Owner:
     """What a behaviour belongs to: an entity, or the node itself.
 
@@ -59,7 +59,7 @@ class Owner:
         return f'{self.kind}{name}{f" ({self.key})" if self.key else ""}'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RunningCall:
     """A call that has begun and not ended.
 

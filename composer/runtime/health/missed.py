@@ -1,18 +1,19 @@
 """What subscriptions and timers miss because callbacks take too long."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
+from composer.records import record
+
 _LATE_SHARE = 0.1
 _MIN_LATE_NS = 1_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MissedCounts:
     """What an entity missed because callbacks took too long, since it is counted.
 

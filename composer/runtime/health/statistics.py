@@ -7,9 +7,9 @@ that ever fail, one call is not counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.records import record
 from composer.runtime.behaviours.tracebacks import summarize
 from composer.runtime.health.missed import MissedCounts
 
@@ -94,7 +94,7 @@ def _last_ns(bucket: int) -> int:
     return ((bucket - (shift << _SUB_BITS) + 1) << shift << _UNIT_BITS) - 1
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class EntityReport:
     """The health of an entity in one period, and since the start.
 

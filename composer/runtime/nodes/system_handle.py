@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from time import monotonic
 from typing import TYPE_CHECKING, Any
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +41,7 @@ class ServiceFailures:
             return self._times.get(service, float('-inf')) >= begun
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SystemHandle:
     """What nodes need of the system that they belong to.
 

@@ -46,6 +46,7 @@ from composer.inference.values import (
     alternatives,
     are_chosen,
     constant,
+    is_none,
     join,
 )
 
@@ -158,12 +159,13 @@ class LibraryCalls(Part):
         owner, name, value = (arguments.get(index, '') for index in range(3))
         if owner is None or name is None or value is None:
             return NONE
-        if isinstance(name.value, Constant) and isinstance(name.value.value, str):
-            where = name_place(name, name.value)
-            self._evaluator.attributes.store(owner.value, name.value.value, value.value, where)
-        elif owner.value == PartOfNode('state'):
-            self._evaluator.run.reading.is_state_open = True
         del place
+        for each in alternatives(name.value):
+            if isinstance(each, Constant) and isinstance(each.value, str):
+                where = name_place(name, each)
+                self._evaluator.attributes.store(owner.value, each.value, value.value, where)
+            elif owner.value == PartOfNode('state'):
+                self._evaluator.run.reading.is_state_open = True
         return NONE
 
     def _hasattr(self, arguments: Arguments, place: Place) -> Value:
@@ -192,7 +194,7 @@ class LibraryCalls(Part):
             return Scalar(bool)
         wanted = classes.value
         several = [item for item, _ in wanted.items] if isinstance(wanted, Sequence) else [wanted]
-        answers = {_is_instance(value.value, each) for each in several}
+        answers = {is_instance(value.value, each) for each in several}
         if True in answers:
             return constant(value=True)
         return Scalar(bool) if None in answers else constant(value=False)
@@ -216,7 +218,8 @@ class LibraryCalls(Part):
         return UNKNOWN
 
     def _round(self, arguments: Arguments, place: Place) -> Value:
-        if len(arguments.positional) == 1:
+        digits = arguments.get(1, 'ndigits')
+        if digits is None or is_none(digits.value):
             return Scalar(int)
         return self._abs(arguments, place)
 
@@ -242,7 +245,7 @@ class LibraryCalls(Part):
         return Partial(arguments.positional[0].value, rest)
 
 
-def _is_instance(value: Value, wanted: Value) -> bool | None:
+def is_instance(value: Value, wanted: Value) -> bool | None:
     """Return whether a value is of a class, if that is known."""
     found = {_is_one_instance(each, wanted) for each in alternatives(value)}
     return found.pop() if len(found) == 1 else None

@@ -13,7 +13,6 @@ from composer.inference.values import (
     NEVER,
     NONE,
     UNKNOWN,
-    Alternatives,
     Argument,
     Arguments,
     Awaitable,
@@ -88,10 +87,15 @@ class Statements(Part):
                 self._store_item(target, value, scope)
 
     def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+        """Return what each target gets of something that is unpacked."""
+        rows = [
+            [item for item, _ in each.items]
+            for each in alternatives(value)
+            if isinstance(each, Sequence) and each.is_whole and len(each.items) == len(targets)
+        ]
         starred = any(isinstance(each, ast.Starred) for each in targets)
-        is_even = isinstance(value, Sequence) and len(value.items) == len(targets)
-        if isinstance(value, Sequence) and is_even and value.is_whole and not starred:
-            return [item for item, _ in value.items]
+        if len(rows) == len(alternatives(value)) and not starred:
+            return [join(column) for column in zip(*rows, strict=True)]
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
@@ -215,19 +219,22 @@ class Statements(Part):
                 self._evaluator.evaluate(each, scope)
         scope.names = None
 
-    def _break(self, _: ast.Break | ast.Continue, scope: Scope) -> None:
+    def _break(self, _: ast.Break, scope: Scope) -> None:
         if scope.names is not None:
-            scope.jumps.append(scope.names)
+            scope.broken.append(scope.names)
         scope.names = None
 
-    _continue = _break
+    def _continue(self, _: ast.Continue, scope: Scope) -> None:
+        if scope.names is not None:
+            scope.continued.append(scope.names)
+        scope.names = None
 
     def _assert(self, node: ast.Assert, scope: Scope) -> None:
         test = self._evaluator.tested(node.test, scope)
         if truth_of(test) is False:
             scope.names = None
             return
-        self._evaluator.narrow(node.test, scope, is_true=True)
+        self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
 
     # Branches
 
@@ -241,12 +248,12 @@ class Statements(Part):
                 truth = truth_of(test)
                 is_doubtful |= truth is None and is_chosen(test) > 0
                 before = scope.copy_names()
-                self._evaluator.narrow(node.test, scope, is_true=True)
+                self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
                     self.follow_all(node.body, scope)
                 ends.append(None if truth is False else scope.names)
                 scope.names = before
-                self._evaluator.narrow(node.test, scope, is_true=False)
+                self._evaluator.narrowing.narrow(node.test, scope, test, is_true=False)
                 branches.enter_context(self._evaluator.branch(test, is_taken=False))
                 if truth is True:
                     ends.append(None)
@@ -266,84 +273,17 @@ class Statements(Part):
             self._evaluator.lasting_doubts[-1] += 1
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
-        subject = self._evaluator.evaluate(node.subject, scope)
-        self._evaluator.run.decide(subject)
-        ends: list[Names | None] = []
-        before = scope.copy_names()
-        for case in node.cases:
-            scope.names = None if before is None else dict(before)
-            for pattern in ast.walk(case.pattern):
-                if isinstance(pattern, ast.MatchValue):
-                    self._evaluator.evaluate(pattern.value, scope)
-                elif isinstance(pattern, ast.MatchClass):
-                    self._evaluator.evaluate(pattern.cls, scope)
-            for name in _captured(case.pattern):
-                scope.set(name, UNKNOWN)
-            if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
-                if case.pattern.name:
-                    scope.set(case.pattern.name, subject)
-            elif isinstance(node.subject, ast.Name) and isinstance(case.pattern, ast.MatchClass):
-                scope.set(node.subject.id, UNKNOWN)
-            if case.guard is not None:
-                self._evaluator.evaluate(case.guard, scope)
-            with self._evaluator.run.condition(is_doubt=is_chosen(subject)):
-                self.follow_all(case.body, scope)
-            ends.append(scope.names)
-        scope.names = join_names([before, *ends])
+        self._evaluator.match_cases.follow(node, scope)
 
     # Loops
 
     def _for(self, node: ast.For | ast.AsyncFor, scope: Scope) -> None:
-        iterated = self._evaluator.iterated(node.iter, scope, isinstance(node, ast.AsyncFor))
-        item = self._evaluator.item_of(iterated)
-
-        def begin() -> None:
-            self.store(node.target, item, scope)
-
-        self._loop(node, scope, begin, is_doubt=False)
+        self._evaluator.loops.follow_for(node, scope)
 
     _asyncfor = _for
 
     def _while(self, node: ast.While, scope: Scope) -> None:
-        test: list[Value] = [UNKNOWN]
-
-        def begin() -> None:
-            test[0] = self._evaluator.tested(node.test, scope)
-            if truth_of(test[0]) is False:
-                scope.names = None
-            else:
-                self._evaluator.narrow(node.test, scope, is_true=True)
-
-        is_endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
-        self._loop(node, scope, begin, is_doubt=False, is_endless=is_endless)
-
-    def _loop(
-        self,
-        node: ast.For | ast.AsyncFor | ast.While,
-        scope: Scope,
-        begin: object,
-        *,
-        is_doubt: bool,
-        is_endless: bool = False,
-    ) -> None:
-        """Follow a loop twice: what the first round stores, the second one finds."""
-        run = self._evaluator.run
-        jumps, scope.jumps = scope.jumps, []
-        before = scope.copy_names()
-        with run.condition(is_doubt=is_doubt):
-            with run.silence():
-                begin()  # type: ignore[operator]
-                self.follow_all(node.body, scope)
-            after = join_names([before, scope.names, *scope.jumps])
-            scope.names = _widened(before, after)
-            again = scope.copy_names()
-            scope.jumps = []
-            begin()  # type: ignore[operator]
-            self.follow_all(node.body, scope)
-        ends = [None if is_endless else again, None if is_endless else scope.names, *scope.jumps]
-        scope.jumps = jumps
-        scope.names = join_names(ends)
-        self.follow_all(node.orelse, scope)
+        self._evaluator.loops.follow_while(node, scope)
 
     # Guards
 
@@ -355,7 +295,9 @@ class Statements(Part):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
-            self.follow_all(node.orelse, scope)
+            # What is wrong in the body, and caught, never comes to this.
+            with run.condition(is_doubt=is_guard):
+                self.follow_all(node.orelse, scope)
         ends = [scope.names]
         caught = join_names([before, after])
         for handler in node.handlers:
@@ -392,27 +334,6 @@ class Statements(Part):
     _asyncwith = _with
 
 
-def _widened(before: Names | None, after: Names | None) -> Names | None:
-    """Return what names stand for in any round: what changes is more than the first two values."""
-    if before is None or after is None:
-        return after
-    return {
-        name: value if before.get(name) == value else _widen(value)
-        for name, value in after.items()
-    }
-
-
-def _widen(value: Value) -> Value:
-    if not isinstance(value, Alternatives):
-        return value
-    return join(
-        Scalar(each.kind, each.is_chosen)
-        if isinstance(each, Constant) and each.kind in (int, float, str)
-        else each
-        for each in alternatives(value)
-    )
-
-
 def _is_guard(handler: ast.ExceptHandler) -> bool:
     """Return whether a handler expects wrong names: it catches them, or ignores everything."""
     names = {'BaseException'} if handler.type is None else _names_in(handler.type)
@@ -439,9 +360,3 @@ def _names_in(expression: ast.expr) -> set[str]:
     nodes = list(ast.walk(expression))
     names = {node.id for node in nodes if isinstance(node, ast.Name)}
     return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-
-
-def _captured(pattern: ast.pattern) -> set[str]:
-    names = {getattr(node, 'name', None) for node in ast.walk(pattern)}
-    names |= {getattr(node, 'rest', None) for node in ast.walk(pattern)}
-    return {name for name in names if name}

@@ -1,0 +1,1 @@
+"""Follow the statements of behaviours: what they store, and on which conditions."""
