@@ -37,7 +37,8 @@ class Unknown:
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs.
+            name of the node, `BY_PARAMETER` for what may change while the system runs, and
+            `BY_STATE` for what behaviours keep, which they may have from the file.
     """
 
     is_chosen: int = 0
@@ -106,11 +107,12 @@ class PartOfNode:
     Attributes:
         name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns,
             `changes` what `on_parameters` is given.
-        type: Of a goal, its action.
+        type: Of a goal, its action; `entity` is the action client that sent it.
     """
 
     name: str
     type: str = ''
+    entity: str = ''
 
 
 @record
@@ -346,8 +348,9 @@ Value: TypeAlias = (
     | Alternatives
 )
 
-BY_FILE = 1
-BY_PARAMETER = 2
+BY_STATE = 1
+BY_FILE = 2
+BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
@@ -376,9 +379,9 @@ def join(values: Iterable[Value]) -> Value:
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     return Alternatives(tuple(found))
 
 

@@ -137,8 +137,12 @@ class Calls(Part):
                     name, arguments, waits=waits, is_awaited=is_awaited
                 )
             case BoundMethod():
-                if isinstance(function.owner, PartOfNode):
-                    self._fits(function.owner.name, function.name, arguments, place)
+                owner, name = function.owner, function.name
+                if isinstance(owner, PartOfNode):
+                    self._fits(owner.name, name, arguments, place)
+                if isinstance(owner, PartOfNode) and owner.name == 'goal':
+                    waits = waits and (name != 'result_async' or is_awaited)
+                    return self._evaluator.node_calls.call_goal(owner, name, place, waits=waits)
                 return self._evaluator.containers.call_method(function, arguments, place)
             case MessageClass():
                 return self._construct(function, arguments)

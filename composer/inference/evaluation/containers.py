@@ -8,7 +8,6 @@ from composer.inference.values import (
     UNKNOWN,
     Arguments,
     ArrayField,
-    Awaitable,
     BoundMethod,
     Constant,
     Instance,
@@ -40,9 +39,6 @@ class Containers(Part):
                 return self._evaluator.node_calls.call_own_state(name, arguments)
             case PartOfNode(name='time') if name == 'to_msg':
                 return Message('builtin_interfaces/msg/Time')
-            case PartOfNode(name='goal') if name in ('result', 'result_async'):
-                result: Value = Message(f'{owner.type}_Result') if owner.type else UNKNOWN
-                return Awaitable(result) if name == 'result_async' else result
             case PartOfNode(name='logger') if name == 'get_child':
                 return owner
             case Mapping() | Sequence() | Constant() | Scalar() | Instance():

@@ -26,6 +26,7 @@ from composer.inference.statements.narrowing import Narrowing
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -44,6 +45,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -66,12 +68,10 @@ class Evaluator:
     Attributes:
         kept: Objects of classes of the project that are kept in the state, by their names there.
         call_places: Where the calls under way are written.
-        lasting_doubts: Of each function under way, the doubts that last until its end.
     """
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self.lasting_doubts: list[int] = [0]
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
@@ -178,7 +178,8 @@ class Evaluator:
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
-            around.enter_context(self.run.condition(is_doubt=is_doubt))
+            by_state = is_chosen(test) == BY_STATE
+            around.enter_context(self.run.condition(is_doubt=is_doubt, by_state=by_state))
             if is_dead and is_chosen(test) != BY_PARAMETER:
                 around.enter_context(self.run.dead_branch())
             yield
@@ -209,7 +210,7 @@ class Evaluator:
                 return Scalar(str)
             case PartOfNode(name='parameters'):
                 self.run.reading.open_kinds.add('parameter')
-        return CHOSEN if is_chosen(value) else UNKNOWN
+        return Unknown(is_chosen(value))
 
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""

@@ -7,7 +7,6 @@ import operator
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
-    CHOSEN,
     UNKNOWN,
     Constant,
     Mapping,
@@ -16,6 +15,7 @@ from composer.inference.values import (
     NodeValue,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -73,7 +73,7 @@ def combine(sign: ast.operator, left: Value, right: Value) -> Value:
 
 
 def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
-    chosen = is_chosen(left) or is_chosen(right)
+    chosen = max(is_chosen(left), is_chosen(right))
     if isinstance(left, Constant) and isinstance(right, Constant):
         compute = _ARITHMETIC.get(type(sign))
         is_power = isinstance(sign, _POWERS) and abs(hash(right.value)) > _GREATEST_POWER
@@ -81,14 +81,14 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
             try:
                 return constant(compute(left.value, right.value), is_chosen=chosen)
             except (ArithmeticError, TypeError, ValueError):
-                return CHOSEN if chosen else UNKNOWN
+                return Unknown(chosen)
     if isinstance(left, Sequence):
         return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))
     result = _result(sign, *kinds)
     if result is not None:
         return Scalar(result, chosen)
-    return CHOSEN if chosen else UNKNOWN
+    return Unknown(chosen)
 
 
 def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value:
@@ -176,14 +176,14 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
 def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     """Return what a comparison says, as far as it is known."""
     known = _compare(sign, left, right)
-    chosen = is_chosen(left) or is_chosen(right)
+    chosen = max(is_chosen(left), is_chosen(right))
     if known is not None:
         return constant(known, is_chosen=chosen)
     plain = all(isinstance(each, Constant | Scalar) for each in (left, right))
     if plain or isinstance(sign, ast.Is | ast.IsNot | ast.In | ast.NotIn):
         return Scalar(bool, chosen)
     # NumPy compares item by item.
-    return CHOSEN if chosen else UNKNOWN
+    return Unknown(chosen)
 
 
 def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:

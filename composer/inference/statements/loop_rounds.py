@@ -86,15 +86,14 @@ class Loops(Part):
     @contextmanager
     def _loop_in(self, node: ast.For | ast.AsyncFor | ast.While, scope: Scope) -> Iterator[None]:
         """Keep the jumps of a loop apart, and forget at its end what they leave in doubt."""
-        run, lasting = self._evaluator.run, self._evaluator.lasting_doubts
+        run = self._evaluator.run
         before = scope.broken, scope.continued
-        doubts = lasting[-1]
+        doubts = run.doubts, run.state_doubts
         scope.broken, scope.continued = [], []
         yield
         scope.broken, scope.continued = before
         if not any(isinstance(each, _ENDS) for each in own_nodes(node)):
-            run.doubts -= lasting[-1] - doubts
-            lasting[-1] = doubts
+            run.doubts, run.state_doubts = doubts
 
     def _follow_each(self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value]) -> None:
         """Follow a loop round by round."""

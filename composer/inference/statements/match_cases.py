@@ -9,6 +9,7 @@ from composer.inference.evaluation.library.library_calls import is_instance
 from composer.inference.evaluation.operators import compare
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
+from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
     UNKNOWN,
     Constant,
@@ -51,6 +52,8 @@ class MatchCases(Part):
                 scope.set(node.subject.id, value)
             if case.guard is not None:
                 matches = _both(matches, truth_of(evaluator.tested(case.guard, scope)))
+            if matches is None:
+                doubt_rounds(node.subject, scope)
             test = self._test(False if is_over else matches, subject)
             with evaluator.branch(test, is_taken=True):
                 evaluator.statements.follow_all(case.body, scope)

@@ -10,6 +10,7 @@ from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
+    BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
@@ -241,12 +242,12 @@ class Statements(Part):
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        is_doubtful = False
+        doubt = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
-                is_doubtful |= truth is None and is_chosen(test) > 0
+                doubt = max(doubt, is_chosen(test) if truth is None else 0)
                 before = scope.copy_names()
                 self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
@@ -267,10 +268,9 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if is_doubtful and has_jumped:
+        if doubt and has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubts += 1
-            self._evaluator.lasting_doubts[-1] += 1
+            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         self._evaluator.match_cases.follow(node, scope)
@@ -291,6 +291,7 @@ class Statements(Part):
         run = self._evaluator.run
         before = scope.copy_names()
         is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
+        tried = run.tried
         with run.guard(is_guard=is_guard, is_broad=is_broad):
             self.follow_all(node.body, scope)
         after = scope.names
@@ -298,6 +299,8 @@ class Statements(Part):
             # What is wrong in the body, and caught, never comes to this.
             with run.condition(is_doubt=is_guard):
                 self.follow_all(node.orelse, scope)
+        # Only then the file may decide whether it raises.
+        is_doubtful = run.tried > tried
         ends = [scope.names]
         caught = join_names([before, after])
         for handler in node.handlers:
@@ -306,7 +309,8 @@ class Statements(Part):
                 self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
-            with run.condition(is_doubt=_is_guard(handler) or _is_broad(handler)):
+            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
+            with run.condition(is_doubt=is_doubt):
                 self.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)
