@@ -39,6 +39,7 @@ class Run:
         conditions: The number of conditions around it.
         dead_branches: The number of branches around it that the file never takes.
         is_silent: Whether the place is read once more later.
+        is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
     """
 
@@ -55,6 +56,7 @@ class Run:
         self.conditions = 0
         self.dead_branches = 0
         self.is_silent = False
+        self.is_at_top = False
         self.steps = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
@@ -100,12 +102,13 @@ class Run:
     @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.guards, self.conditions, self.is_silent
-        self.doubts, self.guards, self.conditions, self.is_silent = 0, int(is_guard), 0, False
+        before = self.doubts, self.guards, self.conditions, self.is_silent, self.is_at_top
+        self.doubts, self.guards, self.conditions = 0, int(is_guard), 0
+        self.is_silent, self.is_at_top = False, True
         try:
             yield
         finally:
-            self.doubts, self.guards, self.conditions, self.is_silent = before
+            self.doubts, self.guards, self.conditions, self.is_silent, self.is_at_top = before
 
     @contextmanager
     def dead_branch(self) -> Iterator[None]:

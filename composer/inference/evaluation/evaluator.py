@@ -6,6 +6,7 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
 from composer.inference.evaluation.containers import Containers
@@ -15,7 +16,6 @@ from composer.inference.evaluation.imports import Imports
 from composer.inference.evaluation.library_calls import LibraryCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
-from composer.inference.evaluation.project_classes import Classes
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
@@ -31,6 +31,7 @@ from composer.inference.values import (
     ArrayField,
     Awaitable,
     BoundMethod,
+    Class,
     Constant,
     Function,
     Generated,
@@ -97,7 +98,8 @@ class Evaluator:
             return CHOSEN
         current: Scope | None = scope
         while current is not None:
-            if name in current.local:
+            is_later = current.is_body and name not in (current.names or ())
+            if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
                     value = current.names[name]
@@ -118,13 +120,21 @@ class Evaluator:
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
-            with self.run.afresh(is_guard=is_conditional):
+            with self.afresh(is_guard=is_conditional):
                 if isinstance(statement, ast.Import | ast.ImportFrom):
                     return self.imports.imported(module, statement, name)
                 self.statements.follow_all([cast('ast.stmt', statement)], scope)
             return (scope.names or {}).get(name, UNKNOWN)
 
         return self.run.modules.value(module, name, evaluate)
+
+    @contextmanager
+    def afresh(self, *, is_guard: bool) -> Iterator[None]:
+        """Read the top of a module or the body of a class meanwhile."""
+        self.lasting_doubts.append(0)
+        with self.run.afresh(is_guard=is_guard):
+            yield
+        self.lasting_doubts.pop()
 
     def read_target(self, target: ast.expr, scope: Scope) -> Value:
         """Return what the target of `+=` holds."""
@@ -199,6 +209,8 @@ class Evaluator:
                 return value.item()
             case Generated():
                 return value.yielded
+            case Instance() | Class():
+                return self._item_of_object(value)
             case Mapping() if not (value.is_open or value.is_lost) and value.entries:
                 return join(constant(key) for key in value.entries)
             case Constant() | Scalar() if value.kind is str:
@@ -207,16 +219,34 @@ class Evaluator:
                 self.run.reading.open_kinds.add('parameter')
         return CHOSEN if is_chosen(value) else UNKNOWN
 
+    def _item_of_object(self, value: Instance | Class) -> Value:
+        items = self.loops.items_of(value)
+        if items is not None:
+            return join(items)
+        if isinstance(value, Class):
+            return UNKNOWN
+        iterator = self.classes.call_method(value, '__iter__')
+        if isinstance(iterator, Instance):
+            return self.classes.call_method(iterator, '__next__') or UNKNOWN
+        return UNKNOWN if iterator is None else self.item_of(iterator)
+
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""
-        return join(
-            each.yielded if isinstance(each, Generated) else UNKNOWN
-            for each in alternatives(value)
-        )
+        return join(self._entered(each) for each in alternatives(value))
+
+    def _entered(self, value: Value) -> Value:
+        if isinstance(value, Instance):
+            entered = self.classes.call_method(value, '__enter__')
+            if entered is None:
+                entered = self.classes.call_method(value, '__aenter__')
+                return entered.result if isinstance(entered, Awaitable) else UNKNOWN
+            return entered
+        return value.yielded if isinstance(value, Generated) else UNKNOWN
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
-        if isinstance(value, Instance):
+        if isinstance(value, Instance) and not value.is_member:
+            value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)

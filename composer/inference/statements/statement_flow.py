@@ -140,13 +140,15 @@ class Statements(Part):
     # Definitions
 
     def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
-        scope.set(node.name, self._evaluator.functions.define_decorated(node, scope))
+        function = self._evaluator.functions.define(node, scope)
+        scope.set(node.name, self._evaluator.functions.decorate(function, node, scope))
 
     _asyncfunctiondef = _functiondef
 
     def _classdef(self, node: ast.ClassDef, scope: Scope) -> None:
         outer = None if scope.function is None else scope
-        scope.set(node.name, Class(scope.module, node, outer))
+        made = Class(scope.module, node, outer)
+        scope.set(node.name, self._evaluator.functions.decorate(made, node, scope))
 
     def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
         for alias in node.names:
