@@ -405,7 +405,10 @@ def join(values: Iterable[Value]) -> Value:
     if not found or len(found) > _MOST_ALTERNATIVES:
         return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
     if any(isinstance(value, Unknown) for value in found):
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        unknown = CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        # Of what may be called, something is known still.
+        called = [each for each in found if isinstance(each, Function | Partial | Class)]
+        return Alternatives((unknown, *called)) if called else unknown
     return Alternatives(tuple(found))
 
 

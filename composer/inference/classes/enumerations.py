@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from typing import Any
 
 from composer.inference.evaluation.part import Part
@@ -13,6 +14,7 @@ from composer.inference.values import (
     Descriptor,
     Function,
     Instance,
+    Place,
     Scalar,
     Value,
     constant,
@@ -52,7 +54,7 @@ class Enumerations(Part):
         if value == UNKNOWN:
             # Of `auto()`.
             texts = 'enum.StrEnum' in externals
-            value = constant(name.lower()) if texts else UNKNOWN
+            value = constant(name.lower(), _place_of(of, name)) if texts else UNKNOWN
         if externals & _MIXINS:
             if isinstance(value, Constant):
                 return Constant(value.kind, value.value, 0, value.origin, (of, name))
@@ -88,6 +90,14 @@ class Enumerations(Part):
         if isinstance(index, Constant) and index.value in names:
             return self.member(of, index.value, names[index.value])
         return join(self.members(of)) if names else UNKNOWN
+
+
+def _place_of(of: Class, name: str) -> Place | None:
+    for statement in of.definition.body:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=stored) as target]) if stored == name:
+                return Place(of.module, target)
+    return None
 
 
 def _value_of(member: Value) -> Value | None:

@@ -163,6 +163,9 @@ class Calls(Part):
                         method, arguments, place, waits=waits, is_awaited=is_awaited
                     )
             case External():
+                made = self._evaluator.callables.call(function.name, arguments, place)
+                if made is not None:
+                    return made
                 return self._evaluator.library.call(function.name, arguments, place)
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)

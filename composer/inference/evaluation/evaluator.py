@@ -6,6 +6,7 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.classes.made_callables import MadeCallables
 from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
@@ -81,6 +82,7 @@ class Evaluator:
         self.library = LibraryCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
+        self.callables = MadeCallables(self)
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
@@ -243,6 +245,17 @@ class Evaluator:
             return entered
         return value.yielded if isinstance(value, Generated) else UNKNOWN
 
+    def left(self, value: Value) -> Value | None:
+        """Return what the end of `with value` gives: true if it catches what was raised."""
+        if not isinstance(value, Instance):
+            return None
+        reason = (UNKNOWN, UNKNOWN, UNKNOWN)
+        ended = self.classes.call_method(value, '__exit__', *reason)
+        if ended is None:
+            ended = self.classes.call_method(value, '__aexit__', *reason)
+            return ended.result if isinstance(ended, Awaitable) else ended
+        return ended
+
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
         if isinstance(value, Instance) and not value.is_member:
@@ -277,8 +290,9 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
-                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
-                    self.run.reading.open_all()
+                for each in value.attributes.values():
+                    if isinstance(each, NodeValue | BoundMethod | PartOfNode):
+                        self.escape(each)
 
     def _escape_method(self, method: BoundMethod) -> None:
         kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)

@@ -235,11 +235,10 @@ PLANTED = {
     'a member that is a text': """
         from enum import StrEnum, auto
         class Topic(StrEnum):
-            LEVEL = auto()
-            <COMAND|COMMAND> = auto()
+            <LEVLE|LEVEL> = auto()
         def hear(node, m):
-            node.publish(Topic.LEVEL, 1)
-            node.publish(Topic.COMMAND, {})
+            for topic in Topic:
+                node.publish(topic, 1)
         """,
     'all members of an enumeration': """
         from enum import Enum
@@ -364,6 +363,59 @@ PLANTED = {
             drive = partialmethod(send, '<comand|command>')
         def hear(node, m):
             Talker(node).drive({})
+        """,
+    'an operator of the project': """
+        class Output:
+            def __init__(self, publish, name):
+                self._publish, self._name = publish, name
+            def __lshift__(self, payload):
+                self._publish(self._name, payload)
+                return self
+        def hear(node, m):
+            Output(node.publish, '<levle|level>') << 1 << 2
+        """,
+    'a getter of attributes': """
+        from operator import attrgetter
+        place = attrgetter('pose.pose.<positon|position>')
+        def hear(node, m):
+            print(place(m).x)
+        """,
+    'a getter of parameters': """
+        from operator import attrgetter
+        settings = attrgetter('speed', '<mod|mode>')
+        def hear(node, m):
+            speed, mode = settings(node.parameters)
+            print(speed, mode)
+        """,
+    'a caller of a method': """
+        from operator import methodcaller
+        send = methodcaller('publish', '<comand|command>', {})
+        def hear(node, m):
+            send(node)
+        """,
+    'a key of a sort': """
+        from operator import attrgetter
+        def hear(node, m):
+            print(sorted([m], key=attrgetter('header.<stmp|stamp>.sec')))
+        """,
+    'a function or another one': """
+        def drive(node):
+            node.publish('<comand|command>', {})
+        def hear(node, m):
+            act = node.own_state.get('act') or drive
+            act(node)
+        """,
+    'a function for a class': """
+        from functools import singledispatch
+        from nav_msgs.msg import Odometry
+        @singledispatch
+        def show(message, node):
+            raise TypeError(message)
+        @show.register
+        def _(message: Odometry, node):
+            node.publish('command', message.<twst|twist>.twist)
+        def hear(node, m):
+            show(m, node)
         """,
 }
 PLACE = re.compile(r'<(\w+)\|(\w+)>')
