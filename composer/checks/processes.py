@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.ament import explain_missing_package, list_executables, list_packages
 from composer.checks.names import IS_EMPTY, check_rules
-from composer.language.paths import PathError, resolve_path
+from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
 from composer.programs import base_environment, find_program_problem, is_on_path
 from composer.spelling import suggest
@@ -92,7 +92,9 @@ def _check_folder(context: CheckContext, process: ProcessSpec) -> Iterator[Diagn
     if folder.is_dir():
         return
     message = f"there is no folder '{process.cwd}' to run in"
-    yield context.at_value((*process.path, 'cwd'), 'missing-folder', message)
+    at = (*process.path, 'cwd')
+    help_text = explain_absent(folder, context.system.positions.value(at), is_folder=True)
+    yield context.at_value(at, 'missing-folder', message, help=help_text)
 
 
 def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:

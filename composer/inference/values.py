@@ -37,7 +37,8 @@ class Unknown:
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs.
+            name of the node, `BY_PARAMETER` for what may change while the system runs, and
+            `BY_STATE` for what behaviours keep, which they may have from the file.
     """
 
     is_chosen: int = 0
@@ -108,11 +109,12 @@ class PartOfNode:
     Attributes:
         name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns,
             `changes` what `on_parameters` is given.
-        type: Of a goal, its action.
+        type: Of a goal, its action; `entity` is the action client that sent it.
     """
 
     name: str
     type: str = ''
+    entity: str = ''
 
 
 @record
@@ -195,6 +197,11 @@ class Sequence:
     def is_whole(self) -> bool:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether its first item comes first, in whatever runs."""
+        return self.kind not in (set, frozenset) or len(self.items) < 2  # noqa: PLR2004
 
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""
@@ -373,8 +380,9 @@ Value: TypeAlias = (
     | Alternatives
 )
 
-BY_FILE = 1
-BY_PARAMETER = 2
+BY_STATE = 1
+BY_FILE = 2
+BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
@@ -403,9 +411,9 @@ def join(values: Iterable[Value]) -> Value:
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        unknown = CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        unknown = Unknown(max(map(is_chosen, found), default=0))
         # Of what may be called, something is known still.
         called = [each for each in found if isinstance(each, Function | Partial | Class)]
         return Alternatives((unknown, *called)) if called else unknown

@@ -36,7 +36,8 @@ class ClassBodies(Part):
         if key not in self._names:
             self._names[key] = {}
             scope = self.scope_of(of)
-            with self._evaluator.afresh(is_guard=False), self._evaluator.run.silence():
+            run = self._evaluator.run
+            with run.afresh(is_guard=False), run.silence():
                 self._evaluator.statements.follow_all(of.definition.body, scope)
             self._names[key] = scope.names or {}
         return self._names[key]

@@ -10,6 +10,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -32,6 +33,7 @@ from composer.inference.values import (
     Scalar,
     Sequence,
     Super,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -160,7 +162,7 @@ class Attributes(Part):
                 return 'unknown-attribute', message, f'write {owner.name}().{name}'
             case Constant() | Scalar() | Mapping() | Sequence():
                 return self._read_builtin(owner, name)
-        return CHOSEN if is_chosen(owner) else UNKNOWN
+        return Unknown(is_chosen(owner))
 
     def _read_node(self, name: str) -> Value | tuple[str, str, str | None]:
         if name == 'name':
@@ -187,7 +189,7 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
-                return self._evaluator.kept.get(name, CHOSEN)
+                return self._evaluator.kept.get(name, Unknown(BY_STATE))
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -217,7 +219,7 @@ class Attributes(Part):
             return MessageClass(f'{owner.type}_{name}')
         if name == 'get_fields_and_field_types':
             return BoundMethod(owner, name)
-        if description is None or name == 'SLOT_TYPES' or name[0] == '_':
+        if description is None or name == 'SLOT_TYPES' or name.startswith('_'):
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN
@@ -278,7 +280,7 @@ class Attributes(Part):
             else:
                 run.reading.is_own_state_open = True
             key = str(index.value) if isinstance(index, Constant) else ''
-            return self._evaluator.kept.get(f'[{key}]', CHOSEN)
+            return self._evaluator.kept.get(f'[{key}]', Unknown(BY_STATE))
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []

@@ -14,17 +14,20 @@ from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
-from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.library.library_calls import LibraryCalls
+from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
+from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -44,6 +47,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -66,20 +70,20 @@ class Evaluator:
     Attributes:
         kept: Objects of classes of the project that are kept in the state, by their names there.
         call_places: Where the calls under way are written.
-        lasting_doubts: Of each function under way, the doubts that last until its end.
     """
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self.lasting_doubts: list[int] = [0]
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
         self.library = LibraryCalls(self)
+        self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
         self.callables = MadeCallables(self)
@@ -122,21 +126,13 @@ class Evaluator:
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
-            with self.afresh(is_guard=is_conditional):
+            with self.run.afresh(is_guard=is_conditional):
                 if isinstance(statement, ast.Import | ast.ImportFrom):
                     return self.imports.imported(module, statement, name)
                 self.statements.follow_all([cast('ast.stmt', statement)], scope)
             return (scope.names or {}).get(name, UNKNOWN)
 
         return self.run.modules.value(module, name, evaluate)
-
-    @contextmanager
-    def afresh(self, *, is_guard: bool) -> Iterator[None]:
-        """Read the top of a module or the body of a class meanwhile."""
-        self.lasting_doubts.append(0)
-        with self.run.afresh(is_guard=is_guard):
-            yield
-        self.lasting_doubts.pop()
 
     def read_target(self, target: ast.expr, scope: Scope) -> Value:
         """Return what the target of `+=` holds."""
@@ -186,7 +182,8 @@ class Evaluator:
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
-            around.enter_context(self.run.condition(is_doubt=is_doubt))
+            by_state = is_chosen(test) == BY_STATE
+            around.enter_context(self.run.condition(is_doubt=is_doubt, by_state=by_state))
             if is_dead and is_chosen(test) != BY_PARAMETER:
                 around.enter_context(self.run.dead_branch())
             yield
@@ -219,7 +216,7 @@ class Evaluator:
                 return Scalar(str)
             case PartOfNode(name='parameters'):
                 self.run.reading.open_kinds.add('parameter')
-        return CHOSEN if is_chosen(value) else UNKNOWN
+        return Unknown(is_chosen(value))
 
     def _item_of_object(self, value: Instance | Class) -> Value:
         items = self.loops.items_of(value)

@@ -135,6 +135,7 @@ class Functions(Part):
         function.is_read = True
         key = self._key_of(function, arguments, waits=waits)
         if key is not None and key in self._results:
+            self._evaluator.run.tried += 1
             return self._results[key]
         if function.definition in self.active or len(self.active) >= _DEEPEST:
             self._evaluator.calls.escape_all(arguments)
@@ -174,7 +175,14 @@ class Functions(Part):
             return None
         names = tuple(name for name, _ in arguments.named)
         run = self._evaluator.run
-        at = (bool(run.doubts), bool(run.guards), run.is_silent, waits, arguments.is_open)
+        at = (
+            bool(run.doubts),
+            run.is_sure,
+            bool(run.guards),
+            run.is_silent,
+            waits,
+            arguments.is_open,
+        )
         owner: object = function.owner
         if isinstance(owner, Instance):
             owner = (id(owner), owner.version)
@@ -192,7 +200,8 @@ class Functions(Part):
         self._bind(function, arguments, scope)
         self.active.append(definition)
         self._evaluator.run.modules.followed.add(id(definition))
-        self._evaluator.lasting_doubts.append(0)
+        run = self._evaluator.run
+        doubts = run.doubts, run.state_doubts
         try:
             if isinstance(definition, ast.Lambda):
                 value = self._evaluator.evaluate(definition.body, scope)
@@ -209,7 +218,7 @@ class Functions(Part):
                     self.follow_later(inner)
                     self._evaluator.run.doubts -= 1
         finally:
-            self._evaluator.run.doubts -= self._evaluator.lasting_doubts.pop()
+            run.doubts, run.state_doubts = doubts
             self.active.pop()
         return scope
 

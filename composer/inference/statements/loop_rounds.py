@@ -70,7 +70,8 @@ class Loops(Part):
         items = self.items_of(iterated) if is_plain else None
         with self._loop_in(node, scope):
             if items is not None:
-                self._follow_each(node, scope, items)
+                is_retry = getattr(iterated, 'kind', None) is range
+                self._follow_each(node, scope, items, is_search=not is_retry)
                 return
             item = evaluator.item_of(iterated)
             self._follow(node, scope, lambda: evaluator.statements.store(node.target, item, scope))
@@ -92,17 +93,18 @@ class Loops(Part):
     @contextmanager
     def _loop_in(self, node: ast.For | ast.AsyncFor | ast.While, scope: Scope) -> Iterator[None]:
         """Keep the jumps of a loop apart, and forget at its end what they leave in doubt."""
-        run, lasting = self._evaluator.run, self._evaluator.lasting_doubts
+        run = self._evaluator.run
         before = scope.broken, scope.continued
-        doubts = lasting[-1]
+        doubts = run.doubts, run.state_doubts
         scope.broken, scope.continued = [], []
         yield
         scope.broken, scope.continued = before
         if not any(isinstance(each, _ENDS) for each in own_nodes(node)):
-            run.doubts -= lasting[-1] - doubts
-            lasting[-1] = doubts
+            run.doubts, run.state_doubts = doubts
 
-    def _follow_each(self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value]) -> None:
+    def _follow_each(
+        self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value], *, is_search: bool
+    ) -> None:
         """Follow a loop round by round."""
         jumps = any(isinstance(each, _JUMPS) for each in own_nodes(node))
         with self._rounds_of(node, items, scope):
@@ -114,7 +116,9 @@ class Loops(Part):
                     self._evaluator.statements.store(node.target, item, scope)
                     self._evaluator.statements.follow_all(node.body, scope)
                 scope.names = join_names([scope.names, *scope.continued])
-        self._evaluator.statements.follow_all(node.orelse, scope)
+        # What is looked for among known items is expected to be one of them.
+        with self._evaluator.run.condition(is_doubt=is_search and bool(scope.broken)):
+            self._evaluator.statements.follow_all(node.orelse, scope)
         scope.names = join_names([scope.names, *scope.broken])
 
     @contextmanager
