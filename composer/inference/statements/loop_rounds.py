@@ -70,8 +70,7 @@ class Loops(Part):
         items = self.items_of(iterated) if is_plain else None
         with self._loop_in(node, scope):
             if items is not None:
-                is_retry = getattr(iterated, 'kind', None) is range
-                self._follow_each(node, scope, items, is_search=not is_retry)
+                self._follow_each(node, scope, items)
                 return
             item = evaluator.item_of(iterated)
             self._follow(node, scope, lambda: evaluator.statements.store(node.target, item, scope))
@@ -102,9 +101,7 @@ class Loops(Part):
         if not any(isinstance(each, _ENDS) for each in own_nodes(node)):
             run.doubts, run.state_doubts = doubts
 
-    def _follow_each(
-        self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value], *, is_search: bool
-    ) -> None:
+    def _follow_each(self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value]) -> None:
         """Follow a loop round by round."""
         jumps = any(isinstance(each, _JUMPS) for each in own_nodes(node))
         with self._rounds_of(node, items, scope):
@@ -117,7 +114,10 @@ class Loops(Part):
                     self._evaluator.statements.follow_all(node.body, scope)
                 scope.names = join_names([scope.names, *scope.continued])
         # What is looked for among known items is expected to be one of them.
-        with self._evaluator.run.condition(is_doubt=is_search and bool(scope.broken)):
+        targets = {each.id for each in ast.walk(node.target) if _is_store(each)}
+        read = {each.id for each in own_nodes(node) if isinstance(each, ast.Name)}
+        is_search = bool(scope.broken and targets & read)
+        with self._evaluator.run.condition(is_doubt=is_search):
             self._evaluator.statements.follow_all(node.orelse, scope)
         scope.names = join_names([scope.names, *scope.broken])
 
