@@ -41,6 +41,7 @@ class Run:
         dead_branches: The number of branches around it that the file never takes.
         tried: How often something was read that is right or wrong by what the file says.
         is_silent: Whether the place is read once more later.
+        is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
     """
 
@@ -59,6 +60,7 @@ class Run:
         self.dead_branches = 0
         self.tried = 0
         self.is_silent = False
+        self.is_at_top = False
         self.steps = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
@@ -118,14 +120,15 @@ class Run:
     @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.state_doubts, self.guards, self.conditions, self.is_silent
+        before = self.doubts, self.state_doubts, self.guards, self.conditions
+        flags = self.is_silent, self.is_at_top
         self.doubts, self.state_doubts, self.guards = 0, 0, int(is_guard)
-        self.conditions, self.is_silent = 0, False
+        self.conditions, self.is_silent, self.is_at_top = 0, False, True
         try:
             yield
         finally:
-            self.doubts, self.state_doubts, self.guards = before[:3]
-            self.conditions, self.is_silent = before[3:]
+            self.doubts, self.state_doubts, self.guards, self.conditions = before
+            self.is_silent, self.is_at_top = flags
 
     @contextmanager
     def dead_branch(self) -> Iterator[None]:
