@@ -23,6 +23,7 @@ from composer.inference.values import (
     External,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
     Message,
@@ -30,6 +31,7 @@ from composer.inference.values import (
     NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     ProjectModule,
     Scalar,
     Sequence,
@@ -90,6 +92,8 @@ _SHOWN_PARTS = {
     'own_state': 'own_state',
     'changes': 'the changes',
 }
+# What stays the same where it is stored in an object.
+_LASTING = (NodeValue, PartOfNode, BoundMethod, Function, Instance, Primitive)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 
 
@@ -147,6 +151,8 @@ class Attributes(Part):
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
+            case Primitive():
+                return BoundMethod(owner, name)
             case Awaitable():
                 if name in _COROUTINE or name.startswith('cr_'):
                     return UNKNOWN
@@ -184,6 +190,8 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
+                if run.probed is not None:
+                    run.probed.add(Held('state', name))
                 return self._evaluator.kept.get(name, Unknown(BY_STATE))
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
@@ -243,7 +251,8 @@ class Attributes(Part):
         if stored is None:
             return found or UNKNOWN
         # What other behaviours store in it is not known here.
-        is_lasting = isinstance(stored, NodeValue | PartOfNode | BoundMethod | Function | Instance)
+        self._evaluator.run.moves += 1
+        is_lasting = isinstance(stored, _LASTING)
         if is_lasting or self._evaluator.classes.is_stored_once(owner.of, name):
             return stored
         return UNKNOWN
@@ -346,6 +355,7 @@ class Attributes(Part):
         match owner:
             case PartOfNode(name='state'):
                 run.reading.state_set.add(name)
+                self._evaluator.waiting.fill(Held('state', name))
                 self._evaluator.keep(name, value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.part import Part
+from composer.inference.evaluation.waiting import MADE
 from composer.inference.values import (
     BY_PARAMETER,
     CHOSEN,
@@ -65,6 +66,8 @@ _KNOWN_RESULTS |= {
     'builtins.print': NONE,
     'time.sleep': NONE,
 }
+# Functions that return the same for the same arguments are in these.
+_PURE = ('builtins.', 'math.', 'copy.', 'functools.', 'operator.')
 # How long a `range` is that is followed item by item.
 _LONGEST_RANGE = 256
 # How long one is whose numbers are followed, too.
@@ -76,6 +79,13 @@ class LibraryCalls(Part):
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Return what a call of a function may return, by its full name: `builtins.len`."""
+        if name in MADE:
+            return self._evaluator.waiting.make(name, arguments, place)
+        if name == 'time.sleep':
+            length = arguments.get(0, 'secs') or Argument(UNKNOWN, place)
+            self._evaluator.waiting.sleep(length, place)
+        elif not name.startswith(_PURE):
+            self._evaluator.run.moves += 1
         method = getattr(self, f'_call_{name.replace(".", "_")}', None)
         if method is not None:
             return cast('Value', method(arguments, place))

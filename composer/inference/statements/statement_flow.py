@@ -19,6 +19,7 @@ from composer.inference.values import (
     Class,
     Constant,
     Generated,
+    Held,
     Mapping,
     PartOfNode,
     Place,
@@ -71,6 +72,8 @@ class Statements(Part):
         """Store a value, in a name or in something."""
         match target:
             case ast.Name():
+                if scope.function is not None and target.id not in scope.local:
+                    self._evaluator.waiting.fill(Held(str(scope.module.path), target.id))
                 scope.set(target.id, value)
             case ast.Starred():
                 self.store(target.value, UNKNOWN, scope)
@@ -113,6 +116,7 @@ class Statements(Part):
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
+                self._evaluator.waiting.fill(Held('state', node.target.attr))
                 return
         if isinstance(node.target, ast.Subscript):
             owner = self._evaluator.evaluate(node.target.value, scope)
@@ -329,13 +333,16 @@ class Statements(Part):
     _trystar = _try
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        locks = ExitStack()
         for item in node.items:
             value = self._evaluator.evaluate(item.context_expr, scope)
+            place = Place(scope.module, item.context_expr)
+            locks.enter_context(self._evaluator.waiting.holding(value, place))
             if item.optional_vars is not None:
                 self.store(item.optional_vars, self._evaluator.entered(value), scope)
         is_guard = any(_suppresses(item.context_expr) for item in node.items)
         before = scope.copy_names()
-        with self._evaluator.run.guard(is_guard=is_guard):
+        with locks, self._evaluator.run.guard(is_guard=is_guard):
             self.follow_all(node.body, scope)
         if is_guard:
             scope.names = join_names([before, scope.names])
