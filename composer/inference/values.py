@@ -196,6 +196,11 @@ class Sequence:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
 
+    @property
+    def is_ordered(self) -> bool:
+        """Whether its first item comes first, in whatever runs."""
+        return self.kind not in (set, frozenset) or len(self.items) < 2  # noqa: PLR2004
+
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""
         count = len(self.items)

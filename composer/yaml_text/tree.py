@@ -7,8 +7,9 @@ from typing import Any, NoReturn, TypeAlias
 
 import yaml
 
-from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.input_limits import MAX_DEPTH, MAX_VALUES
+from composer.spelling import suggest
 
 _QUOTES = ("'", '"')
 
@@ -107,7 +108,9 @@ def _parse(text: str, source: SourceFile, builder: _TreeBuilder) -> None:
         while (event := loader.get_event()) is not None:
             builder.take(event)
     except yaml.MarkedYAMLError as error:
-        raise CompositionError(_syntax_problem(error, source)) from error
+        quote = _find_open_quote(error, builder.last_quoted)
+        finding = _quote_problem(quote, source) if quote else _syntax_problem(error, source)
+        raise CompositionError(finding) from error
     except yaml.reader.ReaderError as error:
         raise CompositionError(_character_problem(error, text, source)) from error
     except yaml.YAMLError as error:
@@ -129,6 +132,7 @@ class _TreeBuilder:
     ) -> None:
         self.roots: list[TreeNode] = []
         self.values = 0
+        self.last_quoted: Any = None
         self._source = source
         self._alias_rule = alias_rule
         self._most_documents = most_documents
@@ -144,6 +148,8 @@ class _TreeBuilder:
             quoted = event.style in _QUOTES
             node = ScalarNode(event.value, tag, plain, self._span(event), quoted)
             self._add(node, event.anchor)
+            if quoted:
+                self.last_quoted = event
         elif isinstance(event, yaml.MappingStartEvent):
             self._enter(MappingNode(event.tag, self._span(event)), event)
         elif isinstance(event, yaml.SequenceStartEvent):
@@ -189,7 +195,9 @@ class _TreeBuilder:
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} before this alias')
+            message = f'no anchor &{event.anchor} before this alias'
+            help_text = suggest(event.anchor, self._anchors, 'there are')
+            self._stop(event, 'unknown-alias', message, help=help_text)
         if node in self._open:
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
         return node
@@ -204,8 +212,30 @@ class _TreeBuilder:
             length = max(len(self._source.line(start.line + 1).rstrip()) - start.column, 1)
         return Span(self._source, start.line + 1, start.column + 1, length)
 
-    def _stop(self, event: Any, rule: str, message: str) -> NoReturn:
-        raise CompositionError(diagnostic_at(self._span(event), rule, message))
+    def _stop(
+        self,
+        event: Any,
+        rule: str,
+        message: str,
+        help: str | None = None,  # noqa: A002 - the word that the finding shows
+    ) -> NoReturn:
+        raise CompositionError(diagnostic_at(self._span(event), rule, message, help=help))
+
+
+def _find_open_quote(error: yaml.MarkedYAMLError, last: Any) -> Any:
+    """Return where a quote begins that is not closed, or only by the beginning of another one."""
+    if error.context and 'quoted scalar' in error.context and 'unexpected' in str(error.problem):
+        return error.context_mark
+    mark = error.problem_mark
+    is_long = last is not None and last.start_mark.line != last.end_mark.line
+    is_at_its_end = is_long and mark is not None and mark.line == last.end_mark.line
+    return last.start_mark if is_at_its_end else None
+
+
+def _quote_problem(begun: Any, source: SourceFile) -> Diagnostic:
+    span = Span(source, begun.line + 1, begun.column + 1)
+    message = 'this is not YAML: the quote that begins here is not closed in its line'
+    return diagnostic_at(span, 'yaml-syntax', message)
 
 
 def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
@@ -214,11 +244,12 @@ def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnost
     problem = error.problem or error.context or 'it cannot be parsed'
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
+    related: tuple[Related, ...] = ()
     if context and begun and mark and begun.line != mark.line:
         context += f' that begins on line {begun.line + 1}'
-    return diagnostic_at(
-        span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
-    )
+        related = (Related('it begins here', Span(source, begun.line + 1, begun.column + 1)),)
+    message = f'this is not YAML: {problem}{context}'
+    return diagnostic_at(span, 'yaml-syntax', message, help=_syntax_help(span), related=related)
 
 
 def _syntax_help(span: Span) -> str | None:

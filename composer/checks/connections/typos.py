@@ -15,7 +15,7 @@ from composer.checks.connections.topology import TOPICS_OF_ROS, full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
-from composer.names import expand_name, with_article
+from composer.names import expand_name, find_topic_name_problem, with_article
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
@@ -166,7 +166,8 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             path = (*node.path, 'remap', source)
             span = positions.key(path)
             scheme, _, bare = source.rpartition('://')
-            if source.startswith('__') or scheme not in ('', 'rostopic', 'rosservice'):
+            is_scheme = scheme in ('', 'rostopic', 'rosservice')
+            if source.startswith('__') or not is_scheme or find_topic_name_problem(bare):
                 continue  # which is a finding of its own
             name = expand_name(bare, node.name, node.namespace)
             if name in names or (name in actions and remaps_actions() is not False):

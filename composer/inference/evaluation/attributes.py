@@ -222,7 +222,7 @@ class Attributes(Part):
             return MessageClass(f'{owner.type}_{name}')
         if name == 'get_fields_and_field_types':
             return BoundMethod(owner, name)
-        if description is None or name == 'SLOT_TYPES' or name[0] == '_':
+        if description is None or name == 'SLOT_TYPES' or name.startswith('_'):
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit, signature_of
 from composer.inference.message_types import in_python
@@ -30,7 +31,6 @@ from composer.inference.values import (
     Place,
     Primitive,
     Scalar,
-    Sequence,
     Unknown,
     Value,
     alternatives,
@@ -97,13 +97,18 @@ class Calls(Part):
         is_open = False
         for each in node.args:
             place = Place(scope.module, each)
-            if isinstance(each, ast.Starred):
+            if is_open:
+                # Nobody knows which position this has.
+                self._evaluator.escape(self._evaluator.evaluate(each, scope))
+            elif isinstance(each, ast.Starred):
                 value = self._evaluator.evaluate(each.value, scope)
-                if isinstance(value, Sequence) and not value.is_lost and not value.is_open:
-                    positional += [Argument(*item) for item in value.items]
-                else:
+                try:
+                    leaves = leaves_of(value, place)
+                except NotKnownError:
                     is_open = True
                     self._evaluator.escape(value)
+                    continue
+                positional += [Argument(each.value, each.place) for each in leaves]
             else:
                 positional.append(Argument(self._evaluator.evaluate(each, scope), place))
         for keyword in node.keywords:

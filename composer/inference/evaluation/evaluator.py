@@ -12,7 +12,8 @@ from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
-from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.library.library_calls import LibraryCalls
+from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
 from composer.inference.evaluation.project_classes import Classes
@@ -21,6 +22,7 @@ from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
+from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
@@ -76,11 +78,13 @@ class Evaluator:
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
         self.library = LibraryCalls(self)
+        self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
         self.imports = Imports(self)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from typing import cast
 
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Scope
@@ -12,6 +13,7 @@ from composer.inference.values import (
     Class,
     Function,
     Instance,
+    Place,
     Value,
 )
 
@@ -26,13 +28,7 @@ class Classes(Part):
         if isinstance(init, Function):
             self._evaluator.functions.follow(init, arguments, waits=True)
         elif self._is_dataclass(of):
-            fields = [
-                each.target.id
-                for each in of.definition.body
-                if isinstance(each, ast.AnnAssign)
-                and isinstance(each.target, ast.Name)
-                and 'ClassVar' not in ast.unparse(each.annotation)
-            ]
+            fields = [each.target.id for each in _fields(of)]
             # Fields of bases come first.
             fields = [] if of.definition.bases else fields
             for name, argument in zip(fields, arguments.positional, strict=False):
@@ -43,6 +39,20 @@ class Classes(Part):
             self._evaluator.calls.escape_all(arguments)
             return made if not of.definition.bases else UNKNOWN
         return made
+
+    def fields_of(self, owner: Instance) -> dict[str, tuple[Value, Place]] | None:
+        """Return the fields of an object of a dataclass, and where each is declared."""
+        of = owner.of
+        if not self._is_dataclass(of) or of.definition.bases:
+            return None
+        found: dict[str, tuple[Value, Place]] = {}
+        for each in _fields(of):
+            name = each.target.id
+            value = owner.attributes.get(name)
+            if value is None and each.value is not None:
+                value = self._evaluator.evaluate(each.value, self._scope_of(of))
+            found[name] = (value or UNKNOWN, Place(of.module, each.target))
+        return found
 
     def _is_dataclass(self, of: Class) -> bool:
         names = {
@@ -107,3 +117,20 @@ class Classes(Part):
                 for node in ast.walk(statement)
             )
         return self._evaluator.run.modules.attribute_stores[key] <= 1
+
+
+class _Field(ast.AnnAssign):
+    """A field of a dataclass."""
+
+    target: ast.Name
+
+
+def _fields(of: Class) -> list[_Field]:
+    """Return the statements that declare the fields of a dataclass."""
+    return [
+        cast('_Field', each)
+        for each in of.definition.body
+        if isinstance(each, ast.AnnAssign)
+        and isinstance(each.target, ast.Name)
+        and 'ClassVar' not in ast.unparse(each.annotation)
+    ]

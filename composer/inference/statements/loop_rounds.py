@@ -109,7 +109,9 @@ class Loops(Part):
                     self._evaluator.statements.store(node.target, item, scope)
                     self._evaluator.statements.follow_all(node.body, scope)
                 scope.names = join_names([scope.names, *scope.continued])
-        self._evaluator.statements.follow_all(node.orelse, scope)
+        # What is looked for among known items is expected to be one of them.
+        with self._evaluator.run.condition(is_doubt=bool(scope.broken)):
+            self._evaluator.statements.follow_all(node.orelse, scope)
         scope.names = join_names([scope.names, *scope.broken])
 
     @contextmanager

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Names, Scope, join_names
-from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
     BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
+    Argument,
+    Arguments,
     Awaitable,
     Class,
     Constant,
@@ -26,7 +27,9 @@ from composer.inference.values import (
     Scalar,
     Sequence,
     Value,
+    alternatives,
     is_chosen,
+    join,
     truth_of,
 )
 
@@ -88,10 +91,15 @@ class Statements(Part):
                 self._store_item(target, value, scope)
 
     def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+        """Return what each target gets of something that is unpacked."""
+        rows = [
+            [item for item, _ in each.items]
+            for each in alternatives(value)
+            if isinstance(each, Sequence) and each.is_whole and len(each.items) == len(targets)
+        ]
         starred = any(isinstance(each, ast.Starred) for each in targets)
-        is_even = isinstance(value, Sequence) and len(value.items) == len(targets)
-        if isinstance(value, Sequence) and is_even and value.is_whole and not starred:
-            return [item for item, _ in value.items]
+        if len(rows) == len(alternatives(value)) and not starred:
+            return [join(column) for column in zip(*rows, strict=True)]
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
@@ -137,10 +145,21 @@ class Statements(Part):
             if isinstance(target, ast.Name):
                 scope.set(target.id, UNKNOWN)
             elif isinstance(target, ast.Subscript):
-                self._evaluator.read_target(target, scope)
-                self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
+                self._delete_item(target, scope)
             elif isinstance(target, ast.Attribute):
-                self._evaluator.evaluate(target.value, scope)
+                self._evaluator.evaluate(target, scope)
+
+    def _delete_item(self, target: ast.Subscript, scope: Scope) -> None:
+        self._evaluator.read_target(target, scope)
+        owner = self._evaluator.evaluate(target.value, scope)
+        with self._evaluator.run.silence():
+            index = self._evaluator.evaluate(target.slice, scope)
+        if isinstance(owner, Mapping | Sequence) and isinstance(index, Constant):
+            given = Argument(index, Place(scope.module, target.slice))
+            place = Place(scope.module, target)
+            self._evaluator.methods.call(owner, 'pop', Arguments((given,)), place)
+        else:
+            self._evaluator.escape(owner)
 
     # Definitions
 
@@ -258,33 +277,7 @@ class Statements(Part):
             self._evaluator.run.doubt(1, int(doubt == BY_STATE))
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
-        subject = self._evaluator.evaluate(node.subject, scope)
-        run = self._evaluator.run
-        run.decide(subject)
-        ends: list[Names | None] = []
-        before = scope.copy_names()
-        for case in node.cases:
-            scope.names = None if before is None else dict(before)
-            doubt_rounds(node.subject, scope)
-            for pattern in ast.walk(case.pattern):
-                if isinstance(pattern, ast.MatchValue):
-                    self._evaluator.evaluate(pattern.value, scope)
-                elif isinstance(pattern, ast.MatchClass):
-                    self._evaluator.evaluate(pattern.cls, scope)
-            for name in _captured(case.pattern):
-                scope.set(name, UNKNOWN)
-            if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
-                if case.pattern.name:
-                    scope.set(case.pattern.name, subject)
-            elif isinstance(node.subject, ast.Name) and isinstance(case.pattern, ast.MatchClass):
-                scope.set(node.subject.id, UNKNOWN)
-            if case.guard is not None:
-                self._evaluator.evaluate(case.guard, scope)
-            chosen = is_chosen(subject)
-            with run.condition(is_doubt=chosen > 0, by_state=chosen == BY_STATE):
-                self.follow_all(case.body, scope)
-            ends.append(scope.names)
-        scope.names = join_names([before, *ends])
+        self._evaluator.match_cases.follow(node, scope)
 
     # Loops
 
@@ -307,7 +300,9 @@ class Statements(Part):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
-            self.follow_all(node.orelse, scope)
+            # What is wrong in the body, and caught, never comes to this.
+            with run.condition(is_doubt=is_guard):
+                self.follow_all(node.orelse, scope)
         # Only then the file may decide whether it raises.
         is_doubtful = run.tried > tried
         ends = [scope.names]
@@ -376,9 +371,3 @@ def _names_in(expression: ast.expr) -> set[str]:
     nodes = list(ast.walk(expression))
     names = {node.id for node in nodes if isinstance(node, ast.Name)}
     return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-
-
-def _captured(pattern: ast.pattern) -> set[str]:
-    names = {getattr(node, 'name', None) for node in ast.walk(pattern)}
-    names |= {getattr(node, 'rest', None) for node in ast.walk(pattern)}
-    return {name for name in names if name}
