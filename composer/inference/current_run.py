@@ -46,6 +46,7 @@ class Run:
         probed: The names that a condition hangs on, while one is looked at.
         moves: How often something was read that changes by itself.
         is_silent: Whether the place is read once more later.
+        is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
     """
 
@@ -68,6 +69,7 @@ class Run:
         self.probed: set[Awaited] | None = None
         self.moves = 0
         self.is_silent = False
+        self.is_at_top = False
         self.steps = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
@@ -127,14 +129,15 @@ class Run:
     @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.state_doubts, self.guards, self.conditions, self.is_silent
+        before = self.doubts, self.state_doubts, self.guards, self.conditions
+        flags = self.is_silent, self.is_at_top
         self.doubts, self.state_doubts, self.guards = 0, 0, int(is_guard)
-        self.conditions, self.is_silent = 0, False
+        self.conditions, self.is_silent, self.is_at_top = 0, False, True
         try:
             yield
         finally:
-            self.doubts, self.state_doubts, self.guards = before[:3]
-            self.conditions, self.is_silent = before[3:]
+            self.doubts, self.state_doubts, self.guards, self.conditions = before
+            self.is_silent, self.is_at_top = flags
 
     @contextmanager
     def dead_branch(self) -> Iterator[None]:

@@ -52,12 +52,14 @@ class Constant:
         kind: Its type, as 1 and `True` are equal.
         origin: Where it is written.
         is_chosen: As that of `Unknown`.
+        member: Of a member of an enumeration, its `Class` and its name there.
     """
 
     kind: type
     value: Any
     is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
+    member: Any = field(default=None, compare=False)
 
 
 @record
@@ -223,6 +225,7 @@ class Function:
         outer: The `Scope` around it; `None` for the module's own.
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
+        of: The `Class` that defines it, if it is a method.
     """
 
     module: ModuleSource
@@ -230,6 +233,7 @@ class Function:
     outer: Any = None
     owner: Value | None = None
     is_read: bool = False
+    of: Any = None
 
 
 @dataclass(slots=True, eq=False)
@@ -247,15 +251,41 @@ class Instance:
 
     Attributes:
         attributes: What was stored in it, wherever that was.
+        is_shared: Whether other behaviours may have it, too.
+        doubtful: The attributes that were stored on conditions.
+        version: How often what it has changed.
+        is_member: Whether it is a member of an enumeration.
     """
 
     of: Class
     attributes: dict[str, Value] = field(default_factory=dict)
+    is_shared: bool = False
+    doubtful: set[str] = field(default_factory=set)
+    version: int = 0
+    is_member: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Note what an attribute may be."""
         before = self.attributes.get(name)
         self.attributes[name] = value if before is None else join([before, value])
+        self.version += before != self.attributes[name]
+
+
+@record
+class Descriptor:
+    """What a class stores for `property`, `staticmethod`, `classmethod` or `partialmethod`."""
+
+    kind: str
+    function: Value
+    setter: Value | None = None
+
+
+@record
+class Super:
+    """What `super()` gives: the attributes of an object that come after those of a class."""
+
+    of: Class
+    owner: Value
 
 
 @dataclass(slots=True, eq=False)
@@ -371,6 +401,8 @@ Value: TypeAlias = (
     | Function
     | Class
     | Instance
+    | Descriptor
+    | Super
     | Partial
     | ProjectModule
     | Primitive
@@ -411,7 +443,10 @@ def join(values: Iterable[Value]) -> Value:
     if not found or len(found) > _MOST_ALTERNATIVES:
         return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        return Unknown(max(map(is_chosen, found), default=0))
+        unknown = Unknown(max(map(is_chosen, found), default=0))
+        # Of what may be called, something is known still.
+        called = [each for each in found if isinstance(each, Function | Partial | Class)]
+        return Alternatives((unknown, *called)) if called else unknown
     return Alternatives(tuple(found))
 
 

@@ -21,7 +21,6 @@ from composer.inference.values import (
     Class,
     Constant,
     External,
-    Function,
     Generated,
     Held,
     Instance,
@@ -35,6 +34,7 @@ from composer.inference.values import (
     ProjectModule,
     Scalar,
     Sequence,
+    Super,
     Unknown,
     Value,
     alternatives,
@@ -92,8 +92,6 @@ _SHOWN_PARTS = {
     'own_state': 'own_state',
     'changes': 'the changes',
 }
-# What stays the same where it is stored in an object.
-_LASTING = (NodeValue, PartOfNode, BoundMethod, Function, Instance, Primitive)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 
 
@@ -126,7 +124,7 @@ class Attributes(Part):
 
     def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
         """Return an attribute, or a problem: the rule, what is wrong, and help."""
-        if name.startswith('__'):
+        if name.startswith('__') and not isinstance(owner, Instance | Super):
             if name == '__class__' and isinstance(owner, Message):
                 return MessageClass(owner.type)
             if name in ('__name__', '__qualname__') and isinstance(owner, MessageClass):
@@ -146,9 +144,15 @@ class Attributes(Part):
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
-                return self._read_instance(owner, name)
+                self._evaluator.run.moves += name in owner.attributes
+                return (
+                    owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
+                )
             case Class():
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
+            case Super(of=of, owner=Instance() | Class() as mine):
+                whole = mine.of if isinstance(mine, Instance) else mine
+                return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
             case Primitive():
@@ -245,18 +249,6 @@ class Attributes(Part):
         message = f"{path.name if path else 'the module'} has no '{name}'"
         return 'undefined-name', message, suggest(name, known)
 
-    def _read_instance(self, owner: Instance, name: str) -> Value:
-        found = self._evaluator.classes.class_attribute(owner.of, name, owner)
-        stored = owner.attributes.get(name)
-        if stored is None:
-            return found or UNKNOWN
-        # What other behaviours store in it is not known here.
-        self._evaluator.run.moves += 1
-        is_lasting = isinstance(stored, _LASTING)
-        if is_lasting or self._evaluator.classes.is_stored_once(owner.of, name):
-            return stored
-        return UNKNOWN
-
     def _read_array(self, owner: ArrayField, name: str) -> Value | tuple[str, str, str | None]:
         nested = owner.type.nested
         if nested is None or hasattr(list, name):
@@ -267,6 +259,10 @@ class Attributes(Part):
     def _read_builtin(
         self, owner: Constant | Scalar | Mapping | Sequence, name: str
     ) -> Value | tuple[str, str, str | None]:
+        if isinstance(owner, Constant) and owner.member is not None:
+            found = self._evaluator.classes.enumerations.read(owner, name)
+            if found is not None:
+                return found
         kind = dict if isinstance(owner, Mapping) else owner.kind
         if kind is type(None):
             return UNKNOWN
@@ -278,6 +274,8 @@ class Attributes(Part):
     def read_item(self, owner: Value, index: Value, place: Place) -> Value:
         """Return what `owner[index]` may be, of a part of the node."""
         run = self._evaluator.run
+        if isinstance(owner, Class | Instance):
+            return self._read_item_of_object(owner, index)
         if isinstance(owner, Message):
             name = index.value if isinstance(index, Constant) else '…'
             message = f'{in_python(owner.type)} is a message, and has no items'
@@ -307,6 +305,16 @@ class Attributes(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+    def _read_item_of_object(self, owner: Class | Instance, index: Value) -> Value:
+        classes = self._evaluator.classes
+        if isinstance(owner, Class):
+            is_one = classes.enumerations.is_one(owner)
+            return classes.enumerations.member_of_name(owner, index) if is_one else UNKNOWN
+        items = classes.fields.items_of(owner)
+        if items is not None and isinstance(index, Constant) and isinstance(index.value, int):
+            return items[index.value] if -len(items) <= index.value < len(items) else UNKNOWN
+        return classes.call_method(owner, '__getitem__', index) or UNKNOWN
 
     def note_containment(self, item: Value, container: Value, place: Place) -> None:
         """`'x' in node.parameters` uses a parameter, and works without it."""
@@ -369,7 +377,7 @@ class Attributes(Part):
             case Message():
                 self._store_field(owner, name, value, place)
             case Instance():
-                owner.set(name, value)
+                self._evaluator.classes.store(owner, name, value)
             case _:
                 self._evaluator.escape(value)
 

@@ -31,6 +31,7 @@ from composer.inference.values import (
     Place,
     Primitive,
     Scalar,
+    Super,
     Unknown,
     Value,
     alternatives,
@@ -54,7 +55,9 @@ class Calls(Part):
         arguments = self._arguments(node, scope)
         place = Place(scope.module, node)
         self._note_keys(function, arguments)
-        if function == External('builtins.super') or function == External('builtins.locals'):
+        if function == External('builtins.super'):
+            return _super_in(scope)
+        if function == External('builtins.locals'):
             return UNKNOWN
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
         if isinstance(function, Unknown) and method in SENDING_METHODS:
@@ -181,8 +184,13 @@ class Calls(Part):
             case Instance():
                 method = self._evaluator.classes.class_attribute(function.of, '__call__', function)
                 if isinstance(method, Function):
-                    return self._evaluator.functions.follow(method, arguments, waits=waits)
+                    return self.invoke(
+                        method, arguments, place, waits=waits, is_awaited=is_awaited
+                    )
             case External():
+                made = self._evaluator.callables.call(function.name, arguments, place)
+                if made is not None:
+                    return made
                 return self._evaluator.library.call(function.name, arguments, place)
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
@@ -257,3 +265,15 @@ class Calls(Part):
                 message = str(error).replace(function.type, shown)
                 evaluator.run.report('unknown-field', argument.place, message, error.help)
         return made
+
+
+def _super_in(scope: Scope) -> Value:
+    """Return what `super()` gives in a method."""
+    current: Scope | None = scope
+    while current is not None:
+        function = current.function
+        if function is not None and function.of is not None:
+            owner = function.owner
+            return UNKNOWN if owner is None else Super(function.of, owner)
+        current = current.outer
+    return UNKNOWN

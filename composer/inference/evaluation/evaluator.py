@@ -6,6 +6,8 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.classes.made_callables import MadeCallables
+from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
 from composer.inference.evaluation.containers import Containers
@@ -16,7 +18,6 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
-from composer.inference.evaluation.project_classes import Classes
 from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
@@ -35,6 +36,7 @@ from composer.inference.values import (
     ArrayField,
     Awaitable,
     BoundMethod,
+    Class,
     Constant,
     Function,
     Generated,
@@ -87,6 +89,7 @@ class Evaluator:
         self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
+        self.callables = MadeCallables(self)
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
@@ -105,7 +108,8 @@ class Evaluator:
             return CHOSEN
         current: Scope | None = scope
         while current is not None:
-            if name in current.local:
+            is_later = current.is_body and name not in (current.names or ())
+            if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
                     value = current.names[name]
@@ -210,6 +214,8 @@ class Evaluator:
                 return value.item()
             case Generated():
                 return value.yielded
+            case Instance() | Class():
+                return self._item_of_object(value)
             case Mapping() if not (value.is_open or value.is_lost) and value.entries:
                 return join(constant(key) for key in value.entries)
             case Constant() | Scalar() if value.kind is str:
@@ -218,16 +224,45 @@ class Evaluator:
                 self.run.reading.open_kinds.add('parameter')
         return Unknown(is_chosen(value))
 
+    def _item_of_object(self, value: Instance | Class) -> Value:
+        items = self.loops.items_of(value)
+        if items is not None:
+            return join(items)
+        if isinstance(value, Class):
+            return UNKNOWN
+        iterator = self.classes.call_method(value, '__iter__')
+        if isinstance(iterator, Instance):
+            return self.classes.call_method(iterator, '__next__') or UNKNOWN
+        return UNKNOWN if iterator is None else self.item_of(iterator)
+
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""
-        return join(
-            each.yielded if isinstance(each, Generated) else UNKNOWN
-            for each in alternatives(value)
-        )
+        return join(self._entered(each) for each in alternatives(value))
+
+    def _entered(self, value: Value) -> Value:
+        if isinstance(value, Instance):
+            entered = self.classes.call_method(value, '__enter__')
+            if entered is None:
+                entered = self.classes.call_method(value, '__aenter__')
+                return entered.result if isinstance(entered, Awaitable) else UNKNOWN
+            return entered
+        return value.yielded if isinstance(value, Generated) else UNKNOWN
+
+    def left(self, value: Value) -> Value | None:
+        """Return what the end of `with value` gives: true if it catches what was raised."""
+        if not isinstance(value, Instance):
+            return None
+        reason = (UNKNOWN, UNKNOWN, UNKNOWN)
+        ended = self.classes.call_method(value, '__exit__', *reason)
+        if ended is None:
+            ended = self.classes.call_method(value, '__aexit__', *reason)
+            return ended.result if isinstance(ended, Awaitable) else ended
+        return ended
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
-        if isinstance(value, Instance):
+        if isinstance(value, Instance) and not value.is_member:
+            value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
@@ -262,8 +297,9 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
-                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
-                    self.run.reading.open_all()
+                for each in value.attributes.values():
+                    if isinstance(each, NodeValue | BoundMethod | PartOfNode):
+                        self.escape(each)
 
     def _escape_method(self, method: BoundMethod) -> None:
         kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)

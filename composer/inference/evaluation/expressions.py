@@ -23,6 +23,7 @@ from composer.inference.values import (
     Awaitable,
     Constant,
     Generated,
+    Instance,
     Mapping,
     Message,
     Place,
@@ -47,6 +48,21 @@ _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 _NO_CONVERSION = -1
 # Of more texts, none is known.
 _MOST_TEXTS = 16
+_OPERATORS: dict[type[ast.operator], str] = {
+    ast.Add: 'add',
+    ast.BitAnd: 'and',
+    ast.BitOr: 'or',
+    ast.BitXor: 'xor',
+    ast.Div: 'truediv',
+    ast.FloorDiv: 'floordiv',
+    ast.LShift: 'lshift',
+    ast.MatMult: 'matmul',
+    ast.Mod: 'mod',
+    ast.Mult: 'mul',
+    ast.Pow: 'pow',
+    ast.RShift: 'rshift',
+    ast.Sub: 'sub',
+}
 
 
 class Expressions(Part):
@@ -151,9 +167,25 @@ class Expressions(Part):
             right = self._evaluator.awaited(each.right, scope)
             if isinstance(value, Mapping) and isinstance(right, Mapping):
                 value = self._merge(value, right)
+            elif any(isinstance(one, Instance) for one in (value, right)):
+                value = self._call_operator(each.op, value, right)
             else:
                 value = combine(each.op, value, right)
         return value
+
+    def _call_operator(self, sign: ast.operator, left: Value, right: Value) -> Value:
+        """Return what the method of an object makes of an operator: `__add__`."""
+        name = _OPERATORS[type(sign)]
+        classes = self._evaluator.classes
+        found: Value | None = None
+        if isinstance(left, Instance):
+            found = classes.call_method(left, f'__{name}__', right)
+        if found is None and isinstance(right, Instance):
+            found = classes.call_method(right, f'__r{name}__', left)
+        if found is None:
+            self._evaluator.escape(left)
+            self._evaluator.escape(right)
+        return UNKNOWN if found is None else found
 
     def _merge(self, left: Mapping, right: Mapping) -> Value:
         if left.is_lost or right.is_lost:
@@ -248,6 +280,10 @@ class Expressions(Part):
         return join(
             self._item(each, index, place, is_slice=is_slice) for each in alternatives(owner)
         )
+
+    def read_item(self, owner: Value, index: Value, place: Place) -> Value:
+        """Return what `owner[index]` may be."""
+        return join(self._item(each, index, place, is_slice=False) for each in alternatives(owner))
 
     def _slice(self, node: ast.Slice, scope: Scope) -> Value:
         """Return the limits of a slice, as a tuple."""

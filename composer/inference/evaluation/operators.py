@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from composer.inference.values import (
     UNKNOWN,
     Constant,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -187,6 +188,9 @@ def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
 
 
 def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:
+    if isinstance(sign, ast.Eq | ast.NotEq) and isinstance(left, Instance):
+        same = _is_same(left, right)
+        return None if same is None else same == isinstance(sign, ast.Eq)
     if isinstance(sign, ast.Is | ast.IsNot):
         same = _is_same(left, right)
         return None if same is None else same == isinstance(sign, ast.Is)
@@ -215,6 +219,8 @@ def _are_one(left: Value, right: Value) -> bool | None:
         return same if known or left.kind is not right.kind else None
     if left == right and isinstance(left, NodeValue):
         return True
+    if isinstance(left, Instance) and isinstance(right, Instance):
+        return left is right if left.is_member and right.is_member else None
     for one, other in ((left, right), (right, left)):
         if isinstance(one, Constant) and one.value is None:
             certain = (Message, MessageClass, NodeValue, Mapping, Sequence)

@@ -11,8 +11,10 @@ from composer.inference.scopes import Names, Scope, join_names, own_nodes
 from composer.inference.values import (
     UNKNOWN,
     Alternatives,
+    Class,
     Constant,
     Generated,
+    Instance,
     Mapping,
     Scalar,
     Sequence,
@@ -49,6 +51,10 @@ class Loops(Part):
                 found = [value for value, _ in iterated.items]
             case Mapping() if not (iterated.is_open or iterated.is_lost):
                 found = [constant(key) for key in iterated.entries]
+            case Instance():
+                found = self._evaluator.classes.fields.items_of(iterated) or []
+            case Class() if self._evaluator.classes.enumerations.is_one(iterated):
+                found = self._evaluator.classes.enumerations.members(iterated)
             case Generated(items=tuple(items)):
                 found = list(items)
             case Constant(value=str(text)) if len(text) <= _MOST_ROUNDS:
@@ -110,7 +116,10 @@ class Loops(Part):
                     self._evaluator.statements.follow_all(node.body, scope)
                 scope.names = join_names([scope.names, *scope.continued])
         # What is looked for among known items is expected to be one of them.
-        with self._evaluator.run.condition(is_doubt=bool(scope.broken)):
+        targets = {each.id for each in ast.walk(node.target) if _is_store(each)}
+        read = {each.id for each in own_nodes(node) if isinstance(each, ast.Name)}
+        is_search = bool(scope.broken and targets & read)
+        with self._evaluator.run.condition(is_doubt=is_search):
             self._evaluator.statements.follow_all(node.orelse, scope)
         scope.names = join_names([scope.names, *scope.broken])
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
-from composer.inference.scopes import Names, Scope, join_names
+from composer.inference.scopes import Names, Scope, join_names, own_nodes
 from composer.inference.values import (
     BY_STATE,
     NEVER,
@@ -19,6 +19,7 @@ from composer.inference.values import (
     Awaitable,
     Class,
     Constant,
+    Function,
     Generated,
     Held,
     Mapping,
@@ -164,13 +165,15 @@ class Statements(Part):
     # Definitions
 
     def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
-        scope.set(node.name, self._evaluator.functions.define_decorated(node, scope))
+        function = self._evaluator.functions.define(node, scope)
+        scope.set(node.name, self._evaluator.functions.decorate(function, node, scope))
 
     _asyncfunctiondef = _functiondef
 
     def _classdef(self, node: ast.ClassDef, scope: Scope) -> None:
         outer = None if scope.function is None else scope
-        scope.set(node.name, Class(scope.module, node, outer))
+        made = Class(scope.module, node, outer)
+        scope.set(node.name, self._evaluator.functions.decorate(made, node, scope))
 
     def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
         for alias in node.names:
@@ -329,18 +332,37 @@ class Statements(Part):
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
         locks = ExitStack()
+        managers: list[Value] = []
+        is_guard = False
         for item in node.items:
             value = self._evaluator.evaluate(item.context_expr, scope)
+            managers.append(value)
             place = Place(scope.module, item.context_expr)
             locks.enter_context(self._evaluator.waiting.holding(value, place))
+            entered = self._evaluator.entered(value)
             if item.optional_vars is not None:
-                self.store(item.optional_vars, self._evaluator.entered(value), scope)
-        is_guard = any(_suppresses(item.context_expr) for item in node.items)
+                self.store(item.optional_vars, entered, scope)
+            is_guard |= _suppresses(item.context_expr) or self._catches(item.context_expr, scope)
         before = scope.copy_names()
+        # What objects do at the end of it, they do on whatever the body raises.
+        results = [self._evaluator.left(each) for each in managers]
+        is_guard |= any(each is not None and truth_of(each) is not False for each in results)
         with locks, self._evaluator.run.guard(is_guard=is_guard):
             self.follow_all(node.body, scope)
         if is_guard:
             scope.names = join_names([before, scope.names])
+
+    def _catches(self, expression: ast.expr, scope: Scope) -> bool:
+        """Return whether a generator that is a context manager catches what its body raises."""
+        if not isinstance(expression, ast.Call):
+            return False
+        with self._evaluator.run.silence():
+            function = self._evaluator.evaluate(expression.func, scope)
+        if not isinstance(function, Function):
+            return False
+        tries = [node for node in own_nodes(function.definition) if isinstance(node, ast.Try)]
+        handlers = [handler for node in tries for handler in node.handlers]
+        return any(_is_guard(each) or _is_broad(each) for each in handlers)
 
     _asyncwith = _with
 
