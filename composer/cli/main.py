@@ -5,9 +5,7 @@ from __future__ import annotations
 import faulthandler
 import io
 import os
-import platform
 import sys
-import traceback
 from contextlib import suppress
 from typing import TypeGuard
 
@@ -124,6 +122,8 @@ def _flush(code: int) -> int:
 
 def _is_of_output(error: Exception) -> TypeGuard[OSError]:
     """Return whether an error is one of standard output or error, as where the disk is full."""
+    import traceback
+
     frames = list(traceback.walk_tb(error.__traceback__))
     return isinstance(error, OSError) and frames[-1][0].f_code is click.echo.__code__
 
@@ -137,6 +137,9 @@ def _translate(error: click.ClickException) -> tuple[str, str]:
 
 
 def _bug_report(arguments: list[str]) -> str:
+    import platform
+    import traceback
+
     from composer.version import find_version
 
     python = f'Python {platform.python_version()}, {platform.platform()}'
