@@ -98,8 +98,19 @@ def read_file(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     return content
 
 
-def explain_missing(path: Path) -> str | None:
-    """Return the help for a path that does not exist: the nearest one, or what is there."""
+def explain_missing(
+    path: Path, base: Path | None = None, *, is_folder: bool = False
+) -> str | None:
+    """Return the help for a path that does not exist: the nearest one, or what is there.
+
+    Args:
+        base: The folder that the path is written relative to; an absolute path stays absolute.
+        is_folder: Whether a folder is missing, not a file.
+    """
+
+    def shown(found: Path) -> str:
+        return str(found) if base is None else os.path.relpath(found, base)
+
     lineage = [path, *path.parents]
     found = next((i for i, at in enumerate(lineage) if os.path.isdir(at)), 0)  # noqa: PTH112
     folder, missing = lineage[found], lineage[found - 1]
@@ -111,17 +122,22 @@ def explain_missing(path: Path) -> str | None:
     if missing != path:
         folders = {each.name: each for each in entries if each.is_dir()}
         if near := find_nearest(missing.name, folders):
-            return did_you_mean(str(folders[near] / path.relative_to(missing)))
-        return suggest(missing.name, folders, f"the folders in '{folder}' are")
+            return did_you_mean(shown(folders[near] / path.relative_to(missing)))
+        return suggest('', folders, f"the folders in '{shown(folder)}' are")
+    if is_folder:
+        names = [shown(each) for each in entries if each.is_dir()]
+        return suggest(shown(path), names, 'there are')
     inside = next((each / path.name for each in entries if (each / path.name).is_file()), None)
     if inside:
-        return did_you_mean(str(inside))
+        return did_you_mean(shown(inside))
     # All have the same suffix, which makes them no more alike.
-    files = {each.stem: each for each in entries if each.suffix in _YAML}
+    suffixes = _YAML if path.suffix in ('', *_YAML) else (path.suffix,)
+    files = {each.stem: each for each in entries if each.suffix in suffixes}
     if near := find_nearest(path.stem, files):
-        return did_you_mean(str(files[near]))
+        return did_you_mean(shown(files[near]))
     names = [each.name for each in files.values()]
-    return suggest('', names, f"in '{folder}' there are")
+    where = shown(folder)
+    return suggest('', names, 'there are' if where == '.' else f"in '{where}' there are")
 
 
 def format_size(size: int) -> str:

@@ -6,6 +6,7 @@ value does not suit its declaration.
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
-from composer.language.paths import PathError, list_neighbours, resolve_path
+from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
     from composer.ros_parameters.overrides import MergedFiles
+    from composer.yaml_text.positions import DataPath
 
 
 @record
@@ -101,12 +103,17 @@ class _Library:
                     at,
                     each.rule,
                     f'{path}: {each.message}',
-                    help=_help_for_missing(Path(path)) or each.help,
+                    help=self._explain(Path(path), at) or each.help,
                 )
                 for each in unreadable
             ]
             if not unreadable:
                 yield path
+
+    def _explain(self, path: Path, at: DataPath) -> str | None:
+        if os.path.lexists(path):
+            return None
+        return explain_absent(path, self._context.system.positions.value(at))
 
     def merge(self, paths: tuple[str, ...]) -> MergedFiles:
         """Return what files say together; they have been read."""
@@ -115,10 +122,6 @@ class _Library:
 
             self._merged[paths] = MergedFiles(self.files[path] for path in paths)
         return self._merged[paths]
-
-
-def _help_for_missing(path: Path) -> str | None:
-    return suggest(path.name, list_neighbours(path), 'there are')
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:

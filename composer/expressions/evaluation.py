@@ -34,17 +34,20 @@ def evaluate_expression(sandbox: Sandbox, code: str, values: Mapping[str, Any]) 
     """
     sandbox.budget.begin()
     try:
-        return _Evaluator(sandbox, values).value(sandbox.parse_expression(code))
+        return Evaluator(sandbox, values).value(sandbox.parse_expression(code))
     except RecursionError:
         raise too_deep() from None
 
 
-class _Evaluator:
+class Evaluator:
+    """Evaluates the nodes of an expression, each by its row of a table."""
+
     def __init__(self, sandbox: Sandbox, values: Mapping[str, Any]) -> None:
         self.sandbox = sandbox
         self.values = values
 
     def value(self, node: nodes.Node | None) -> Any:
+        """Return the value of any node."""
         evaluate = _NODES.get(type(node))
         if evaluate is None:
             message = f'an expression cannot contain a {type(node).__name__}'
@@ -54,12 +57,14 @@ class _Evaluator:
         return value
 
     def name(self, node: nodes.Name) -> Any:
+        """Return what a name stands for."""
         for scope in (self.values, self.sandbox.globals):
             if node.name in scope:
                 return scope[node.name]
         return self.sandbox.undefined(name=node.name)
 
     def condition(self, node: nodes.CondExpr) -> Any:
+        """Return the value that a condition chooses."""
         if self.value(node.test):
             return self.value(node.expr1)
         if node.expr2 is not None:
@@ -67,11 +72,13 @@ class _Evaluator:
         return self.sandbox.undefined('the condition is false, and the expression has no else')
 
     def concatenation(self, node: nodes.Concat) -> str:
+        """Return values as one text."""
         parts = [self.value(each) for each in node.nodes]
         self.sandbox.budget.spend(parts)
         return ''.join(map(str, parts))
 
     def comparison(self, node: nodes.Compare) -> Any:
+        """Return whether a chain of comparisons holds."""
         left = self.value(node.expr)
         holds: Any = True
         for operand in node.ops:
@@ -84,6 +91,7 @@ class _Evaluator:
         return holds
 
     def binary(self, node: nodes.BinExpr) -> Any:
+        """Apply an operator to two values."""
         left, right = self.value(node.left), self.value(node.right)
         if isinstance(node, nodes.Pow):
             limits.limit_power(left, right)
@@ -94,10 +102,12 @@ class _Evaluator:
         return _BINARY[type(node)](left, right)
 
     def slice(self, node: nodes.Slice) -> slice:
+        """Return a part of a sequence as Python names it."""
         ends = (node.start, node.stop, node.step)
         return slice(*(None if each is None else self.value(each) for each in ends))
 
     def call(self, node: nodes.Call) -> Any:
+        """Call a function or a method."""
         function = self.value(node.node)
         positional, named = self.arguments(node)
         for argument in (*positional, *named.values()):
@@ -106,6 +116,7 @@ class _Evaluator:
         return self.sandbox.call_function(function, positional, named)
 
     def filter_or_test(self, node: nodes.Filter | nodes.Test) -> Any:
+        """Apply a filter or a test."""
         is_filter = isinstance(node, nodes.Filter)
         what, known = (
             ('filter', self.sandbox.filters) if is_filter else ('test', self.sandbox.tests)
@@ -119,6 +130,7 @@ class _Evaluator:
         return apply(node.name, self.value(node.node), *self.arguments(node))
 
     def arguments(self, node: Any) -> tuple[list[Any], dict[str, Any]]:
+        """Return the positional and the named arguments of a call."""
         positional = [self.value(each) for each in node.args]
         named = {each.key: self.value(each.value) for each in node.kwargs}
         if node.dyn_args is not None:
@@ -149,29 +161,29 @@ _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     nodes.Mod: operator.mod,
     nodes.Pow: operator.pow,
 }
-_NODES: dict[type, Callable[[_Evaluator, Any], Any]] = {
-    nodes.Name: _Evaluator.name,
+_NODES: dict[type, Callable[[Evaluator, Any], Any]] = {
+    nodes.Name: Evaluator.name,
     nodes.Const: lambda _, node: node.value,
     nodes.Tuple: lambda this, node: tuple(map(this.value, node.items)),
     nodes.List: lambda this, node: list(map(this.value, node.items)),
     nodes.Dict: lambda this, node: {
         this.value(pair.key): this.value(pair.value) for pair in node.items
     },
-    nodes.CondExpr: _Evaluator.condition,
+    nodes.CondExpr: Evaluator.condition,
     nodes.And: lambda this, node: this.value(node.left) and this.value(node.right),
     nodes.Or: lambda this, node: this.value(node.left) or this.value(node.right),
     nodes.Not: lambda this, node: not this.value(node.node),
     nodes.Neg: lambda this, node: -this.value(node.node),
     nodes.Pos: lambda this, node: +this.value(node.node),
-    nodes.Concat: _Evaluator.concatenation,
-    nodes.Compare: _Evaluator.comparison,
+    nodes.Concat: Evaluator.concatenation,
+    nodes.Compare: Evaluator.comparison,
     nodes.Getattr: lambda this, node: this.sandbox.attribute(this.value(node.node), node.attr),
     nodes.Getitem: lambda this, node: this.sandbox.getitem(
         this.value(node.node), this.value(node.arg)
     ),
-    nodes.Slice: _Evaluator.slice,
-    nodes.Call: _Evaluator.call,
-    nodes.Filter: _Evaluator.filter_or_test,
-    nodes.Test: _Evaluator.filter_or_test,
-    **dict.fromkeys(_BINARY, _Evaluator.binary),
+    nodes.Slice: Evaluator.slice,
+    nodes.Call: Evaluator.call,
+    nodes.Filter: Evaluator.filter_or_test,
+    nodes.Test: Evaluator.filter_or_test,
+    **dict.fromkeys(_BINARY, Evaluator.binary),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Span
 from composer.inference.reading import NodeUse, Problem, Reading, StateUse
@@ -34,11 +34,14 @@ class Run:
 
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
+        state_doubts: Those of them that hang on the state only.
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
         conditions: The number of conditions around it.
         dead_branches: The number of branches around it that the file never takes.
+        tried: How often something was read that is right or wrong by what the file says.
         is_silent: Whether the place is read once more later.
+        is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
     """
 
@@ -50,11 +53,14 @@ class Run:
         self.types = types
         self.reading = Reading()
         self.doubts = 0
+        self.state_doubts = 0
         self.guards = 0
         self.broad_guards = 0
         self.conditions = 0
         self.dead_branches = 0
+        self.tried = 0
         self.is_silent = False
+        self.is_at_top = False
         self.steps = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
@@ -75,16 +81,30 @@ class Run:
         if self.steps > self._most_steps:
             raise TooLongError
 
+    @property
+    def is_sure(self) -> bool:
+        """Whether the place is reached, if not always, whatever the file says."""
+        return self.doubts == self.state_doubts
+
     @contextmanager
-    def condition(self, *, is_doubt: bool = False) -> Iterator[None]:
-        """Note what is read meanwhile as read on a condition."""
+    def condition(self, *, is_doubt: bool = False, by_state: bool = False) -> Iterator[None]:
+        """Note what is read meanwhile as read on a condition.
+
+        Args:
+            is_doubt: Whether the file decides on it; `by_state` says that only the state does.
+        """
         self.conditions += 1
-        self.doubts += is_doubt
+        self.doubt(is_doubt, by_state and is_doubt)
         try:
             yield
         finally:
             self.conditions -= 1
-            self.doubts -= is_doubt
+            self.doubt(-is_doubt, -(by_state and is_doubt))
+
+    def doubt(self, count: int, of_state: int) -> None:
+        """Add doubts."""
+        self.doubts += count
+        self.state_doubts += of_state
 
     @contextmanager
     def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
@@ -100,12 +120,15 @@ class Run:
     @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.guards, self.conditions, self.is_silent
-        self.doubts, self.guards, self.conditions, self.is_silent = 0, int(is_guard), 0, False
+        before = self.doubts, self.state_doubts, self.guards, self.conditions
+        flags = self.is_silent, self.is_at_top
+        self.doubts, self.state_doubts, self.guards = 0, 0, int(is_guard)
+        self.conditions, self.is_silent, self.is_at_top = 0, False, True
         try:
             yield
         finally:
-            self.doubts, self.guards, self.conditions, self.is_silent = before
+            self.doubts, self.state_doubts, self.guards, self.conditions = before
+            self.is_silent, self.is_at_top = flags
 
     @contextmanager
     def dead_branch(self) -> Iterator[None]:
@@ -142,6 +165,7 @@ class Run:
             used_at: Where the value is used that `place` wrote.
         """
         if self.guards or self.broad_guards or self.is_silent:
+            self.tried += 1
             return
         if self.doubts and not (help_text or '').startswith('did you mean'):
             return
@@ -150,29 +174,17 @@ class Run:
             used = None
         self.reading.problems.append(Problem(rule, message, span, help_text, used))
 
-    def use(
-        self,
-        kind: str,
-        name: str,
-        place: Place,
-        *,
-        is_optional: bool = False,
-        has_default: bool = False,
-        waits: bool = False,
-        is_change: bool = False,
-    ) -> None:
-        """Note the use of an entity by its name."""
+    def use(self, kind: str, name: str, place: Place, **details: Any) -> None:
+        """Note the use of an entity by its name, with further attributes of `NodeUse`."""
+        self.tried += 1
         self.reading.uses.append(
             NodeUse(
                 kind,
                 name,
                 span_of(place, name),
-                is_optional=is_optional,
-                has_default=has_default,
                 is_certain=not (self.doubts or self.broad_guards),
                 is_guarded=bool(self.guards or self.dead_branches),
-                waits=waits,
-                is_change=is_change,
+                **details,
             )
         )
 

@@ -8,6 +8,7 @@ import sys
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.inference.classes.attribute_stores import CHANGING, find_stores
 from composer.inference.values import UNKNOWN, External, Value
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.syntax import BLOCKS
@@ -15,12 +16,11 @@ from composer.python_source.syntax import BLOCKS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
+    from composer.inference.classes.attribute_stores import AttributeStore
     from composer.python_source.module_finder import ModuleFinder
 
 _INSTALLED = {'site-packages', 'dist-packages'}
 _BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-# Methods that change what they are called on.
-_CHANGING = {'add', 'append', 'clear', 'extend', 'insert', 'pop', 'remove', 'setdefault', 'update'}
 
 
 class TopNames:
@@ -80,7 +80,7 @@ class TopNames:
                 case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
                     found.add(name)
                 case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
-                    if method in _CHANGING:
+                    if method in CHANGING:
                         found.add(name)
                 case ast.AugAssign(target=ast.Name(id=name)):
                     found.add(name)
@@ -114,8 +114,16 @@ class ProjectModules:
         self.followed: set[int] = set()
         # What calls of functions return, by their syntax trees.
         self.kinds: dict[int, FunctionKind] = {}
-        # How often the code of a module stores an attribute of a name.
-        self.attribute_stores: dict[tuple[int, str], int] = {}
+        self._stores: dict[int, dict[str, list[AttributeStore]]] = {}
+
+    def stores_of(self, name: str) -> list[AttributeStore]:
+        """Return the places in all modules that were read which store an attribute."""
+        found: list[AttributeStore] = []
+        for key, module in tuple(self._read.items()):
+            if key not in self._stores:
+                self._stores[key] = find_stores(module.body)
+            found += self._stores[key].get(name, ())
+        return found
 
     def is_patched(self, name: str) -> bool:
         """Return whether a module that was read stores an attribute of this name at its top."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from composer.entity_kinds import USED_KINDS
 from composer.records import record
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from composer.inference.values import Constant
     from composer.python_source.modules import ModuleSource
 
+# What a behaviour waits for when it uses an entity.
+Waited: TypeAlias = Literal['', 'answer', 'end']
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
 # The methods of the node that send something, and the noun of what they use by its name.
@@ -36,7 +38,9 @@ class NodeUse:
         is_certain: Whether it happens whatever else the file says: it does not depend on
             parameters, the node's name, or arguments under `with:`.
         is_guarded: Whether the behaviour catches the error that it raises.
-        waits: Whether the behaviour itself waits for the answer.
+        waits: What the behaviour itself waits for, whatever else the file says: the answer, or
+            the end of the goal.
+        among: The names of which it is one, if one of several is used.
         is_change: Whether it is looked for among the changes of `on_parameters`.
     """
 
@@ -47,8 +51,9 @@ class NodeUse:
     has_default: bool = False
     is_certain: bool = True
     is_guarded: bool = False
-    waits: bool = False
+    waits: Waited = ''
     is_change: bool = False
+    among: tuple[str, ...] = ()
 
 
 @record

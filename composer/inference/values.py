@@ -37,7 +37,8 @@ class Unknown:
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs.
+            name of the node, `BY_PARAMETER` for what may change while the system runs, and
+            `BY_STATE` for what behaviours keep, which they may have from the file.
     """
 
     is_chosen: int = 0
@@ -51,12 +52,14 @@ class Constant:
         kind: Its type, as 1 and `True` are equal.
         origin: Where it is written.
         is_chosen: As that of `Unknown`.
+        member: Of a member of an enumeration, its `Class` and its name there.
     """
 
     kind: type
     value: Any
     is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
+    member: Any = field(default=None, compare=False)
 
 
 @record
@@ -106,11 +109,12 @@ class PartOfNode:
     Attributes:
         name: As in `logger`; `goal` is what `send_goal` returns, `time` what `now` returns,
             `changes` what `on_parameters` is given.
-        type: Of a goal, its action.
+        type: Of a goal, its action; `entity` is the action client that sent it.
     """
 
     name: str
     type: str = ''
+    entity: str = ''
 
 
 @record
@@ -194,6 +198,11 @@ class Sequence:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
 
+    @property
+    def is_ordered(self) -> bool:
+        """Whether its first item comes first, in whatever runs."""
+        return self.kind not in (set, frozenset) or len(self.items) < 2  # noqa: PLR2004
+
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""
         count = len(self.items)
@@ -216,6 +225,7 @@ class Function:
         outer: The `Scope` around it; `None` for the module's own.
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
+        of: The `Class` that defines it, if it is a method.
     """
 
     module: ModuleSource
@@ -223,6 +233,7 @@ class Function:
     outer: Any = None
     owner: Value | None = None
     is_read: bool = False
+    of: Any = None
 
 
 @dataclass(slots=True, eq=False)
@@ -240,15 +251,41 @@ class Instance:
 
     Attributes:
         attributes: What was stored in it, wherever that was.
+        is_shared: Whether other behaviours may have it, too.
+        doubtful: The attributes that were stored on conditions.
+        version: How often what it has changed.
+        is_member: Whether it is a member of an enumeration.
     """
 
     of: Class
     attributes: dict[str, Value] = field(default_factory=dict)
+    is_shared: bool = False
+    doubtful: set[str] = field(default_factory=set)
+    version: int = 0
+    is_member: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Note what an attribute may be."""
         before = self.attributes.get(name)
         self.attributes[name] = value if before is None else join([before, value])
+        self.version += before != self.attributes[name]
+
+
+@record
+class Descriptor:
+    """What a class stores for `property`, `staticmethod`, `classmethod` or `partialmethod`."""
+
+    kind: str
+    function: Value
+    setter: Value | None = None
+
+
+@record
+class Super:
+    """What `super()` gives: the attributes of an object that come after those of a class."""
+
+    of: Class
+    owner: Value
 
 
 @dataclass(slots=True, eq=False)
@@ -335,14 +372,17 @@ Value: TypeAlias = (
     | Function
     | Class
     | Instance
+    | Descriptor
+    | Super
     | Partial
     | ProjectModule
     | Never
     | Alternatives
 )
 
-BY_FILE = 1
-BY_PARAMETER = 2
+BY_STATE = 1
+BY_FILE = 2
+BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
@@ -371,9 +411,12 @@ def join(values: Iterable[Value]) -> Value:
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        return CHOSEN if any(map(is_chosen, found)) else UNKNOWN
+        unknown = Unknown(max(map(is_chosen, found), default=0))
+        # Of what may be called, something is known still.
+        called = [each for each in found if isinstance(each, Function | Partial | Class)]
+        return Alternatives((unknown, *called)) if called else unknown
     return Alternatives(tuple(found))
 
 

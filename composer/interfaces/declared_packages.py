@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.paths import explain_absent
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from composer.interfaces.definitions.package_folder import PackageDefinitions
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
+    from composer.yaml_text.positions import SourceMap
 
 
 @record
@@ -58,6 +60,9 @@ def load_declared(system: LoadedSystem, installed: InterfaceCatalogue) -> Declar
             system.positions.value(('interfaces', package)),
             'unknown-interfaces',
             f"there is no folder '{folder}' with the definitions of '{package}'",
+            help=explain_absent(
+                folder, system.positions.value(('interfaces', package)), is_folder=True
+            ),
         )
         for package, folder in absent.items()
     ]
@@ -123,10 +128,19 @@ def _load_folders(
     try:
         return load_packages(folders, catalogue), ()
     except DefinitionsError as error:
-        return [], error.diagnostics
+        return [], [_placed(each, folders, system.positions) for each in error.diagnostics]
     except ComposerError as error:
         span = system.positions.key(('interfaces',))
         return [], [diagnostic_at(span, 'unreadable-interfaces', str(error), help=error.help)]
+
+
+def _placed(finding: Diagnostic, folders: Mapping[str, Path], positions: SourceMap) -> Diagnostic:
+    """Return a finding; one in a folder as a whole stands where the file names the folder."""
+    package = next((each for each, path in folders.items() if str(path) == finding.file), None)
+    if finding.span is not None or package is None:
+        return finding
+    span = positions.value(('interfaces', package))
+    return diagnostic_at(span, finding.rule, finding.message, help=finding.help)
 
 
 def _is_folder(path: Path) -> bool:

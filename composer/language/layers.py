@@ -11,9 +11,10 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.entity_kinds import WORK_KEYS
+from composer.entity_kinds import ENTITY_KINDS, WORK_KEYS
 from composer.language.specs import NodeSpec
-from composer.spelling import suggest
+from composer.schema.structure import lacks_keys
+from composer.spelling import did_you_mean, find_nearest, suggest
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
@@ -75,6 +76,12 @@ class _Merging:
             elif isinstance(value, dict) and isinstance(merged.get(key), dict):
                 merged[key] = self.merge(merged[key], value, at)
             else:
+                if key not in merged and (meant := _find_meant(at, value, below)):
+                    self._report_incomplete(at, meant)
+                    # What it says is read as what it means, and has findings of its own.
+                    self._new_positions.move(at, (*path, meant))
+                    merged[meant] = self.merge(merged[meant], value, (*path, meant))
+                    continue
                 if key not in merged and _only_changes_a_node(at, value):
                     self._report(at, f"there is no node '{key}' to change", below)
                 if key not in merged and path == ('args',) and not self._is_used(key):
@@ -105,6 +112,13 @@ class _Merging:
             for text in _texts(each.data)
         )
 
+    def _report_incomplete(self, path: DataPath, meant: str) -> None:
+        what = _NOUNS[str(path[-2])]
+        message = f"there is no {what} '{path[-1]}' to change, and for a new one keys are missing"
+        span = self._new_positions.key(path)
+        finding = diagnostic_at(span, 'missing-key', message, help=did_you_mean(meant))
+        self.findings.append(finding)
+
     def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
         self.findings.append(
             diagnostic_at(
@@ -128,6 +142,21 @@ def _texts(data: Any) -> Iterator[str]:
         yield data
 
 
+def _find_meant(path: DataPath, value: Any, there: dict[str, Any]) -> str | None:
+    """Return the entry that a new one without all its keys was meant to change."""
+    if not isinstance(value, dict) or len(path) == 1:
+        return None
+    if path[-2] not in _SECTIONS.get((len(path), str(path[0])), ()):
+        return None
+    meant = find_nearest(path[-1], there)
+    if meant is None or not isinstance(there[meant], dict):
+        return None
+    part: Any = value
+    for key in reversed(path):
+        part = {key: part}
+    return meant if lacks_keys(part) else None
+
+
 def _only_changes_a_node(path: DataPath, value: Any) -> bool:
     """Return whether a value only changes a node, and gives it nothing to do."""
     is_node = len(path) == _NODE and path[0] == 'nodes'
@@ -142,6 +171,19 @@ def is_null_a_value(path: DataPath) -> bool:
     )
 
 
+# The sections with entries that need some keys, by the depth of these and the first key.
+_NOUNS = {
+    **{kind.section: kind.noun for kind in ENTITY_KINDS if kind.section != 'parameters'},
+    'nodes': 'node',
+    'include': 'include',
+    'processes': 'process',
+}
+_SECTIONS = {
+    (2, 'nodes'): ('nodes',),
+    (2, 'include'): ('include',),
+    (2, 'processes'): ('processes',),
+    (4, 'nodes'): tuple(_NOUNS),
+}
 _NODE = 2
 _IN_NODE = 3
 _IN_ENTITY = 5

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from composer.ament import explain_missing_package, find_share, list_packages
 from composer.errors import ComposerError
+from composer.input_limits import explain_missing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from composer.diagnostics import Span
     from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath, SourceMap
 
@@ -46,13 +48,10 @@ def resolve_path(text: str, folder: Path) -> Path:
     return share / rest
 
 
-def list_neighbours(path: Path) -> list[str]:
-    """Return the names of the YAML files in the folder of a missing file."""
-    try:
-        names = [each.name for each in path.parent.iterdir() if each.suffix in ('.yaml', '.yml')]
-    except OSError:
-        return []
-    return [] if path.name in names else names
+def explain_absent(path: Path, place: Span, *, is_folder: bool = False) -> str | None:
+    """Return the help for a path to nothing that is written at `place`, in the form used there."""
+    is_relative = not place.text.lstrip('\'"').startswith(('/', _PACKAGE))
+    return explain_missing(path, place.source.folder if is_relative else None, is_folder=is_folder)
 
 
 def resolve_paths(system: LoadedSystem) -> None:

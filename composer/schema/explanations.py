@@ -98,6 +98,11 @@ def _explain_const(error: ValidationError) -> Iterator[Violation]:
 def _explain_pattern(error: ValidationError) -> Iterator[Violation]:
     expected = error.schema.get('x-expected', f'text that matches {error.validator_value}')
     path = path_of(error)
+    if _is_of_key(error):
+        path = (*path, error.instance)
+        message = f"'{error.instance}' is not {expected}"
+        yield Violation('bad-value', message, path, path, at_key=True)
+        return
     meant = _find_meant_form(error.instance, error.validator_value)
     yield Violation(
         'bad-value',
@@ -106,6 +111,11 @@ def _explain_pattern(error: ValidationError) -> Iterator[Violation]:
         droppable(path),
         help=did_you_mean(meant),
     )
+
+
+def _is_of_key(error: ValidationError) -> bool:
+    """Return whether a key is wrong: the path of the error is that of its mapping."""
+    return 'propertyNames' in list(error.absolute_schema_path)[-2:-1]
 
 
 _BOUNDS = {

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import yaml
 
-from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.input_limits import MAX_DEPTH, MAX_VALUES
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,12 +107,14 @@ def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> tuple[list
 def _parse(text: str, source: SourceFile, builder: _TreeBuilder) -> None:
     try:
         loader = _Loader(text)
-        takers = builder.takers
+        takers = builder.takers()
         while (event := loader.get_event()) is not None:
             if take := takers.get(type(event)):
                 take(event)
     except yaml.MarkedYAMLError as error:
-        raise CompositionError(_syntax_problem(error, source)) from error
+        quote = _find_open_quote(error, builder.last_quoted)
+        finding = _quote_problem(quote, source) if quote else _syntax_problem(error, source)
+        raise CompositionError(finding) from error
     except yaml.reader.ReaderError as error:
         raise CompositionError(_character_problem(error, text, source)) from error
     except yaml.YAMLError as error:
@@ -121,11 +124,7 @@ def _parse(text: str, source: SourceFile, builder: _TreeBuilder) -> None:
 
 
 class _TreeBuilder:
-    """Takes the parser's events one by one.
-
-    Attributes:
-        takers: What takes an event, by its class.
-    """
+    """Takes the parser's events one by one."""
 
     def __init__(
         self,
@@ -137,15 +136,7 @@ class _TreeBuilder:
     ) -> None:
         self.roots: list[TreeNode] = []
         self.values = 0
-        self.takers: dict[type, Callable[[Any], None]] = {
-            yaml.ScalarEvent: self._take_scalar,
-            yaml.MappingStartEvent: self._begin_mapping,
-            yaml.SequenceStartEvent: self._begin_sequence,
-            yaml.MappingEndEvent: self._end,
-            yaml.SequenceEndEvent: self._end,
-            yaml.AliasEvent: self._take_alias,
-            yaml.DocumentStartEvent: self._begin_document,
-        }
+        self.last_quoted: Any = None
         self._source = source
         self._alias_rule = alias_rule
         self._most_documents = most_documents
@@ -156,6 +147,18 @@ class _TreeBuilder:
         self._inner = self.roots
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
+
+    def takers(self) -> dict[type, Callable[[Any], None]]:
+        """Return what takes an event, by its class."""
+        return {
+            yaml.ScalarEvent: self._take_scalar,
+            yaml.MappingStartEvent: self._begin_mapping,
+            yaml.SequenceStartEvent: self._begin_sequence,
+            yaml.MappingEndEvent: self._end,
+            yaml.SequenceEndEvent: self._end,
+            yaml.AliasEvent: self._take_alias,
+            yaml.DocumentStartEvent: self._begin_document,
+        }
 
     def _take_scalar(self, event: Any) -> None:
         is_plain, is_text = event.implicit
@@ -170,6 +173,8 @@ class _TreeBuilder:
         style = event.style
         plain, quoted = is_plain and not style, style in _QUOTES
         self._add(ScalarNode(event.value, tag, plain, span, quoted), event.anchor)
+        if quoted:
+            self.last_quoted = event
 
     def _begin_mapping(self, event: Any) -> None:
         node = MappingNode(event.tag, self._start(event))
@@ -213,7 +218,9 @@ class _TreeBuilder:
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} before this alias')
+            message = f'no anchor &{event.anchor} before this alias'
+            help_text = suggest(event.anchor, self._anchors, 'there are')
+            self._stop(event, 'unknown-alias', message, help=help_text)
         if any(node is each for each, _ in self._open):
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
         self._add(node, None)
@@ -222,10 +229,33 @@ class _TreeBuilder:
         mark = event.start_mark
         return Span(self._source, mark.line + 1, mark.column + 1, length)
 
-    def _stop(self, event: Any, rule: str, message: str) -> NoReturn:
+    def _stop(
+        self,
+        event: Any,
+        rule: str,
+        message: str,
+        help: str | None = None,  # noqa: A002 - the word that the finding shows
+    ) -> NoReturn:
         # Only an alias has a name here, after its asterisk.
         length = len(f'*{event.anchor}') if isinstance(event, yaml.AliasEvent) else 1
-        raise CompositionError(diagnostic_at(self._start(event, length), rule, message))
+        span = self._start(event, length)
+        raise CompositionError(diagnostic_at(span, rule, message, help=help))
+
+
+def _find_open_quote(error: yaml.MarkedYAMLError, last: Any) -> Any:
+    """Return where a quote begins that is not closed, or only by the beginning of another one."""
+    if error.context and 'quoted scalar' in error.context and 'unexpected' in str(error.problem):
+        return error.context_mark
+    mark = error.problem_mark
+    is_long = last is not None and last.start_mark.line != last.end_mark.line
+    is_at_its_end = is_long and mark is not None and mark.line == last.end_mark.line
+    return last.start_mark if is_at_its_end else None
+
+
+def _quote_problem(begun: Any, source: SourceFile) -> Diagnostic:
+    span = Span(source, begun.line + 1, begun.column + 1)
+    message = 'this is not YAML: the quote that begins here is not closed in its line'
+    return diagnostic_at(span, 'yaml-syntax', message)
 
 
 def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
@@ -234,11 +264,12 @@ def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnost
     problem = error.problem or error.context or 'it cannot be parsed'
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
+    related: tuple[Related, ...] = ()
     if context and begun and mark and begun.line != mark.line:
         context += f' that begins on line {begun.line + 1}'
-    return diagnostic_at(
-        span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
-    )
+        related = (Related('it begins here', Span(source, begun.line + 1, begun.column + 1)),)
+    message = f'this is not YAML: {problem}{context}'
+    return diagnostic_at(span, 'yaml-syntax', message, help=_syntax_help(span), related=related)
 
 
 def _syntax_help(span: Span) -> str | None:

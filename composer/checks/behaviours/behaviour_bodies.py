@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.checks.behaviours.behaviour_functions import is_called_wrongly
+from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.bindings import node_bindings
@@ -51,6 +53,13 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
 def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     for binding, reading in readings:
         for each in reading.problems:
+            if is_shipped(context, binding.behaviour.module):
+                if is_called_wrongly(context, binding):
+                    continue
+                # Its user cannot change what stands there.
+                said = f"'{binding.behaviour.name}' does not work here: {each.message}"
+                yield context.at_value(binding.behaviour.path, each.rule, said, help=each.help)
+                continue
             yield diagnostic_at(
                 each.place,
                 each.rule,

@@ -40,6 +40,11 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
                 yield explain(context, binding, module)
 
 
+def is_called_wrongly(context: CheckContext, binding: Binding) -> bool:
+    """Return whether `check_behaviour_sources` finds something wrong with a behaviour."""
+    return any(_check_source(context, binding, context.modules.find(binding.behaviour.module)))
+
+
 def check_behaviour_call(
     context: CheckContext,
     binding: Binding,

@@ -14,6 +14,7 @@ from composer.python_source.module_finder import MissingModule
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from composer.checks.behaviours.message_expressions import ExpressionValue
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import NodeSpec, SubscriptionSpec
@@ -59,9 +60,10 @@ def _check_fields(
         path = (*subscription.path, 'with', 'fields', name)
         findings = list(_check_name(context, made, name, path)) if made else []
         if heard:
-            findings += _check_expression(context, heard, str(expression), path)
-        if heard and made and not findings:
-            findings += _check_type(context, made, heard, str(expression), path)
+            wrong, value = _evaluate(context, heard, str(expression), path)
+            findings += wrong
+            if made and value and not findings:
+                findings += _check_type(context, made, value, path)
         yield from findings
 
 
@@ -91,36 +93,31 @@ def _check_name(
         yield context.at_key(path, 'unknown-field', str(error), help=error.help)
 
 
-def _check_expression(
+def _evaluate(
     context: CheckContext, heard: MessageDescription, expression: str, path: DataPath
-) -> Iterator[Diagnostic]:
+) -> tuple[list[Diagnostic], ExpressionValue | None]:
+    """Return what is wrong with an expression, and what is known of its value."""
     # The import of jinja2 takes a tenth of the time of a check, and most files do not need it.
-    from composer.checks.behaviours.message_expressions import check_expression
+    from composer.checks.behaviours.message_expressions import evaluate_over
 
-    for finding in check_expression(expression, heard, context.catalogue):
-        yield context.at_value(
-            path, finding.rule, finding.message, part=finding.part, help=finding.help
-        )
+    findings, value = evaluate_over(expression, heard, context.catalogue)
+    return [
+        context.at_value(path, each.rule, each.message, part=each.part, help=each.help)
+        for each in findings
+    ], value
 
 
 def _check_type(
-    context: CheckContext,
-    made: MessageDescription,
-    heard: MessageDescription,
-    expression: str,
-    path: DataPath,
+    context: CheckContext, made: MessageDescription, value: ExpressionValue, path: DataPath
 ) -> Iterator[Diagnostic]:
-    """Check that the value of an expression, as far as it is known, fits its field."""
-    from composer.checks.behaviours.message_expressions import value_of_expression
-
-    value = value_of_expression(expression, heard, context.catalogue)
+    """Check that the value of an expression fits its field."""
     *outer, last = str(path[-1]).split('.')
     owner: MessageDescription | None = made
     for part in outer:
         nested = owner.field(part) if owner else None
         owner = _describe(context, nested.type.nested or '') if nested else None
     field = owner.field(last) if owner else None
-    if value is None or owner is None or field is None:
+    if owner is None or field is None:
         return
     wrong = f'{owner.name}: {last}: expected {field.type}, got {value.noun}'
     if value.message is not None:

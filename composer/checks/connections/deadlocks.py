@@ -11,17 +11,20 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.cycles import find_knots, find_way
+from composer.checks.connections.wait_conditions import StartOrder
 from composer.diagnostics import Related
+from composer.entity_kinds import KIND_OF_NOUN
 from composer.language.bindings import node_bindings
-from composer.language.specs import REENTRANT
+from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec
 from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator
 
-    from composer.checks.connections.topology import Endpoint
+    from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
+    from composer.inference.reading import NodeUse, Waited
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
@@ -29,16 +32,19 @@ if TYPE_CHECKING:
 # Of a chain of calls, how many are named.
 _MOST_SHOWN = 8
 
-# A callback group: the node's name and the group's own.
+# A callback group, or what else only one has at a time: the node's full name, and its own.
 Group = tuple[str, str]
+# The group in which a node accepts goals.
+_ACCEPTING = 'goals'
 
 
 @record
 class _Wait:
-    """A behaviour waits for a service.
+    """A behaviour waits for a service, or for an action: an answer, or the end of a goal.
 
     Attributes:
         group: The group that it keeps meanwhile, `None` for none.
+        name: The full name of the service or action; `what` is what it waits for, in words.
         client: The end that it calls through.
         server: The end that would answer.
         place: Where the behaviour waits.
@@ -49,29 +55,24 @@ class _Wait:
     node: NodeSpec
     binding: Binding
     group: Group | None
-    service: str
+    name: str
+    what: str
     client: Endpoint
     server: Endpoint
     place: Span
+    answering: DataPath
+    answering_group: Group | None
 
     @property
     def path(self) -> DataPath:
         return self.binding.behaviour.path
-
-    @property
-    def answering(self) -> DataPath:
-        return (*self.server.path, 'behaviour')
-
-    @property
-    def answering_group(self) -> Group | None:
-        return _group_of(self.server.node, getattr(self.server.entity, 'group', None))
 
     def __str__(self) -> str:
         return f"{self.binding.owner} of node '{self.node.name}'"
 
 
 def check_deadlocks(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check that no behaviour waits for a service that is blocked by the behaviour itself."""
+    """Check that no behaviour waits for something that is blocked by the behaviour itself."""
     waits = list(_find_waits(context))
     yield from _check_hooks(context, waits)
     yield from _check_groups(context, waits)
@@ -79,8 +80,9 @@ def check_deadlocks(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     servers = {
-        (end.node.name, end.entity.name): (channel, end)
-        for channel in context.topology.of_kind('service')
+        (end.kind.section, end.node.full_name, end.entity.name): (channel, end)
+        for kind in ('service', 'action')
+        for channel in context.topology.of_kind(kind)
         for end in channel.users
         if len(channel.providers) == 1
     }
@@ -90,47 +92,110 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
         for binding in node_bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
-            waits = {
-                use.name: use.place
-                for use in reversed(context.behaviours.read(node, binding).uses)
-                if use.kind == 'service client' and use.waits and use.is_certain
-            }
-            for name, place in sorted(waits.items(), key=lambda wait: wait[0]):
-                if (node.name, name) in servers:
-                    channel, client = servers[node.name, name]
-                    group = _group_in(node, binding)
-                    server = channel.providers[0]
-                    yield _Wait(node, binding, group, channel.name, client, server, place)
+            group = _group_in(node, binding)
+            for use in _waiting_uses(context, node, binding):
+                ends = [
+                    servers.get((KIND_OF_NOUN[use.kind].section, node.full_name, name))
+                    for name in use.among
+                ]
+                channel, client = ends[use.among.index(use.name)] or (None, None)
+                if channel is None or client is None:
+                    continue
+                wait = _wait_of(node, binding, group, channel, client, use)
+                needs = {_need(end[0].providers[0], use.waits) if end else None for end in ends}
+                # Of several names, each may be the one that is used.
+                if len(ends) == 1 or (len(needs) == 1 and wait.answering_group):
+                    yield wait
+
+
+def _waiting_uses(context: CheckContext, node: NodeSpec, binding: Binding) -> list[NodeUse]:
+    """Return where a behaviour waits, each name once."""
+    found = {
+        (use.kind, use.name, use.waits): use
+        for use in reversed(context.behaviours.read(node, binding).uses)
+        if use.waits
+    }
+    return [found[key] for key in sorted(found)]
+
+
+def _wait_of(
+    node: NodeSpec,
+    binding: Binding,
+    group: Group | None,
+    channel: Channel,
+    client: Endpoint,
+    use: NodeUse,
+) -> _Wait:
+    server = channel.providers[0]
+    what = f"{channel.kind} '{channel.name}'"
+    part = 'accept' if channel.kind == 'action' and use.waits == 'answer' else 'behaviour'
+    return _Wait(
+        node,
+        binding,
+        group,
+        channel.name,
+        f'the end of a goal of {what}' if use.waits == 'end' else what,
+        client,
+        server,
+        use.place,
+        answering=(*server.path, part),
+        answering_group=_need(server, use.waits),
+    )
+
+
+def _need(server: Endpoint, waited: Waited) -> Group | None:
+    """Return the group that an answer needs."""
+    if isinstance(server.entity, ActionSpec):
+        if waited == 'answer':
+            return server.node.full_name, _ACCEPTING
+        return _queue_of(server.node, server.entity)
+    return _group_of(server.node, getattr(server.entity, 'group', None))
 
 
 def _group_in(node: NodeSpec, binding: Binding) -> Group | None:
     """Return the mutually exclusive group that a behaviour runs in, if there is one."""
+    if isinstance(binding.entity, ActionSpec):
+        if binding.key.key == 'accept':
+            return node.full_name, _ACCEPTING
+        return _queue_of(node, binding.entity)
+    if isinstance(binding.entity, ActionClientSpec):
+        return _group_of(node, None)
     if binding.kind is None or not binding.kind.has_group:
         return None
     return _group_of(node, getattr(binding.entity, 'group', None))
 
 
+def _queue_of(node: NodeSpec, action: ActionSpec) -> Group | None:
+    """Return what only one goal of an action has at a time."""
+    return (node.full_name, f'goals of {action.name}') if action.concurrency == 'queue' else None
+
+
 def _group_of(node: NodeSpec, name: str | None) -> Group | None:
-    return None if name == REENTRANT else (node.name, name or '')
+    return None if name == REENTRANT else (node.full_name, name or '')
 
 
 def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
-    """Check calls in hooks: services answer only between `on_start` and `on_stop`."""
-    order = {name: index for index, name in enumerate(context.spec.nodes)}
-    for wait in waits:
+    """Check calls in hooks: services and actions answer only between `on_start` and `on_stop`."""
+    in_hooks = [wait for wait in waits if wait.binding.kind is None]
+    starts = StartOrder(context) if in_hooks else None
+    for wait in in_hooks:
         hook, server = wait.binding.owner, wait.server.node
         is_own = server is wait.node
-        if hook == 'on_start' and (is_own or _starts_later(order, wait)):
-            when = f"after the on_start of node '{server.name}'"
+        if hook == 'on_start' and starts and (is_own or starts.is_later(server, wait.node)):
+            part = 'on_start' if server.on_start else 'start'
+            when = f"after the {part} of node '{server.name}'"
         elif hook == 'on_stop' and is_own:
             when = 'until on_stop'
         else:
             continue
+        help_text = 'put that node before this one'
+        if wait.node.wait_for or server.wait_for:
+            help_text = f"'{server.name}' has 'wait_for', and starts after '{wait.node.name}'"
         yield context.at_value(
             wait.path,
             'service-deadlock',
-            f"{wait} waits for service '{wait.service}', which answers only {when}",
-            help=_HOOK_HELP.get(hook) if is_own else 'put that node before this one',
+            f'{wait} waits for {wait.what}, which answers only {when}',
+            help=_HOOK_HELP.get(hook) if is_own else help_text,
             related=_places(context, [wait]),
         )
 
@@ -139,11 +204,6 @@ _HOOK_HELP = {
     'on_start': 'call it in a timer, which runs when all nodes have started',
     'on_stop': 'call what the service does as a plain function',
 }
-
-
-def _starts_later(order: dict[str, int], wait: _Wait) -> bool:
-    server = wait.server.node
-    return server.on_start is not None and order[server.name] > order[wait.node.name]
 
 
 def _check_groups(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnostic]:
@@ -189,27 +249,29 @@ def _with_groups(
 
 def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
     first, last = chain[0], chain[-1]
-    if len(chain) == 1:
+    kind = last.server.kind
+    if len(chain) == 1 and kind.has_group:
         message = (
-            f"{first} waits for service '{first.service}', which its own callback group serves: "
+            f'{first} waits for {first.what}, which its own callback group serves: '
             'neither can continue'
         )
+    elif len(chain) == 1:
+        message = f'{first} waits for {first.what}, which waits for it: neither can continue'
     else:
-        names = [f"'{wait.service}'" for wait in chain]
+        names = [f"'{wait.name}'" for wait in chain]
         if len(names) > _MOST_SHOWN:
             names[_MOST_SHOWN - 1 : -1] = ['…']
         way = ' → '.join(names)
         message = (
-            f'{first} waits for a chain of services that comes back to its own callback group, '
-            f'so none can continue: {way}'
+            f'{first} waits for a chain of {_kinds_in(chain)} that comes back to its own '
+            f'callback group, so none can continue: {way}'
         )
     return context.at_value(
         first.path,
         'service-deadlock',
         message,
         part=first.binding.behaviour.function,
-        help=f"give {last.server.kind.noun} '{last.server.entity.name}' a group of its own, "
-        "or 'group: reentrant'",
+        help=_help_for(last),
         related=_places(context, chain[:_MOST_SHOWN]),
     )
 
@@ -220,7 +282,23 @@ def _places(context: CheckContext, chain: list[_Wait]) -> list[Related]:
         for wait in chain
         for place in (
             Related(f"'{wait.binding.behaviour.function}' waits here", wait.place),
-            context.related(wait.server.path, f"'{wait.service}' is served here"),
+            context.related(wait.server.path, f"'{wait.name}' is served here"),
             context.related(wait.client.path, f"node '{wait.node.name}' calls it by this name"),
         )
     ]
+
+
+def _help_for(last: _Wait) -> str:
+    """Return what to do about the last wait of a chain."""
+    server = last.server
+    if server.kind.has_group:
+        name = f"{server.kind.noun} '{server.entity.name}'"
+        return f"give {name} a group of its own, or 'group: reentrant'"
+    if last.answering[-1] == 'accept':
+        return 'send the goal in a timer, or in the behaviour of the action'
+    return "write 'concurrency: parallel' at the action, or do not wait for the goal"
+
+
+def _kinds_in(chain: list[_Wait]) -> str:
+    """Return `services`, `actions`, or both."""
+    return ' and '.join(sorted({f'{wait.server.kind.channel}s' for wait in chain}, reverse=True))

@@ -11,11 +11,12 @@ import re
 from typing import TYPE_CHECKING
 
 from composer.ament import remaps_actions
-from composer.checks.connections.topology import full_name
+from composer.checks.connections.topology import TOPICS_OF_ROS, full_name
 from composer.checks.connections.wait_conditions import waiters
+from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
-from composer.names import expand_name, with_article
-from composer.spelling import count_edits, did_you_mean
+from composer.names import expand_name, find_topic_name_problem, with_article
+from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -95,7 +96,7 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
         names = present[condition.kind]
         if name in names or len(names) > _MOST_COMPARED:
             continue
-        near = find_typo(name, names)
+        near = find_typo(name, names) or _at_the_top(condition.name, names)
         if near:
             meant = _as_written(condition.name, near, waiter.namespace or '/')
             yield context.at_value(
@@ -104,6 +105,11 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
                 f"{with_article(condition.kind)} '{name}' is nowhere in this system",
                 help=did_you_mean(meant),
             )
+
+
+def _at_the_top(name: str, names: set[str]) -> str | None:
+    """Return the name without a namespace that one inside a namespace was meant to be."""
+    return f'/{name}' if f'/{name}' in names else None
 
 
 def _present(context: CheckContext) -> dict[str, set[str]]:
@@ -142,30 +148,72 @@ def _as_written(name: str, full: str, namespace: str) -> str:
 
 
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check remapping rules; a rule of an include applies to all that is in it."""
-    matching: set[Span] = set()
+    """Check remapping rules: one of an include applies to all that is in it."""
+    positions = context.system.positions
+    # Nobody knows what processes have.
+    matching = {
+        positions.key((*process.path, 'remap', source))
+        for process in context.spec.processes.values()
+        for source, _ in process.remap
+    }
     found: dict[Span, Diagnostic] = {}
-    for node in context.spec.nodes.values():
+    for node in _all_nodes(context):
         if not node.remap:
             continue
         names, actions = _names_of(node), _actions_of(node)
+        is_known = not _may_have_more(context, node)
         for source, _ in node.remap:
             path = (*node.path, 'remap', source)
-            span = context.system.positions.key(path)
-            bare = source.rpartition('://')[2]
+            span = positions.key(path)
+            scheme, _, bare = source.rpartition('://')
+            is_scheme = scheme in ('', 'rostopic', 'rosservice')
+            if source.startswith('__') or not is_scheme or find_topic_name_problem(bare):
+                continue  # which is a finding of its own
             name = expand_name(bare, node.name, node.namespace)
             if name in names or (name in actions and remaps_actions() is not False):
                 matching.add(span)
             elif name in actions:
                 found[span] = _explain_action(context, path, actions[name], name)
             elif near := find_typo(name, names):
-                found[span] = context.at_key(
-                    path,
-                    _RULE,
-                    f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule",
-                    help=did_you_mean(_as_written(bare, near, node.namespace)),
-                )
+                meant = _as_written(bare, near, node.namespace)
+                found[span] = _explain_rule(context, path, node, name, did_you_mean(meant))
+            elif not is_known or _is_of_ros(context, name):
+                matching.add(span)
+            else:
+                written = [_as_written(bare, each, node.namespace) for each in names]
+                nearest = _at_the_top(bare, names) or find_nearest(bare, written)
+                found[span] = _explain_rule(context, path, node, name, did_you_mean(nearest))
     yield from (finding for span, finding in found.items() if span not in matching)
+
+
+def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
+    """Yield the nodes, also those that are left out this time."""
+    yield from context.spec.nodes.values()
+    if context.system.unused is not None:
+        yield from context.system.unused.nodes.values()
+
+
+def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
+    """Return whether a node may have topics and services that the file does not show."""
+    depth = len(node.path)
+    if any(path[:depth] == node.path for path in context.system.dropped):
+        return True
+    return any(
+        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
+    )
+
+
+def _is_of_ros(context: CheckContext, name: str) -> bool:
+    """Return whether a rule is for what nodes have from ROS, or often get just in case."""
+    is_usual = name.rpartition('/')[2] in ('tf', 'tf_static')
+    return is_usual or name in TOPICS_OF_ROS or name in context.topology.ros_services
+
+
+def _explain_rule(
+    context: CheckContext, path: DataPath, node: NodeSpec, name: str, help_text: str | None
+) -> Diagnostic:
+    message = f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule"
+    return context.at_key(path, 'likely-misspelling', message, help=help_text)
 
 
 def _explain_action(

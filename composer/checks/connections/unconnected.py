@@ -5,10 +5,11 @@ A warning: the other end may be elsewhere, which `external: true` says.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import OF_ACTIONS, TOPICS_OF_ROS, is_misnamed
-from composer.spelling import did_you_mean, find_nearest
+from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -71,13 +72,14 @@ class _Partners:
 
     def __init__(self, topology: Topology) -> None:
         # Names are compared without their namespaces, in which all names look alike.
-        self._names: dict[tuple[str, str, bool], dict[str, str]] = {}
+        self._names: dict[tuple[str, str, bool], dict[str, list[str]]] = {}
         for channel in topology.channels.values():
             last = channel.name.rpartition('/')[2]
             for ends, provides in ((channel.providers, True), (channel.users, False)):
                 for end in ends:
                     key = (channel.kind, end.entity.type, provides)
-                    self._names.setdefault(key, {})[last] = channel.name
+                    same = self._names.setdefault(key, {}).setdefault(last, [])
+                    same.append(channel.name)
         self._comparisons = 0
 
     def nearest(self, channel: Channel, end: Endpoint) -> str | None:
@@ -88,4 +90,5 @@ class _Partners:
         if self._comparisons > _MOST_COMPARED:
             return None
         near = find_nearest(channel.name.rpartition('/')[2], names)
-        return names[near] if near else None
+        # Of several, the one whose namespace is nearest.
+        return min(names.get(near or '', ()), key=partial(count_edits, channel.name), default=None)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import ChannelKind
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, SystemSpec
+    from composer.yaml_text.positions import DataPath
 
 
 def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
@@ -96,6 +97,38 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
                 yield context.at_value(condition.path, 'wait-cycle', message)
             elif target not in done:
                 pending.append((target, iter(edges.get(target, ()))))
+
+
+class StartOrder:
+    """Which nodes start after which: those with conditions after all those without."""
+
+    def __init__(self, context: CheckContext) -> None:
+        self._context = context
+        self._order = {name: index for index, name in enumerate(context.spec.nodes)}
+        self._providers = _Providers(context)
+
+    def is_later(self, node: NodeSpec, other: NodeSpec) -> bool:
+        """Return whether a node is sure to serve nothing before the `on_start` of another ends."""
+        if not other.wait_for:
+            if node.wait_for:
+                return True
+            return node.on_start is not None and self._order[node.key] > self._order[other.key]
+        return bool(node.wait_for) and self._waits_for(node, other)
+
+    def _waits_for(self, node: NodeSpec, other: NodeSpec) -> bool:
+        by_path = {each.path: each for each in waiters(self._context.spec)}
+        pending: list[DataPath] = [node.path]
+        seen: set[DataPath] = set()
+        while pending:
+            path = pending.pop()
+            if path == other.path:
+                return True
+            if path not in seen:
+                seen.add(path)
+                waiter = by_path[path]
+                for condition in waiter.wait_for:
+                    pending += self._providers.of(waiter, condition)
+        return False
 
 
 class _Providers:

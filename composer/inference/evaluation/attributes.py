@@ -10,6 +10,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -20,7 +21,6 @@ from composer.inference.values import (
     Class,
     Constant,
     External,
-    Function,
     Generated,
     Instance,
     Mapping,
@@ -32,6 +32,8 @@ from composer.inference.values import (
     ProjectModule,
     Scalar,
     Sequence,
+    Super,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -120,7 +122,7 @@ class Attributes(Part):
 
     def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
         """Return an attribute, or a problem: the rule, what is wrong, and help."""
-        if name.startswith('__'):
+        if name.startswith('__') and not isinstance(owner, Instance | Super):
             if name == '__class__' and isinstance(owner, Message):
                 return MessageClass(owner.type)
             if name in ('__name__', '__qualname__') and isinstance(owner, MessageClass):
@@ -140,9 +142,14 @@ class Attributes(Part):
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
-                return self._read_instance(owner, name)
+                return (
+                    owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
+                )
             case Class():
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
+            case Super(of=of, owner=Instance() | Class() as mine):
+                whole = mine.of if isinstance(mine, Instance) else mine
+                return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
             case Awaitable():
@@ -155,7 +162,7 @@ class Attributes(Part):
                 return 'unknown-attribute', message, f'write {owner.name}().{name}'
             case Constant() | Scalar() | Mapping() | Sequence():
                 return self._read_builtin(owner, name)
-        return CHOSEN if is_chosen(owner) else UNKNOWN
+        return Unknown(is_chosen(owner))
 
     def _read_node(self, name: str) -> Value | tuple[str, str, str | None]:
         if name == 'name':
@@ -182,7 +189,7 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
-                return self._evaluator.kept.get(name, CHOSEN)
+                return self._evaluator.kept.get(name, Unknown(BY_STATE))
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -212,7 +219,7 @@ class Attributes(Part):
             return MessageClass(f'{owner.type}_{name}')
         if name == 'get_fields_and_field_types':
             return BoundMethod(owner, name)
-        if description is None or name == 'SLOT_TYPES' or name[0] == '_':
+        if description is None or name == 'SLOT_TYPES' or name.startswith('_'):
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN
@@ -235,17 +242,6 @@ class Attributes(Part):
         message = f"{path.name if path else 'the module'} has no '{name}'"
         return 'undefined-name', message, suggest(name, known)
 
-    def _read_instance(self, owner: Instance, name: str) -> Value:
-        found = self._evaluator.classes.class_attribute(owner.of, name, owner)
-        stored = owner.attributes.get(name)
-        if stored is None:
-            return found or UNKNOWN
-        # What other behaviours store in it is not known here.
-        is_lasting = isinstance(stored, NodeValue | PartOfNode | BoundMethod | Function | Instance)
-        if is_lasting or self._evaluator.classes.is_stored_once(owner.of, name):
-            return stored
-        return UNKNOWN
-
     def _read_array(self, owner: ArrayField, name: str) -> Value | tuple[str, str, str | None]:
         nested = owner.type.nested
         if nested is None or hasattr(list, name):
@@ -256,6 +252,10 @@ class Attributes(Part):
     def _read_builtin(
         self, owner: Constant | Scalar | Mapping | Sequence, name: str
     ) -> Value | tuple[str, str, str | None]:
+        if isinstance(owner, Constant) and owner.member is not None:
+            found = self._evaluator.classes.enumerations.read(owner, name)
+            if found is not None:
+                return found
         kind = dict if isinstance(owner, Mapping) else owner.kind
         if kind is type(None):
             return UNKNOWN
@@ -267,6 +267,8 @@ class Attributes(Part):
     def read_item(self, owner: Value, index: Value, place: Place) -> Value:
         """Return what `owner[index]` may be, of a part of the node."""
         run = self._evaluator.run
+        if isinstance(owner, Class | Instance):
+            return self._read_item_of_object(owner, index)
         if isinstance(owner, Message):
             name = index.value if isinstance(index, Constant) else '…'
             message = f'{in_python(owner.type)} is a message, and has no items'
@@ -278,7 +280,7 @@ class Attributes(Part):
             else:
                 run.reading.is_own_state_open = True
             key = str(index.value) if isinstance(index, Constant) else ''
-            return self._evaluator.kept.get(f'[{key}]', CHOSEN)
+            return self._evaluator.kept.get(f'[{key}]', Unknown(BY_STATE))
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []
@@ -296,6 +298,16 @@ class Attributes(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+    def _read_item_of_object(self, owner: Class | Instance, index: Value) -> Value:
+        classes = self._evaluator.classes
+        if isinstance(owner, Class):
+            is_one = classes.enumerations.is_one(owner)
+            return classes.enumerations.member_of_name(owner, index) if is_one else UNKNOWN
+        items = classes.fields.items_of(owner)
+        if items is not None and isinstance(index, Constant) and isinstance(index.value, int):
+            return items[index.value] if -len(items) <= index.value < len(items) else UNKNOWN
+        return classes.call_method(owner, '__getitem__', index) or UNKNOWN
 
     def note_containment(self, item: Value, container: Value, place: Place) -> None:
         """`'x' in node.parameters` uses a parameter, and works without it."""
@@ -357,7 +369,7 @@ class Attributes(Part):
             case Message():
                 self._store_field(owner, name, value, place)
             case Instance():
-                owner.set(name, value)
+                self._evaluator.classes.store(owner, name, value)
             case _:
                 self._evaluator.escape(value)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit, signature_of
 from composer.inference.message_types import in_python
@@ -29,7 +30,7 @@ from composer.inference.values import (
     PartOfNode,
     Place,
     Scalar,
-    Sequence,
+    Super,
     Unknown,
     Value,
     alternatives,
@@ -53,7 +54,9 @@ class Calls(Part):
         arguments = self._arguments(node, scope)
         place = Place(scope.module, node)
         self._note_keys(function, arguments)
-        if function == External('builtins.super') or function == External('builtins.locals'):
+        if function == External('builtins.super'):
+            return _super_in(scope)
+        if function == External('builtins.locals'):
             return UNKNOWN
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
         if isinstance(function, Unknown) and method in SENDING_METHODS:
@@ -84,13 +87,18 @@ class Calls(Part):
         is_open = False
         for each in node.args:
             place = Place(scope.module, each)
-            if isinstance(each, ast.Starred):
+            if is_open:
+                # Nobody knows which position this has.
+                self._evaluator.escape(self._evaluator.evaluate(each, scope))
+            elif isinstance(each, ast.Starred):
                 value = self._evaluator.evaluate(each.value, scope)
-                if isinstance(value, Sequence) and not value.is_lost and not value.is_open:
-                    positional += [Argument(*item) for item in value.items]
-                else:
+                try:
+                    leaves = leaves_of(value, place)
+                except NotKnownError:
                     is_open = True
                     self._evaluator.escape(value)
+                    continue
+                positional += [Argument(each.value, each.place) for each in leaves]
             else:
                 positional.append(Argument(self._evaluator.evaluate(each, scope), place))
         for keyword in node.keywords:
@@ -132,8 +140,12 @@ class Calls(Part):
                     name, arguments, waits=waits, is_awaited=is_awaited
                 )
             case BoundMethod():
-                if isinstance(function.owner, PartOfNode):
-                    self._fits(function.owner.name, function.name, arguments, place)
+                owner, name = function.owner, function.name
+                if isinstance(owner, PartOfNode):
+                    self._fits(owner.name, name, arguments, place)
+                if isinstance(owner, PartOfNode) and owner.name == 'goal':
+                    waits = waits and (name != 'result_async' or is_awaited)
+                    return self._evaluator.node_calls.call_goal(owner, name, place, waits=waits)
                 return self._evaluator.containers.call_method(function, arguments, place)
             case MessageClass():
                 return self._construct(function, arguments)
@@ -156,8 +168,13 @@ class Calls(Part):
             case Instance():
                 method = self._evaluator.classes.class_attribute(function.of, '__call__', function)
                 if isinstance(method, Function):
-                    return self._evaluator.functions.follow(method, arguments, waits=waits)
+                    return self.invoke(
+                        method, arguments, place, waits=waits, is_awaited=is_awaited
+                    )
             case External():
+                made = self._evaluator.callables.call(function.name, arguments, place)
+                if made is not None:
+                    return made
                 return self._evaluator.library.call(function.name, arguments, place)
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
@@ -231,3 +248,15 @@ class Calls(Part):
                 message = str(error).replace(function.type, shown)
                 evaluator.run.report('unknown-field', argument.place, message, error.help)
         return made
+
+
+def _super_in(scope: Scope) -> Value:
+    """Return what `super()` gives in a method."""
+    current: Scope | None = scope
+    while current is not None:
+        function = current.function
+        if function is not None and function.of is not None:
+            owner = function.owner
+            return UNKNOWN if owner is None else Super(function.of, owner)
+        current = current.outer
+    return UNKNOWN

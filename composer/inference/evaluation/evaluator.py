@@ -6,24 +6,28 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.classes.made_callables import MadeCallables
+from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
 from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
-from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.library.library_calls import LibraryCalls
+from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
-from composer.inference.evaluation.project_classes import Classes
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
+from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -31,6 +35,7 @@ from composer.inference.values import (
     ArrayField,
     Awaitable,
     BoundMethod,
+    Class,
     Constant,
     Function,
     Generated,
@@ -42,6 +47,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -64,22 +70,23 @@ class Evaluator:
     Attributes:
         kept: Objects of classes of the project that are kept in the state, by their names there.
         call_places: Where the calls under way are written.
-        lasting_doubts: Of each function under way, the doubts that last until its end.
     """
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self.lasting_doubts: list[int] = [0]
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
         self.library = LibraryCalls(self)
+        self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
+        self.callables = MadeCallables(self)
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
@@ -97,7 +104,8 @@ class Evaluator:
             return CHOSEN
         current: Scope | None = scope
         while current is not None:
-            if name in current.local:
+            is_later = current.is_body and name not in (current.names or ())
+            if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
                     value = current.names[name]
@@ -174,7 +182,8 @@ class Evaluator:
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
-            around.enter_context(self.run.condition(is_doubt=is_doubt))
+            by_state = is_chosen(test) == BY_STATE
+            around.enter_context(self.run.condition(is_doubt=is_doubt, by_state=by_state))
             if is_dead and is_chosen(test) != BY_PARAMETER:
                 around.enter_context(self.run.dead_branch())
             yield
@@ -199,24 +208,55 @@ class Evaluator:
                 return value.item()
             case Generated():
                 return value.yielded
+            case Instance() | Class():
+                return self._item_of_object(value)
             case Mapping() if not (value.is_open or value.is_lost) and value.entries:
                 return join(constant(key) for key in value.entries)
             case Constant() | Scalar() if value.kind is str:
                 return Scalar(str)
             case PartOfNode(name='parameters'):
                 self.run.reading.open_kinds.add('parameter')
-        return CHOSEN if is_chosen(value) else UNKNOWN
+        return Unknown(is_chosen(value))
+
+    def _item_of_object(self, value: Instance | Class) -> Value:
+        items = self.loops.items_of(value)
+        if items is not None:
+            return join(items)
+        if isinstance(value, Class):
+            return UNKNOWN
+        iterator = self.classes.call_method(value, '__iter__')
+        if isinstance(iterator, Instance):
+            return self.classes.call_method(iterator, '__next__') or UNKNOWN
+        return UNKNOWN if iterator is None else self.item_of(iterator)
 
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""
-        return join(
-            each.yielded if isinstance(each, Generated) else UNKNOWN
-            for each in alternatives(value)
-        )
+        return join(self._entered(each) for each in alternatives(value))
+
+    def _entered(self, value: Value) -> Value:
+        if isinstance(value, Instance):
+            entered = self.classes.call_method(value, '__enter__')
+            if entered is None:
+                entered = self.classes.call_method(value, '__aenter__')
+                return entered.result if isinstance(entered, Awaitable) else UNKNOWN
+            return entered
+        return value.yielded if isinstance(value, Generated) else UNKNOWN
+
+    def left(self, value: Value) -> Value | None:
+        """Return what the end of `with value` gives: true if it catches what was raised."""
+        if not isinstance(value, Instance):
+            return None
+        reason = (UNKNOWN, UNKNOWN, UNKNOWN)
+        ended = self.classes.call_method(value, '__exit__', *reason)
+        if ended is None:
+            ended = self.classes.call_method(value, '__aexit__', *reason)
+            return ended.result if isinstance(ended, Awaitable) else ended
+        return ended
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
-        if isinstance(value, Instance):
+        if isinstance(value, Instance) and not value.is_member:
+            value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
@@ -247,8 +287,9 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
-                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
-                    self.run.reading.open_all()
+                for each in value.attributes.values():
+                    if isinstance(each, NodeValue | BoundMethod | PartOfNode):
+                        self.escape(each)
 
     def _escape_method(self, method: BoundMethod) -> None:
         kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)

@@ -24,16 +24,20 @@ from composer.inference.values import (
     Message,
     PartOfNode,
     Place,
+    Scalar,
     Sequence,
     Value,
     alternatives,
     constant,
+    is_chosen,
     is_none,
     join,
 )
 
 if TYPE_CHECKING:
     from collections import abc
+
+    from composer.inference.reading import Waited
 
 
 class NodeCalls(Part):
@@ -60,21 +64,42 @@ class NodeCalls(Part):
             # Name and payload may have been chosen together.
             payload = Argument(join(alternatives(payload.value)), payload.place)
         self._evaluator.run.decide(name.value)
-        for each in alternatives(name.value):
+        # Of names by conditions that the file decides on, none is sure.
+        is_sure = waits_here and method != 'publish' and self._evaluator.run.is_sure
+        waited: Waited = 'answer' if is_sure else ''
+        several = alternatives(name.value)
+        among = tuple(str(each.value) for each in several if isinstance(each, Constant))
+        if len(several) > 1 and (len(among) < len(several) or is_chosen(name.value)):
+            waited = ''
+        for each in several:
             if not isinstance(each, Constant) or not isinstance(each.value, str):
                 self._evaluator.run.reading.open_kinds.add(kind)
                 results.append(UNKNOWN)
                 continue
-            waited = waits_here and method in ('call', 'call_async')
             # Of several names, conditions may leave out some, unless they are chosen right here.
-            is_doubt = isinstance(name.value, Alternatives)
-            is_doubt = is_doubt and not isinstance(name.place.node, ast.IfExp)
+            is_doubt = len(several) > 1 and not isinstance(name.place.node, ast.IfExp)
             with self._evaluator.run.condition(is_doubt=is_doubt):
-                self._evaluator.run.use(kind, each.value, name_place(name, each), waits=waited)
+                self._evaluator.run.use(
+                    kind, each.value, name_place(name, each), waits=waited, among=among
+                )
             type_name = self._evaluator.run.facts.type_of(section, each.value)
-            results.append(self._send(method, type_name, payload, arguments))
-        result = join(results)
-        return Awaitable(result) if method == 'call_async' else result
+            result = self._send(method, type_name, payload, arguments)
+            if isinstance(result, PartOfNode):
+                result = PartOfNode(result.name, result.type, each.value)
+            results.append(result)
+        found = join(results)
+        return Awaitable(found) if method == 'call_async' else found
+
+    def call_goal(self, owner: PartOfNode, method: str, place: Place, *, waits: bool) -> Value:
+        """Return what a method of a goal may return."""
+        if method == 'cancel':
+            return Scalar(bool)
+        run = self._evaluator.run
+        if owner.entity and waits and run.is_sure:
+            name = owner.entity
+            run.use('action client', name, place, waits='end', among=(name,))
+        result: Value = Message(f'{owner.type}_Result') if owner.type else UNKNOWN
+        return Awaitable(result) if method == 'result_async' else result
 
     def _send(
         self, method: str, type_name: str | None, payload: Argument | None, arguments: Arguments

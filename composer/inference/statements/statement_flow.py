@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
-from composer.inference.scopes import Names, Scope, join_names
-from composer.inference.statements.narrowing import doubt_rounds
+from composer.inference.scopes import Names, Scope, join_names, own_nodes
 from composer.inference.values import (
+    BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
+    Argument,
+    Arguments,
     Awaitable,
     Class,
     Constant,
+    Function,
     Generated,
     Mapping,
     PartOfNode,
@@ -24,7 +27,9 @@ from composer.inference.values import (
     Scalar,
     Sequence,
     Value,
+    alternatives,
     is_chosen,
+    join,
     truth_of,
 )
 
@@ -84,10 +89,15 @@ class Statements(Part):
                 self._store_item(target, value, scope)
 
     def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+        """Return what each target gets of something that is unpacked."""
+        rows = [
+            [item for item, _ in each.items]
+            for each in alternatives(value)
+            if isinstance(each, Sequence) and each.is_whole and len(each.items) == len(targets)
+        ]
         starred = any(isinstance(each, ast.Starred) for each in targets)
-        is_even = isinstance(value, Sequence) and len(value.items) == len(targets)
-        if isinstance(value, Sequence) and is_even and value.is_whole and not starred:
-            return [item for item, _ in value.items]
+        if len(rows) == len(alternatives(value)) and not starred:
+            return [join(column) for column in zip(*rows, strict=True)]
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
@@ -132,21 +142,34 @@ class Statements(Part):
             if isinstance(target, ast.Name):
                 scope.set(target.id, UNKNOWN)
             elif isinstance(target, ast.Subscript):
-                self._evaluator.read_target(target, scope)
-                self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
+                self._delete_item(target, scope)
             elif isinstance(target, ast.Attribute):
-                self._evaluator.evaluate(target.value, scope)
+                self._evaluator.evaluate(target, scope)
+
+    def _delete_item(self, target: ast.Subscript, scope: Scope) -> None:
+        self._evaluator.read_target(target, scope)
+        owner = self._evaluator.evaluate(target.value, scope)
+        with self._evaluator.run.silence():
+            index = self._evaluator.evaluate(target.slice, scope)
+        if isinstance(owner, Mapping | Sequence) and isinstance(index, Constant):
+            given = Argument(index, Place(scope.module, target.slice))
+            place = Place(scope.module, target)
+            self._evaluator.methods.call(owner, 'pop', Arguments((given,)), place)
+        else:
+            self._evaluator.escape(owner)
 
     # Definitions
 
     def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
-        scope.set(node.name, self._evaluator.functions.define_decorated(node, scope))
+        function = self._evaluator.functions.define(node, scope)
+        scope.set(node.name, self._evaluator.functions.decorate(function, node, scope))
 
     _asyncfunctiondef = _functiondef
 
     def _classdef(self, node: ast.ClassDef, scope: Scope) -> None:
         outer = None if scope.function is None else scope
-        scope.set(node.name, Class(scope.module, node, outer))
+        made = Class(scope.module, node, outer)
+        scope.set(node.name, self._evaluator.functions.decorate(made, node, scope))
 
     def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
         for alias in node.names:
@@ -222,12 +245,12 @@ class Statements(Part):
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        is_doubtful = False
+        doubt = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
-                is_doubtful |= truth is None and is_chosen(test) > 0
+                doubt = max(doubt, is_chosen(test) if truth is None else 0)
                 before = scope.copy_names()
                 self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
@@ -248,37 +271,12 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if is_doubtful and has_jumped:
+        if doubt and has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubts += 1
-            self._evaluator.lasting_doubts[-1] += 1
+            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
-        subject = self._evaluator.evaluate(node.subject, scope)
-        self._evaluator.run.decide(subject)
-        ends: list[Names | None] = []
-        before = scope.copy_names()
-        for case in node.cases:
-            scope.names = None if before is None else dict(before)
-            doubt_rounds(node.subject, scope)
-            for pattern in ast.walk(case.pattern):
-                if isinstance(pattern, ast.MatchValue):
-                    self._evaluator.evaluate(pattern.value, scope)
-                elif isinstance(pattern, ast.MatchClass):
-                    self._evaluator.evaluate(pattern.cls, scope)
-            for name in _captured(case.pattern):
-                scope.set(name, UNKNOWN)
-            if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
-                if case.pattern.name:
-                    scope.set(case.pattern.name, subject)
-            elif isinstance(node.subject, ast.Name) and isinstance(case.pattern, ast.MatchClass):
-                scope.set(node.subject.id, UNKNOWN)
-            if case.guard is not None:
-                self._evaluator.evaluate(case.guard, scope)
-            with self._evaluator.run.condition(is_doubt=is_chosen(subject)):
-                self.follow_all(case.body, scope)
-            ends.append(scope.names)
-        scope.names = join_names([before, *ends])
+        self._evaluator.match_cases.follow(node, scope)
 
     # Loops
 
@@ -296,11 +294,16 @@ class Statements(Part):
         run = self._evaluator.run
         before = scope.copy_names()
         is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
+        tried = run.tried
         with run.guard(is_guard=is_guard, is_broad=is_broad):
             self.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
-            self.follow_all(node.orelse, scope)
+            # What is wrong in the body, and caught, never comes to this.
+            with run.condition(is_doubt=is_guard):
+                self.follow_all(node.orelse, scope)
+        # Only then the file may decide whether it raises.
+        is_doubtful = run.tried > tried
         ends = [scope.names]
         caught = join_names([before, after])
         for handler in node.handlers:
@@ -309,7 +312,8 @@ class Statements(Part):
                 self._evaluator.evaluate(handler.type, scope)
             if handler.name:
                 scope.set(handler.name, UNKNOWN)
-            with run.condition(is_doubt=_is_guard(handler) or _is_broad(handler)):
+            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
+            with run.condition(is_doubt=is_doubt):
                 self.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)
@@ -323,16 +327,35 @@ class Statements(Part):
     _trystar = _try
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        managers: list[Value] = []
+        is_guard = False
         for item in node.items:
             value = self._evaluator.evaluate(item.context_expr, scope)
+            managers.append(value)
+            entered = self._evaluator.entered(value)
             if item.optional_vars is not None:
-                self.store(item.optional_vars, self._evaluator.entered(value), scope)
-        is_guard = any(_suppresses(item.context_expr) for item in node.items)
+                self.store(item.optional_vars, entered, scope)
+            is_guard |= _suppresses(item.context_expr) or self._catches(item.context_expr, scope)
         before = scope.copy_names()
+        # What objects do at the end of it, they do on whatever the body raises.
+        results = [self._evaluator.left(each) for each in managers]
+        is_guard |= any(each is not None and truth_of(each) is not False for each in results)
         with self._evaluator.run.guard(is_guard=is_guard):
             self.follow_all(node.body, scope)
         if is_guard:
             scope.names = join_names([before, scope.names])
+
+    def _catches(self, expression: ast.expr, scope: Scope) -> bool:
+        """Return whether a generator that is a context manager catches what its body raises."""
+        if not isinstance(expression, ast.Call):
+            return False
+        with self._evaluator.run.silence():
+            function = self._evaluator.evaluate(expression.func, scope)
+        if not isinstance(function, Function):
+            return False
+        tries = [node for node in own_nodes(function.definition) if isinstance(node, ast.Try)]
+        handlers = [handler for node in tries for handler in node.handlers]
+        return any(_is_guard(each) or _is_broad(each) for each in handlers)
 
     _asyncwith = _with
 
@@ -363,9 +386,3 @@ def _names_in(expression: ast.expr) -> set[str]:
     nodes = list(ast.walk(expression))
     names = {node.id for node in nodes if isinstance(node, ast.Name)}
     return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-
-
-def _captured(pattern: ast.pattern) -> set[str]:
-    names = {getattr(node, 'name', None) for node in ast.walk(pattern)}
-    names |= {getattr(node, 'rest', None) for node in ast.walk(pattern)}
-    return {name for name in names if name}

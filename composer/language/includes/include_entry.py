@@ -11,13 +11,12 @@ from composer.diagnostics import Related, diagnostic_at
 from composer.language.paths import (
     PackagePathError,
     PathError,
+    explain_absent,
     is_in_package,
-    list_neighbours,
     resolve_path,
 )
 from composer.names import find_namespace_problem
 from composer.records import record
-from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -145,7 +144,7 @@ def locate_file(text: str, place: Span) -> Path:
     path = resolve_path(text, place.source.folder)
     if not _is_there(path):
         message = f"there is no file '{shown_path(path)}'"
-        raise PathError(message, help=suggest(path.name, list_neighbours(path), 'there are'))
+        raise PathError(message, help=explain_absent(path, place))
     return path
 
 

@@ -23,7 +23,9 @@ SYSTEM = """
       cover: {type: nav_msgs/msg/Odometry, external: true}
     subscriptions:
       odom: {type: nav_msgs/msg/Odometry, external: true, behaviour: parts:hear}
-    service_clients: {enable: {type: std_srvs/srv/SetBool, external: true}}
+    service_clients:
+      enable: {type: std_srvs/srv/SetBool, external: true}
+      plan: {type: nav_msgs/srv/GetPlan, external: true}
     action_clients: {count: {type: test_msgs/action/Fibonacci, external: true}}
   camera:
     parameters: {gain: 0.5}
@@ -36,13 +38,18 @@ def use(node):
     node.publish('scan', {})
     node.publish('cover', {})
     node.call('enable', True)
+    node.call('plan', {})
     node.send_goal('count', 3)
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
+import copy
+import dataclasses
 import functools
+import itertools
 import math
 from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, LaserScan
 
 
@@ -55,6 +62,16 @@ class Keeper:
 
     async def wait(self):
         return await self.node.call_async('enable', True)
+
+
+@dataclasses.dataclass
+class Turn:
+    linear: dict
+    angul: dict  # of ASDICT
+
+
+def poses(node):
+    return node.call('plan', {}).plan.poses
 
 
 def pass_on(node, name, payload):
@@ -125,6 +142,40 @@ WRONG = {
     "node.publish('scan', {'ranges': 1.0})": 'field-type',
     "node.publish('cover', {'pose': {'covariance': [0.0] * 9}})": 'field-length',
     "node.call('enable', 'yes')": 'field-type',
+    # payloads that are computed
+    "node.publish('command', dict(zip(('linear', 'angul'), ({}, {}))))": 'unknown-field',
+    "node.publish('command', dict.fromkeys(['linear', 'angul'], {}))": 'unknown-field',
+    "node.publish('command', dict([('linear', {}), ('angul', {})]))": 'unknown-field',
+    "node.publish('command', {'linear': {}} | {'angul': {}})": 'unknown-field',
+    "node.publish('command', copy.deepcopy({'angul': {}}))": 'unknown-field',
+    "node.publish('command', {name: {} for name in ('linear', 'angul')})": 'unknown-field',
+    "t = Twist(); [setattr(t, name, Vector3()) for name in ('linear', 'angul')]": 'unknown-field',
+    "node.publish('level', round(m.pose.pose.position.x, 1))": 'field-type',
+    "node.publish('level', divmod(7, 3))": 'field-type',
+    "node.publish('level', 1 << 8)": 'field-range',
+    "node.publish('level', max(100, 256))": 'field-range',
+    "node.publish('level', sum([200, 100]))": 'field-range',
+    "node.publish('level', len('x' * 300))": 'field-range',
+    "node.publish('level', int('2' + '56'))": 'field-range',
+    "for level in (1, 256): node.publish('level', level)": 'field-range',
+    "node.publish('level', '1,2'.split(','))": 'field-type',
+    "node.publish('level', math.pi)": 'field-type',
+    "node.call('enable', sum([True, True]))": 'field-type',
+    "node.publish('cover', {'pose': {'covariance': ([0.0] * 36)[1:]}})": 'field-length',
+    "ranges = [1.0]; ranges.append('x'); node.publish('scan', {'ranges': ranges})": 'field-type',
+    # what is read of the items of arrays
+    'print(next(each for each in poses(node)).pos)': 'unknown-field',
+    'print([b.pos for a, b in itertools.pairwise(poses(node))])': 'unknown-field',
+    'print([b.pos for a, b in zip(poses(node), poses(node))])': 'unknown-field',
+    'print([each.pos for i, each in enumerate(poses(node), start=1)])': 'unknown-field',
+    'print([each.pos for each in reversed(poses(node))])': 'unknown-field',
+    'found = list(poses(node)); found.sort(key=lambda each: each.pos)': 'unknown-field',
+    'print(sorted(poses(node), key=lambda each: each.pos))': 'unknown-field',
+    'print(max(poses(node), key=lambda each: each.pose.position.x).pos)': 'unknown-field',
+    'print(functools.reduce(lambda total, each: total + each.pos, poses(node), 0))': 'unknown-field',
+    'print(list(filter(lambda each: each.pos, poses(node))))': 'unknown-field',
+    'print(list(map(lambda each: each.pos, poses(node))))': 'unknown-field',
+    'first, *rest = poses(node); print(first.pos)': 'unknown-field',
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
@@ -152,6 +203,17 @@ RIGHT = [
     'setattr(node.state, m.child_frame_id, 1); print(node.state.anything)',
     "node.logger.info('late', throttle_duration_sec=1.0)",
     "node.publish('scan', {'ranges': map(float, range(3))})",
+    "node.publish('level', round(m.pose.pose.position.x))",
+    "node.publish('level', round(m.pose.pose.position.x, None))",
+    "names = ['comand', 'command']; del names[0]; node.publish(names[0], {})",
+    "names = ['comand', 'command']; names.sort(reverse=True); node.publish(names[1][:3] + 'mand', {})",
+    "node.publish(*({'command': 1, 'comand': 2}.keys() - {'comand'}), {})",
+    "node.publish(max(['comand', 'command'], key=len), {})",
+    "parts = [m.child_frame_id]; node.publish(*parts, 'command')",
+    "for i in range(3):\n    if i == m.twist.twist.linear.x: break\nelse: node.publish('never', 1)",
+    'if m.__class__ in (Twist,): print(m.linear)',
+    "match 3:\n    case str(): node.publish('level', 'three')\n    case int(level): node.publish('level', level)",
+    "try: node.parameters.get(m)\nexcept AttributeError: pass\nelse: node.publish('never', 1)",
 ]
 
 
@@ -167,6 +229,21 @@ def check_line(check, line):
 def test_what_is_wrong_is_found_in_its_line(check, line, rule):
     number, found = check_line(check, line)
     assert found == [(number, rule)]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('lines', 'mark'),
+    [
+        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of ASDICT'),
+        ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
+    ],
+)
+def test_a_field_is_found_where_it_is_written(check, lines, mark):
+    _, found = check_line(check, lines)
+    code = f'{HEAD}\n\ndef hear(node, m):\n    use(node)\n{indent(lines, "    ")}\n'
+    number = next(at for at, text in enumerate(code.splitlines(), 1) if text.endswith(mark))
+    assert found == [(number, 'unknown-field')]
 
 
 @pytest.mark.ros

@@ -136,6 +136,42 @@ def findings(fields, heard='nav_msgs/msg/Odometry'):
             '5000000000',
             None,
         ),
+        *(
+            (f'twist.linear.x: {code}', rule, part or code, message, None)
+            for code, rule, part, message in (
+                ('pose.pose.position.x.y', 'unknown-field', 'y', "float64 has no field 'y'"),
+                ('child_frame_id.fast()', 'unknown-field', 'fast', "string has no field 'fast'"),
+                (
+                    'header + 2',
+                    'bad-expression',
+                    '',
+                    "'+' does not take std_msgs/msg/Header and int",
+                ),
+                ('child_frame_id / 2', 'bad-expression', '', "'/' does not take string and int"),
+                ('-child_frame_id', 'bad-expression', '', "'-' does not take string"),
+                ('header.stamp.sec / 0', 'bad-expression', '', 'division by zero'),
+                (
+                    'header | sum',
+                    'bad-expression',
+                    '',
+                    "the filter 'sum' does not take std_msgs/msg/Header",
+                ),
+                (
+                    '1 if child_frame_id > 2 else 3',
+                    'bad-expression',
+                    '',
+                    'cannot compare string with int',
+                ),
+                (
+                    'child_frame_id.split(3)[0] | int',
+                    'bad-expression',
+                    '',
+                    "'split' does not take these arguments",
+                ),
+                ('header.stamp.sec()', 'bad-expression', '', 'int cannot be called'),
+                ('header[0]', 'bad-expression', '', 'std_msgs/msg/Header has no item 0'),
+            )
+        ),
     ],
 )
 def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
@@ -161,6 +197,18 @@ def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
         'header.stamp.sec: pose.pose.position.x | int',
         'header.stamp.sec: header.stamp.nanosec * 1000',
         'header.frame_id: header.frame_id ~ header.stamp.sec',
+        'header.frame_id: header.frame_id % header.stamp.sec',
+        'header.frame_id: "\'%s/%d\' % (child_frame_id, header.stamp.sec)"',
+        'header.frame_id: child_frame_id.split("/")[3] or "odom"',
+        'header.frame_id: child_frame_id[2:]',
+        'twist.linear.x: (pose.covariance * 2) | sum',
+        'twist.linear.x: pose.covariance[6:].size or 1',
+        'twist.linear.x: (pose.covariance | select("gt", 5) | first) + 2',
+        'twist.linear.x: 1 / (header.stamp.sec - 1)',
+        'twist.linear.x: 1 if header == twist.twist else 2',
+        'twist.linear.x: "([pose.pose, twist.twist] | map(attribute=\'position\') | first).x"',
+        'twist.linear.x: pose.pose.position["x"]',
+        'twist.linear.x: (child_frame_id and pose.pose.position.x) or 0',
     ],
 )
 def test_what_may_work_has_no_finding(fields):

@@ -155,7 +155,10 @@ def test_what_nodes_share_is_used_if_one_of_them_uses_it(check):
         ('int | str', 'three', True),
         ('int | None', 'three', False),
         ('Path', '3', True),
-        ('list[int]', '3', True),
+        ('list[int]', '3', False),
+        ('list[int]', '[3]', True),
+        ('list[int]', '[a]', False),
+        ('dict[str, int]', '[3]', False),
     ],
 )
 def test_a_constant_argument_is_of_the_annotated_type(check, annotation, value, fits):

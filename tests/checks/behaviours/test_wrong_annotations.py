@@ -176,7 +176,7 @@ def test_an_action_is_annotated_with_its_parts(check):
   a:
     actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do, accept: parts:take}}
     action_clients: {do: {type: test_msgs/action/Fibonacci, feedback: parts:feel, result: parts:end}}
-    on_start: parts:send
+    timers: {tick: {period: 1, behaviour: parts:send}}
 """
     code = """
         from collections.abc import Generator

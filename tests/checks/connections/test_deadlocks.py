@@ -86,6 +86,123 @@ def test_a_service_in_a_group_of_its_own_answers(check):
     assert deadlocks(check, nodes.replace(timer, same)) == [6]
 
 
+@pytest.mark.parametrize(
+    'body',
+    [
+        "if node.state.count > 3: node.call('set_it')",
+        "if not node.own_state.get('seen'): return\n            node.call('set_it')",
+        "try: float(node.name)\n            except ValueError: node.call('set_it')",
+        "try: node.call('set_it')\n            except Exception: node.logger.warning('late')",
+        "node.call('set_it' if node.now().nanoseconds % 2 else 'too')",
+        "for name in ('set_it', 'too'): node.call(name)",
+    ],
+)
+def test_a_wait_on_a_condition_of_the_running_system_never_gets_an_answer(check, body):
+    code = f"""
+        def set_it(node, request): ...
+
+        def tick(node):
+            {body}
+            node.state.count += 1
+
+        def use(node, request):
+            node.call('too')
+            node.call('set_it')
+    """
+    more = ALONE.replace(
+        '{set_it: std', '{too: {type: std_srvs/srv/SetBool, service: set_it}, set_it: std'
+    )
+    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n    state: {count: 0}\n'
+    assert check(more + timer, code, installed=False)[-1:] == [(6, 'service-deadlock')]
+
+
+def test_one_of_several_names_may_be_the_right_one(check):
+    code = """
+        def set_it(node, request): ...
+
+        def tick(node):
+            node.call('set_it' if node.now().nanoseconds % 2 else 'other')
+    """
+    other = '{other: {type: std_srvs/srv/SetBool, external: true}, set_it: std'
+    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n'
+    assert check(ALONE.replace('{set_it: std', other) + timer, code, installed=False) == []
+
+
+ACTION = """
+  a:
+    action_clients: {count: test_msgs/action/Fibonacci}
+    actions: {count: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
+"""
+GOALS = """
+    def do(node, goal):
+        return node.send_goal('count', goal).result()
+
+    def do_later(node, goal):
+        node.send_goal('count', goal)
+
+    def take(node, goal):
+        node.send_goal('count', goal)
+
+    def send(node):
+        node.send_goal('count', 1)
+
+    def wait(node):
+        node.send_goal('count', 1).result()
+
+    def answer(node, request): ...
+
+    def ask(node, goal):
+        node.call('answer')
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('rest', 'count'),
+    [
+        ('    on_start: parts:send\n', 1),
+        ('    on_stop: parts:send\n', 1),
+        ('    timers: {tick: {period: 1, behaviour: parts:wait}}\n', 0),
+    ],
+)
+def test_an_action_takes_goals_between_start_and_stop(check, rest, count):
+    assert len(check(ACTION + rest, GOALS, rule='service-deadlock')) == count
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('server', 'message'),
+    [
+        ('behaviour: parts:do', None),
+        ('behaviour: parts:do, concurrency: queue', 'the end of a goal of action'),
+        ('behaviour: parts:do_later, concurrency: queue', None),
+        ('behaviour: parts:do, accept: parts:take', "action 'count' (accept)"),
+    ],
+)
+def test_a_goal_may_not_wait_for_what_waits_for_it(check, server, message):
+    nodes = ACTION.replace('behaviour: parts:do', server)
+    found = check(nodes, GOALS, rule='service-deadlock')
+    assert len(found) == (message is not None)
+    assert not message or message in found[0]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(('group', 'count'), [('', 1), (', group: other', 0)])
+@pytest.mark.parametrize(('timer', 'waits'), [('wait', 1), ('send', 0)])
+def test_a_goal_that_asks_the_group_of_who_waits_for_it_never_ends(
+    check, group, count, timer, waits
+):
+    nodes = (
+        ACTION.replace('parts:do', 'parts:ask')
+        + f"""
+    timers: {{tick: {{period: 1, behaviour: parts:{timer}}}}}
+    service_clients: {{answer: std_srvs/srv/Trigger}}
+    services: {{answer: {{type: std_srvs/srv/Trigger, behaviour: parts:answer{group}}}}}
+"""
+    )
+    assert len(check(nodes, GOALS, rule='service-deadlock')) == count * waits
+
+
 def ring(*names, behaviour='relay', groups=None):
     """Return nodes each of which asks the next to answer."""
     nodes = ''
@@ -166,6 +283,30 @@ def test_on_start_may_ask_nodes_that_have_started(check):
     assert deadlocks(check, client + server) == []
     assert deadlocks(check, starting + client) == []
     assert deadlocks(check, client + starting) == [5]
+
+
+@pytest.mark.parametrize(
+    ('client', 'server', 'is_deadlock'),
+    [
+        ('', 'wait_for: {node: client}', True),
+        ('', 'wait_for: {topic: elsewhere}', True),
+        ('wait_for: {node: server}', 'on_start: parts:ask_if', False),
+        ('wait_for: {topic: elsewhere}', 'on_start: parts:ask_if', False),
+        ('wait_for: {topic: elsewhere}', 'wait_for: {topic: elsewhere}', False),
+        ('wait_for: {topic: elsewhere}', 'wait_for: {node: client}', True),
+    ],
+)
+def test_nodes_with_wait_for_start_after_all_others(check, client, server, is_deadlock):
+    nodes = f"""
+  client:
+    service_clients: {{set_it: std_srvs/srv/SetBool}}
+    on_start: parts:ask
+    {client}
+  server:
+    services: {{set_it: {{type: std_srvs/srv/SetBool, behaviour: parts:set_it}}}}
+    {server}
+"""
+    assert bool(deadlocks(check, nodes)) == is_deadlock
 
 
 @pytest.mark.ros
