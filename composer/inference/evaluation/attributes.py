@@ -22,6 +22,7 @@ from composer.inference.values import (
     Constant,
     External,
     Generated,
+    Held,
     Instance,
     Mapping,
     Message,
@@ -29,6 +30,7 @@ from composer.inference.values import (
     NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     ProjectModule,
     Scalar,
     Sequence,
@@ -142,6 +144,7 @@ class Attributes(Part):
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
+                self._evaluator.run.moves += name in owner.attributes
                 return (
                     owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
                 )
@@ -152,6 +155,8 @@ class Attributes(Part):
                 return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
+            case Primitive():
+                return BoundMethod(owner, name)
             case Awaitable():
                 if name in _COROUTINE or name.startswith('cr_'):
                     return UNKNOWN
@@ -189,6 +194,8 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
+                if run.probed is not None:
+                    run.probed.add(Held('state', name))
                 return self._evaluator.kept.get(name, Unknown(BY_STATE))
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
@@ -356,6 +363,7 @@ class Attributes(Part):
         match owner:
             case PartOfNode(name='state'):
                 run.reading.state_set.add(name)
+                self._evaluator.waiting.fill(Held('state', name))
                 self._evaluator.keep(name, value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)

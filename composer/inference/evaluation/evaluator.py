@@ -18,6 +18,7 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
@@ -40,12 +41,14 @@ from composer.inference.values import (
     Constant,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
     NodeValue,
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Unknown,
@@ -92,6 +95,7 @@ class Evaluator:
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.waiting = Waiting(self)
         self.call_places: list[Place] = []
         self.kept: dict[str, Value] = {}
 
@@ -120,6 +124,8 @@ class Evaluator:
             message = f"'{name}' is not defined"
             self.run.report('undefined-name', place, message, suggest(name, known))
             return UNKNOWN
+        if self.run.probed is not None and name in modules.top(scope.module).changed:
+            self.run.probed.add(Held(str(scope.module.path), name))
         return self.top_value(scope.module, name)
 
     def top_value(self, module: ModuleSource, name: str) -> Value:
@@ -285,6 +291,10 @@ class Evaluator:
                 self.run.reading.is_state_open = True
             case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
                 self._escape_method(value)
+            case Primitive():
+                value.is_lost = True
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                owner.is_lost |= name not in WAITING.get(owner.kind, ())
             case Mapping() | Sequence() if not value.is_lost:
                 value.is_lost = True
                 held = value.entries.values() if isinstance(value, Mapping) else value.items
