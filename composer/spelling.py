@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import heapq
 from collections import Counter
 from functools import lru_cache
@@ -80,6 +79,9 @@ def _find_nearest(word: str, choices: frozenset[str]) -> str | None:
     lowered = _lower(choices)
     if word in lowered:
         return lowered[word]
+    # Most files have nothing misspelt.
+    import difflib
+
     close = difflib.get_close_matches(word, _preselect(word, choices), n=5, cutoff=0.6)
     if not close:
         return None

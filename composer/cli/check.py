@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from typing import TYPE_CHECKING
 
 import click
@@ -87,8 +86,6 @@ def check(words: Sequence[str], options: CheckOptions) -> int:
         ComposerError: The report cannot be written, or there is no type checker.
     """
     _refuse_contradictions(options)
-    # What is read lives until the end: to look for garbage as often as usual takes a fifth more.
-    gc.set_threshold(50_000)
     report = _inspect(words, options)
     _show(report, options)
     if options.expected:

@@ -5,6 +5,7 @@ Each command is implemented in a file of its own, imported when the command runs
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 
 import click
@@ -26,6 +27,9 @@ from composer.terminal import escape
 
 # What `check --types` can be followed by.
 TYPE_CHECKERS = ('mypy', 'pyright')
+# What a check imports and reads lives until its end: to look for garbage in it as often as usual
+# takes a fifth more.
+_OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
 
@@ -200,6 +204,7 @@ def check_command(  # noqa: PLR0913 - one for each option
     quoted pattern, or - for standard input. Of several files, one without 'version:' is a layer
     of the one before it.
     """
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     from composer.cli.check import CheckOptions, check
 
     # The name of a type checker is a word of its own: the option works without.

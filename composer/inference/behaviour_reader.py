@@ -152,6 +152,7 @@ class BehaviourReader:
                 self._mentions[key] = find_mentions(module, self._modules.followed)
             found.names |= self._mentions[key].names
             found.open_kinds |= self._mentions[key].open_kinds
+            found.attributes |= self._mentions[key].attributes
         return found
 
     def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:

@@ -308,6 +308,35 @@ class ProjectModule:
     module: ModuleSource
 
 
+@dataclass(slots=True, eq=False)
+class Primitive:
+    """Something that threads wait for, such as an event, a queue or a lock; or a thread.
+
+    Attributes:
+        kind: The full name of its class.
+        origin: Where it is made.
+        target: What a thread runs.
+        is_lost: Whether something unknown may bring about what is waited for.
+    """
+
+    kind: str
+    origin: Place
+    target: Any = None
+    is_lost: bool = False
+
+
+@record
+class Held:
+    """A name of `node.state`, of a module, or what is kept there.
+
+    Attributes:
+        kind: The class of what is kept; `state` for the name itself, or the file of the module.
+    """
+
+    kind: str
+    name: str
+
+
 @record
 class Never:
     """What a call gives that always raises.
@@ -387,6 +416,7 @@ Value: TypeAlias = (
     | Super
     | Partial
     | ProjectModule
+    | Primitive
     | Never
     | Alternatives
 )

@@ -21,6 +21,7 @@ from composer.inference.values import (
     Constant,
     External,
     Generated,
+    Held,
     Instance,
     Mapping,
     Message,
@@ -28,6 +29,7 @@ from composer.inference.values import (
     NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     ProjectModule,
     Scalar,
     Sequence,
@@ -147,6 +149,7 @@ class Attributes(Part):
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance():
+                self._evaluator.run.moves += name in owner.attributes
                 return (
                     owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
                 )
@@ -157,6 +160,8 @@ class Attributes(Part):
                 return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
+            case Primitive():
+                return BoundMethod(owner, name)
             case Awaitable():
                 if name in _COROUTINE or name.startswith('cr_'):
                     return UNKNOWN
@@ -194,6 +199,8 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
+                if run.probed is not None:
+                    run.probed.add(Held('state', name))
                 return self._evaluator.kept_value(name)
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
@@ -363,6 +370,7 @@ class Attributes(Part):
         match owner:
             case PartOfNode(name='state'):
                 run.reading.state_set.add(name)
+                self._evaluator.waiting.fill(Held('state', name))
                 self._evaluator.keep(name, value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)

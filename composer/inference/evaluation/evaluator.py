@@ -18,12 +18,14 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
+from composer.inference.statements.registries import Registries
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
@@ -40,6 +42,7 @@ from composer.inference.values import (
     Constant,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
     Message,
@@ -47,6 +50,7 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Unknown,
@@ -81,6 +85,7 @@ class Evaluator:
         self.loops = Loops(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
+        self.registries = Registries(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
@@ -92,6 +97,7 @@ class Evaluator:
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.waiting = Waiting(self)
         self.call_places: list[Place] = []
         self.kept: dict[str, Value] = {}
 
@@ -120,11 +126,19 @@ class Evaluator:
             message = f"'{name}' is not defined"
             self.run.report('undefined-name', place, message, suggest(name, known))
             return UNKNOWN
+        if self.run.probed is not None and name in modules.top(scope.module).changed:
+            self.run.probed.add(Held(str(scope.module.path), name))
         return self.top_value(scope.module, name)
 
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
         self.run.reading.modules.setdefault(id(module), module)
+        home = self.run.modules.star_home(module, name)
+        if home is not None:
+            return self.top_value(home, name)
+        registry = self.registries.find(module, name)
+        if registry is not None:
+            return registry
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
@@ -286,6 +300,10 @@ class Evaluator:
                 self.run.reading.is_state_open = True
             case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
                 self._escape_method(value)
+            case Primitive():
+                value.is_lost = True
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                owner.is_lost |= name not in WAITING.get(owner.kind, ())
             case Mapping() | Sequence() if not value.is_lost:
                 value.is_lost = True
                 held = value.entries.values() if isinstance(value, Mapping) else value.items

@@ -283,7 +283,7 @@ KEPT = """
         ('state.last = m', 'state.last.positon', 'unknown-field'),
         ('state.last = m', 'state.last and node.state.last.pose.positon', 'unknown-field'),
         ('state.last = node.now()', '(node.now() - node.state.last).seconds', 'unknown-attribute'),
-        ('state.last = m if m.pose else node.now()', 'state.last.nanoseconds', None),
+        ('state.last = m if m.child_frame_id else node.now()', 'state.last.nanoseconds', None),
         ('state.count = m', 'state.count.positon', None),
         ('state.last = m; setattr(node.state, str(m), 3)', 'state.last.positon', None),
         ('state.last = m; node.state.last += 1', 'state.last.positon', None),
