@@ -7,6 +7,7 @@ import operator
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
+    AGAIN,
     UNKNOWN,
     Constant,
     Instance,
@@ -93,6 +94,10 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     if isinstance(left, PartOfNode) and isinstance(right, PartOfNode):
         is_difference = left.name == right.name == 'time' and isinstance(sign, ast.Sub)
         return PartOfNode('duration') if is_difference else UNKNOWN
+    if AGAIN in (left, right) and isinstance(sign, ast.Add):
+        other = right if left == AGAIN else left
+        if isinstance(other, Sequence) and not other.is_lost:
+            return Sequence(list(other.items), other.kind, is_open=True)
     if isinstance(left, Sequence):
         return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))
