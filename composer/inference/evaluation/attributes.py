@@ -148,6 +148,8 @@ class Attributes(Part):
                 return self._evaluator.imports.external(f'{owner.name}.{name}', place)
             case ProjectModule():
                 return self._read_module(owner, name)
+            case Instance() if name in ('_asdict', '_replace'):
+                return BoundMethod(owner, name)
             case Instance():
                 self._evaluator.run.moves += name in owner.attributes
                 return (

@@ -9,6 +9,7 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from composer.inference.classes.made_records import MadeRecords
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.library.iterable_calls import IterableCalls
 from composer.inference.evaluation.library.known_functions import (
@@ -83,6 +84,7 @@ class LibraryCalls(Part):
             'functools.partial': self._partial,
             **self.iterables.handlers(),
             **self.mappings.handlers(),
+            **MadeRecords(evaluator).handlers(),
         }
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
