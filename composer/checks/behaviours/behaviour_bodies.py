@@ -8,7 +8,6 @@ from composer.checks.behaviours.behaviour_functions import is_called_wrongly
 from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.bindings import node_bindings
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import find_nearest, is_typo, suggest
@@ -36,7 +35,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in node_bindings(node)
+            for binding in context.bindings[node.key]
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
@@ -205,6 +204,4 @@ def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec 
 
 
 def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return any(
-        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
-    )
+    return any(each.reaches_ros for each in context.readings(node))
