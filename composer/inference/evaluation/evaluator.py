@@ -25,6 +25,7 @@ from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
+from composer.inference.statements.registries import Registries
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
@@ -82,6 +83,7 @@ class Evaluator:
         self.loops = Loops(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
+        self.registries = Registries(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
@@ -129,6 +131,12 @@ class Evaluator:
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
         self.run.reading.modules.setdefault(id(module), module)
+        home = self.run.modules.star_home(module, name)
+        if home is not None:
+            return self.top_value(home, name)
+        registry = self.registries.find(module, name)
+        if registry is not None:
+            return registry
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
