@@ -148,7 +148,7 @@ def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):
         (['robot.yaml', 'site.yaml'], {'Small', 'Added'}),
         (['robot.yaml', 'name:=large'], {'Large'}),
         (['robot.yaml', 'site.yaml', 'large'], {'Large', 'Added'}),
-        (['robot.yaml', '--set', 'nodes.other.on_start=go:go'], {'Small', 'Other'}),
+        (['robot.yaml', '--set', 'args.name=large'], {'Large'}),
     ],
 )
 def test_the_nodes_are_those_that_the_command_line_gives(tmp_path, monkeypatch, words, names):
@@ -158,7 +158,7 @@ def test_the_nodes_are_those_that_the_command_line_gives(tmp_path, monkeypatch, 
     (tmp_path / 'site.yaml').write_text('nodes: {added: {on_start: go:go}}\n')
     assert cli.run(['stubs', *words]) == 0
     text = (tmp_path / 'typings' / 'composer_stubs' / 'robot.py').read_text()
-    known = {'Small', 'Large', 'Added', 'Other'}
+    known = {'Small', 'Large', 'Added'}
     assert {each for each in known if each in text} == names
 
 
