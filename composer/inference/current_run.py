@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from composer.inference.message_types import MessageTypes
     from composer.inference.module_names import ProjectModules
     from composer.inference.node_facts import NodeFacts
-    from composer.inference.values import Argument, Value
+    from composer.inference.reading import Awaited
+    from composer.inference.values import Argument, Primitive, Value
 
 # What one behaviour may take: statements and expressions, helpers included.
 _MOST_STEPS = 60_000
@@ -40,6 +41,10 @@ class Run:
         conditions: The number of conditions around it.
         dead_branches: The number of branches around it that the file never takes.
         tried: How often something was read that is right or wrong by what the file says.
+        waits: Whether who calls the behaviour waits for the function under way.
+        held_locks: The locks that are held, and where they were taken.
+        probed: The names that a condition hangs on, while one is looked at.
+        moves: How often something was read that changes by itself.
         is_silent: Whether the place is read once more later.
         is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
@@ -59,6 +64,10 @@ class Run:
         self.conditions = 0
         self.dead_branches = 0
         self.tried = 0
+        self.waits = True
+        self.held_locks: list[tuple[Primitive, Place]] = []
+        self.probed: set[Awaited] | None = None
+        self.moves = 0
         self.is_silent = False
         self.is_at_top = False
         self.steps = 0

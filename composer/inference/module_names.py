@@ -29,6 +29,7 @@ class TopNames:
     def __init__(self, body: Iterable[ast.stmt]) -> None:
         self.statements: dict[str, list[tuple[ast.AST, bool]]] = {}
         self.is_open = False
+        self.stars: list[ast.ImportFrom] = []
         self._body = list(body)
         pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(self._body)]
         while pending:
@@ -45,7 +46,10 @@ class TopNames:
             self.is_open |= statement.name == '__getattr__'
         elif isinstance(statement, ast.Import | ast.ImportFrom):
             for alias in statement.names:
-                self.is_open |= alias.name == '*'
+                if alias.name == '*' and isinstance(statement, ast.ImportFrom):
+                    self.is_open = True
+                    self.stars.append(statement)
+                    continue
                 yield alias.asname or alias.name.partition('.')[0]
         elif isinstance(statement, ast.ExceptHandler):
             yield from filter(None, [statement.name])
@@ -137,6 +141,21 @@ class ProjectModules:
         self._names.setdefault(id(module), name)
         self._read[id(module)] = module
         return module
+
+    def star_home(self, module: ModuleSource, name: str) -> ModuleSource | None:
+        """Return the module whose name a star import brings; `None` if none is known to."""
+        top = self.top(module)
+        if name in top.statements or name.startswith('_'):
+            return None
+        for statement in reversed(top.stars):
+            home = self.find(self.imported(module, statement, '*').removesuffix('.*'))
+            if home is None or home is module:
+                return None
+            if name in self.top(home).statements:
+                return home
+            if self.top(home).is_open:
+                return self.star_home(home, name)
+        return None
 
     def public_names(self, name: str) -> list[str]:
         """Return the names that a module lists in its `__all__`."""

@@ -92,9 +92,14 @@ class MessageClass:
 
 @record
 class ArrayField:
-    """The value of a field that is an array."""
+    """The value of a field that is an array.
+
+    Attributes:
+        is_made: As that of `Message`.
+    """
 
     type: FieldType
+    is_made: bool = False
 
 
 @record
@@ -303,9 +308,44 @@ class ProjectModule:
     module: ModuleSource
 
 
+@dataclass(slots=True, eq=False)
+class Primitive:
+    """Something that threads wait for, such as an event, a queue or a lock; or a thread.
+
+    Attributes:
+        kind: The full name of its class.
+        origin: Where it is made.
+        target: What a thread runs.
+        is_lost: Whether something unknown may bring about what is waited for.
+    """
+
+    kind: str
+    origin: Place
+    target: Any = None
+    is_lost: bool = False
+
+
+@record
+class Held:
+    """A name of `node.state`, of a module, or what is kept there.
+
+    Attributes:
+        kind: The class of what is kept; `state` for the name itself, or the file of the module.
+    """
+
+    kind: str
+    name: str
+
+
 @record
 class Never:
-    """What a call gives that always raises."""
+    """What a call gives that always raises.
+
+    Attributes:
+        is_again: Whether it is only not known yet: a call of a function in that function.
+    """
+
+    is_again: bool = False
 
 
 @record
@@ -376,6 +416,7 @@ Value: TypeAlias = (
     | Super
     | Partial
     | ProjectModule
+    | Primitive
     | Never
     | Alternatives
 )
@@ -386,6 +427,7 @@ BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
+AGAIN = Never(is_again=True)
 CHOSEN = Unknown(BY_PARAMETER)
 NODE = NodeValue()
 NONE = Constant(type(None), None)
@@ -401,13 +443,19 @@ def alternatives(value: Value) -> tuple[Value, ...]:
     return value.values if isinstance(value, Alternatives) else (value,)
 
 
-def join(values: Iterable[Value]) -> Value:
-    """Return the value that is one of several."""
+def join(values: Iterable[Value], *, like: Value | None = None) -> Value:
+    """Return the value that is one of several.
+
+    Args:
+        like: Of what they are a part; one expression chooses between them if it does there.
+    """
     found: dict[Value, None] = {}
     for value in values:
         found.update(dict.fromkeys(alternatives(value)))
     if len(found) > 1:
         found.pop(NEVER, None)
+    if len(found) > 1:
+        found.pop(AGAIN, None)
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
@@ -417,7 +465,7 @@ def join(values: Iterable[Value]) -> Value:
         # Of what may be called, something is known still.
         called = [each for each in found if isinstance(each, Function | Partial | Class)]
         return Alternatives((unknown, *called)) if called else unknown
-    return Alternatives(tuple(found))
+    return Alternatives(tuple(found), isinstance(like, Alternatives) and like.is_direct)
 
 
 def is_none(value: Value) -> bool:

@@ -98,8 +98,8 @@ def _check_state(
 
 def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
-    for owner in dict.fromkeys(_owner_of(binding) for binding, _ in readings):
-        own = [(binding, reading) for binding, reading in readings if _owner_of(binding) == owner]
+    for owner in dict.fromkeys(binding.own_state_of for binding, _ in readings):
+        own = [each for each in readings if each[0].own_state_of == owner]
         if any(reading.is_own_state_open for _, reading in own):
             continue
         known = set().union(*(reading.own_state_set for _, reading in own))
@@ -114,10 +114,6 @@ def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diag
                     help=suggest(use.name, known, 'there are', 'set it first, or read it by get'),
                     related=[bound_at(context, binding)],
                 )
-
-
-def _owner_of(binding: Binding) -> object:
-    return binding.entity.path if binding.entity is not None else binding.key.key
 
 
 def _check_remote_parameters(

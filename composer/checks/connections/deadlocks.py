@@ -91,7 +91,7 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
         for binding in context.bindings[node.key]:
             if context.was_dropped(binding.behaviour.path):
                 continue
-            group = _group_in(node, binding)
+            group = group_in(node, binding)
             for use in _waiting_uses(context, node, binding):
                 ends = [
                     servers.get((KIND_OF_NOUN[use.kind].section, node.full_name, name))
@@ -151,7 +151,7 @@ def _need(server: Endpoint, waited: Waited) -> Group | None:
     return _group_of(server.node, getattr(server.entity, 'group', None))
 
 
-def _group_in(node: NodeSpec, binding: Binding) -> Group | None:
+def group_in(node: NodeSpec, binding: Binding) -> Group | None:
     """Return the mutually exclusive group that a behaviour runs in, if there is one."""
     if isinstance(binding.entity, ActionSpec):
         if binding.key.key == 'accept':

@@ -24,6 +24,7 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Value,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 # What an object keeps, wherever else something is stored in it.
 _LASTING = (
+    Primitive,
     *(NodeValue, PartOfNode, BoundMethod, Function, Instance, Class, MessageClass, Partial),
 )
 

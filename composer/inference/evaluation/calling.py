@@ -29,6 +29,7 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Super,
     Unknown,
@@ -65,6 +66,8 @@ class Calls(Part):
             if name is None or not isinstance(name.value, Constant):
                 self._evaluator.run.reading.open_kinds.add(SENDING_METHODS[method])
         self._evaluator.call_places.append(place)
+        if isinstance(function, Unknown):
+            self._note_wait(node, arguments, scope)
         try:
             return join(
                 self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
@@ -72,6 +75,16 @@ class Calls(Part):
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _note_wait(self, node: ast.Call, arguments: Arguments, scope: Scope) -> None:
+        """Note a call of a method of what is kept in the state: `node.state.event.wait()`."""
+        match node.func:
+            case ast.Attribute(value=ast.Attribute(value=owner, attr=name), attr=method):
+                with self._evaluator.run.silence():
+                    is_state = self._evaluator.evaluate(owner, scope) == PartOfNode('state')
+                if is_state:
+                    place = Place(scope.module, node)
+                    self._evaluator.waiting.call_held(name, method, arguments, place)
 
     def _note_keys(self, function: Value, arguments: Arguments) -> None:
         """Note that arguments decide which attribute or entry of a table is meant."""
@@ -134,7 +147,10 @@ class Calls(Part):
             is_awaited: Whether its result is awaited at once.
         """
         match function:
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                return self._evaluator.waiting.call(owner, name, arguments, place)
             case BoundMethod(owner=owner, name=name) if owner == NODE:
+                self._evaluator.run.moves += 1
                 self._fits('node', name, arguments, place)
                 return self._evaluator.node_calls.call(
                     name, arguments, waits=waits, is_awaited=is_awaited
@@ -178,6 +194,7 @@ class Calls(Part):
                 return self._evaluator.library.call(function.name, arguments, place)
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
+        self._evaluator.run.moves += 1
         self.escape_all(arguments)
         return CHOSEN if is_chosen(function) or are_chosen(arguments) else UNKNOWN
 

@@ -18,18 +18,21 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
+from composer.inference.statements.registries import Registries
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
     BY_STATE,
     CHOSEN,
     NODE,
+    NONE,
     UNKNOWN,
     Alternatives,
     ArrayField,
@@ -39,12 +42,15 @@ from composer.inference.values import (
     Constant,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
+    Message,
     NodeValue,
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Unknown,
@@ -79,6 +85,7 @@ class Evaluator:
         self.loops = Loops(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
+        self.registries = Registries(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
@@ -90,6 +97,7 @@ class Evaluator:
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.waiting = Waiting(self)
         self.call_places: list[Place] = []
         self.kept: dict[str, Value] = {}
 
@@ -118,11 +126,19 @@ class Evaluator:
             message = f"'{name}' is not defined"
             self.run.report('undefined-name', place, message, suggest(name, known))
             return UNKNOWN
+        if self.run.probed is not None and name in modules.top(scope.module).changed:
+            self.run.probed.add(Held(str(scope.module.path), name))
         return self.top_value(scope.module, name)
 
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
         self.run.reading.modules.setdefault(id(module), module)
+        home = self.run.modules.star_home(module, name)
+        if home is not None:
+            return self.top_value(home, name)
+        registry = self.registries.find(module, name)
+        if registry is not None:
+            return registry
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
@@ -203,7 +219,7 @@ class Evaluator:
     def _item_of(self, value: Value) -> Value:
         match value:
             case ArrayField():
-                return item_of(value.type)
+                return item_of(value.type, is_made=value.is_made)
             case Sequence():
                 return value.item()
             case Generated():
@@ -255,11 +271,18 @@ class Evaluator:
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
+        kept = self.run.reading.kept
+        found = join(map(_lasting, alternatives(value)))
+        kept[name] = join([kept[name], found]) if name in kept else found
         if isinstance(value, Instance) and not value.is_member:
             value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
+
+    def kept_value(self, name: str) -> Value:
+        """Return what is kept under a name in `node.state`; `[name]` is of `node.own_state`."""
+        return self.kept[name] if name in self.kept else self.run.facts.kept_value(name)
 
     def escape(self, value: Value) -> None:
         """Note that something unknown has a value: it may change it, or call it."""
@@ -277,6 +300,10 @@ class Evaluator:
                 self.run.reading.is_state_open = True
             case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
                 self._escape_method(value)
+            case Primitive():
+                value.is_lost = True
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                owner.is_lost |= name not in WAITING.get(owner.kind, ())
             case Mapping() | Sequence() if not value.is_lost:
                 value.is_lost = True
                 held = value.entries.values() if isinstance(value, Mapping) else value.items
@@ -297,3 +324,15 @@ class Evaluator:
             self.run.reading.open_kinds.add(kind)
         elif method.name == 'get_parameters':
             self.run.reading.reads_others = True
+
+
+def _lasting(value: Value) -> Value:
+    """Return what of a value holds in other calls, too."""
+    match value:
+        case Message():
+            return Message(value.type, is_made=True)
+        case Constant(value=None):
+            return NONE
+        case PartOfNode(name='time' | 'goal'):
+            return value
+    return UNKNOWN

@@ -9,6 +9,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.values import (
+    AGAIN,
     NEVER,
     NONE,
     UNKNOWN,
@@ -134,12 +135,14 @@ class Functions(Part):
         """Return what a call of a function may return, and read what it does."""
         function.is_read = True
         key = self._key_of(function, arguments, waits=waits)
-        if key is not None and key in self._results:
+        if key is not None and key in self._results and self._evaluator.run.probed is None:
             self._evaluator.run.tried += 1
             return self._results[key]
         if function.definition in self.active or len(self.active) >= _DEEPEST:
             self._evaluator.calls.escape_all(arguments)
-            return UNKNOWN
+            # What a call of itself gives, the other ways through it give, too.
+            is_plain = self.kind_of(function) is FunctionKind.PLAIN
+            return AGAIN if is_plain and function.definition in self.active else UNKNOWN
         if not self.fits(function, arguments):
             return UNKNOWN
         scope = self.enter(function, arguments, waits=waits)
@@ -181,6 +184,7 @@ class Functions(Part):
             bool(run.guards),
             run.is_silent,
             waits,
+            tuple(id(lock) for lock, _ in run.held_locks),
             arguments.is_open,
         )
         owner: object = function.owner
@@ -202,6 +206,7 @@ class Functions(Part):
         self._evaluator.run.modules.followed.add(id(definition))
         run = self._evaluator.run
         doubts = run.doubts, run.state_doubts
+        before, run.waits = run.waits, waits
         try:
             if isinstance(definition, ast.Lambda):
                 value = self._evaluator.evaluate(definition.body, scope)
@@ -218,6 +223,7 @@ class Functions(Part):
                     self.follow_later(inner)
                     self._evaluator.run.doubts -= 1
         finally:
+            run.waits = before
             run.doubts, run.state_doubts = doubts
             self.active.pop()
         return scope

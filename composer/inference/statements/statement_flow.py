@@ -21,6 +21,7 @@ from composer.inference.values import (
     Constant,
     Function,
     Generated,
+    Held,
     Mapping,
     PartOfNode,
     Place,
@@ -75,6 +76,8 @@ class Statements(Part):
         """Store a value, in a name or in something."""
         match target:
             case ast.Name():
+                if scope.function is not None and target.id not in scope.local:
+                    self._evaluator.waiting.fill(Held(str(scope.module.path), target.id))
                 scope.set(target.id, value)
             case ast.Starred():
                 self.store(target.value, UNKNOWN, scope)
@@ -122,10 +125,16 @@ class Statements(Part):
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
+                self._evaluator.keep(node.target.attr, UNKNOWN)
+                self._evaluator.waiting.fill(Held('state', node.target.attr))
                 return
         if isinstance(node.target, ast.Subscript):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('own_state'):
+                index = self._evaluator.evaluate(node.target.slice, scope)
+                for each in alternatives(index):
+                    if isinstance(each, Constant):
+                        self._evaluator.keep(f'[{each.value}]', UNKNOWN)
                 return
         is_union = isinstance(node.op, ast.BitOr)
         if isinstance(before, Mapping) and isinstance(value, Mapping) and is_union:
@@ -327,11 +336,14 @@ class Statements(Part):
     _trystar = _try
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        locks = ExitStack()
         managers: list[Value] = []
         is_guard = False
         for item in node.items:
             value = self._evaluator.evaluate(item.context_expr, scope)
             managers.append(value)
+            place = Place(scope.module, item.context_expr)
+            locks.enter_context(self._evaluator.waiting.holding(value, place))
             entered = self._evaluator.entered(value)
             if item.optional_vars is not None:
                 self.store(item.optional_vars, entered, scope)
@@ -340,7 +352,7 @@ class Statements(Part):
         # What objects do at the end of it, they do on whatever the body raises.
         results = [self._evaluator.left(each) for each in managers]
         is_guard |= any(each is not None and truth_of(each) is not False for each in results)
-        with self._evaluator.run.guard(is_guard=is_guard):
+        with locks, self._evaluator.run.guard(is_guard=is_guard):
             self.follow_all(node.body, scope)
         if is_guard:
             scope.names = join_names([before, scope.names])

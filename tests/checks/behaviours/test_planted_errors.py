@@ -364,6 +364,42 @@ PLANTED = {
         def hear(node, m):
             Talker(node).drive({})
         """,
+    'a function that a decorator registers': """
+        ACTIONS = {}
+        def action(name):
+            def register(function):
+                ACTIONS[name] = function
+                return function
+            return register
+        @action('drive')
+        def drive(node):
+            node.publish('<comand|command>', {})
+        @action('lift')
+        def lift(node):
+            node.publish('level', 1)
+        def hear(node, m):
+            ACTIONS[m.child_frame_id](node)
+        """,
+    'a class that a decorator registers': """
+        TALKERS = []
+        def talker(cls):
+            TALKERS.append(cls)
+            return cls
+        @talker
+        class Talker:
+            def go(self, node):
+                node.publish('<comand|command>', {})
+        def hear(node, m):
+            for each in TALKERS:
+                each().go(node)
+        """,
+    'a table that is filled at the top': """
+        TOPICS = {}
+        TOPICS['drive'] = '<comand|command>'
+        TOPICS['lift'] = 'command'
+        def hear(node, m):
+            node.publish(TOPICS['drive'], {})
+        """,
     'an operator of the project': """
         class Output:
             def __init__(self, publish, name):

@@ -24,11 +24,13 @@ from composer.inference.evaluation.library.known_values import (
 from composer.inference.evaluation.library.mapping_calls import MappingCalls
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
+from composer.inference.evaluation.waiting import MADE
 from composer.inference.values import (
     BY_PARAMETER,
     CHOSEN,
     NONE,
     UNKNOWN,
+    Argument,
     Arguments,
     BoundMethod,
     Constant,
@@ -55,6 +57,8 @@ if TYPE_CHECKING:
 
 # Of more combinations of values, nothing is computed.
 _MOST_COMBINATIONS = 16
+# Functions in these return the same for the same arguments.
+_PURE = ('builtins.', 'math.', 'copy.', 'functools.', 'operator.')
 # `str.upper(text)` is `text.upper()`.
 _OF_TEXTS = 'builtins.str.'
 
@@ -83,6 +87,13 @@ class LibraryCalls(Part):
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Return what a call of a function may return, by its full name: `builtins.len`."""
+        if name in MADE:
+            return self._evaluator.waiting.make(name, arguments, place)
+        if name == 'time.sleep':
+            length = arguments.get(0, 'secs') or Argument(UNKNOWN, place)
+            self._evaluator.waiting.sleep(length, place)
+        elif not name.startswith(_PURE):
+            self._evaluator.run.moves += 1
         known = self._compute(name, arguments, place)
         if known is not None:
             return known
