@@ -78,7 +78,7 @@ def _note_unpublished(evaluator: Evaluator, scope: Scope, wire: Wire) -> None:
 def _is_made_there(node: ast.AST) -> bool:
     """Return whether an expression is a dictionary, or makes an object of a class."""
     called = node.func if isinstance(node, ast.Call) else None
-    name: str = getattr(called, 'id', None) or getattr(called, 'attr', '')
+    name = str(getattr(called, 'id', None) or getattr(called, 'attr', ''))
     return isinstance(node, ast.Dict) or name[:1].isupper()
 
 

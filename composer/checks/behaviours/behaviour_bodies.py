@@ -10,7 +10,6 @@ from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import PUBLISHED
-from composer.language.bindings import node_bindings
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import find_nearest, is_typo, suggest
@@ -40,7 +39,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in node_bindings(node)
+            for binding in context.bindings[node.key]
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
@@ -82,7 +81,7 @@ def _publishing_behaviours(context: CheckContext) -> set[str]:
     return {
         binding.behaviour.name
         for node in context.spec.nodes.values()
-        for binding in node_bindings(node)
+        for binding in context.bindings(node)
         if getattr(binding.entity, 'publish', None)
         or binding.key.returned not in (None, PUBLISHED)
     }
@@ -247,6 +246,4 @@ def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec 
 
 
 def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return any(
-        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
-    )
+    return any(each.reaches_ros for each in context.readings(node))
