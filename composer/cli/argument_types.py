@@ -130,7 +130,9 @@ def check_rule(
 
 
 def _folder_error(folder: str) -> UsageError:
-    from composer.cli.file_selection import list_systems
+    from composer.cli.file_selection import (
+        list_systems,
+    )
 
     systems = [escape(str(path)) for path in list_systems(Path(folder))]
     shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]

@@ -333,8 +333,8 @@ def graph_command(
     return graph(paths, arguments, set_values, format_name=format_name, output=output)
 
 
-@cli.command('stubs')
-@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+@cli.command('stubs', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
 @click.option(
     '--output',
     type=click.Path(path_type=Path, file_okay=False),
@@ -343,15 +343,18 @@ def graph_command(
     metavar='DIR',
     help='The folder to write them to.',
 )
-def stubs_command(files: tuple[Path, ...], output: Path) -> int:
-    """Write typed stubs of the messages and nodes of FILES.
+def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: Path) -> int:
+    """Write typed stubs of the messages and nodes of FILE.
+
+    Layers, arguments and --set are those of 'composer up'; without arguments and --set, several
+    files, folders and patterns may be named.
 
     Annotate a behaviour with the class of its node, as in `node: Governor` after
     `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
     """
     from composer.cli.editors import write_stubs
 
-    return write_stubs(files, output)
+    return write_stubs(words, set_values, output)
 
 
 @cli.command('new')

@@ -106,17 +106,17 @@ def value_of(field_type: FieldType, *, is_made: bool = False) -> Value:
     """
     if field_type.nested and not field_type.array:
         return Message(field_type.nested, is_made)
+    if field_type.array and (field_type.nested or not is_made):
+        return ArrayField(field_type, is_made)
     if is_made:
         return UNKNOWN
-    if field_type.array:
-        return ArrayField(field_type)
     return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
 
 
-def item_of(field_type: FieldType) -> Value:
+def item_of(field_type: FieldType, *, is_made: bool = False) -> Value:
     """Return what an item of an array is when it is read."""
     if field_type.nested:
-        return Message(field_type.nested)
+        return Message(field_type.nested, is_made)
     # NumPy's numbers come out of arrays of fixed length.
     if field_type.array == 'fixed' and field_type.kind not in ('string', 'wstring'):
         return UNKNOWN

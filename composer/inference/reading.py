@@ -10,7 +10,7 @@ from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
-    from composer.inference.values import Constant, Held, Primitive
+    from composer.inference.values import Constant, Held, Primitive, Value
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.
@@ -138,6 +138,8 @@ class Reading:
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
             are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
+        kept: What it keeps in `node.state`, and as `[name]` in `node.own_state`.
+        kept_read: The names of what it reads of these.
         remote_parameters: Parameters of nodes that it sets or reads by their names.
         blocks: What it waits for without an end.
         fills: What it brings about that others may wait for, and whether it does so itself: what
@@ -161,6 +163,8 @@ class Reading:
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
+    kept: dict[str, Value] = field(default_factory=dict)
+    kept_read: set[str] = field(default_factory=set)
     remote_parameters: list[RemoteParameter] = field(default_factory=list)
     blocks: list[Block] = field(default_factory=list)
     fills: dict[Awaited, set[bool]] = field(default_factory=dict)

@@ -92,9 +92,14 @@ class MessageClass:
 
 @record
 class ArrayField:
-    """The value of a field that is an array."""
+    """The value of a field that is an array.
+
+    Attributes:
+        is_made: As that of `Message`.
+    """
 
     type: FieldType
+    is_made: bool = False
 
 
 @record
@@ -342,7 +347,13 @@ class Held:
 
 @record
 class Never:
-    """What a call gives that always raises."""
+    """What a call gives that always raises.
+
+    Attributes:
+        is_again: Whether it is only not known yet: a call of a function in that function.
+    """
+
+    is_again: bool = False
 
 
 @record
@@ -424,6 +435,7 @@ BY_PARAMETER = 3
 
 UNKNOWN = Unknown()
 NEVER = Never()
+AGAIN = Never(is_again=True)
 CHOSEN = Unknown(BY_PARAMETER)
 NODE = NodeValue()
 NONE = Constant(type(None), None)
@@ -439,13 +451,19 @@ def alternatives(value: Value) -> tuple[Value, ...]:
     return value.values if isinstance(value, Alternatives) else (value,)
 
 
-def join(values: Iterable[Value]) -> Value:
-    """Return the value that is one of several."""
+def join(values: Iterable[Value], *, like: Value | None = None) -> Value:
+    """Return the value that is one of several.
+
+    Args:
+        like: Of what they are a part; one expression chooses between them if it does there.
+    """
     found: dict[Value, None] = {}
     for value in values:
         found.update(dict.fromkeys(alternatives(value)))
     if len(found) > 1:
         found.pop(NEVER, None)
+    if len(found) > 1:
+        found.pop(AGAIN, None)
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
@@ -455,7 +473,7 @@ def join(values: Iterable[Value]) -> Value:
         # Of what may be called, something is known still.
         called = [each for each in found if _is_acting(each)]
         return Alternatives((unknown, *called)) if called else unknown
-    return Alternatives(tuple(found))
+    return Alternatives(tuple(found), isinstance(like, Alternatives) and like.is_direct)
 
 
 def _is_acting(value: Value) -> bool:

@@ -51,7 +51,6 @@ def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
         given=type_of(key.given),
         yielded=type_of(key.yielded),
         returned=type_of(key.returned),
-        # Timers do not publish what a generator returns at its end.
-        ended=None if key.returned == PUBLISHED else type_of(key.returned),
+        ended=type_of(key.returned),
         needs_payload=key.returned not in (None, PUBLISHED),
     )

@@ -8,7 +8,6 @@ from composer.checks.behaviours.behaviour_functions import is_called_wrongly
 from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.bindings import node_bindings
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import find_nearest, is_typo, suggest
@@ -36,7 +35,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in node_bindings(node)
+            for binding in context.bindings[node.key]
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
@@ -99,8 +98,8 @@ def _check_state(
 
 def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
-    for owner in dict.fromkeys(_owner_of(binding) for binding, _ in readings):
-        own = [(binding, reading) for binding, reading in readings if _owner_of(binding) == owner]
+    for owner in dict.fromkeys(binding.own_state_of for binding, _ in readings):
+        own = [each for each in readings if each[0].own_state_of == owner]
         if any(reading.is_own_state_open for _, reading in own):
             continue
         known = set().union(*(reading.own_state_set for _, reading in own))
@@ -115,10 +114,6 @@ def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diag
                     help=suggest(use.name, known, 'there are', 'set it first, or read it by get'),
                     related=[bound_at(context, binding)],
                 )
-
-
-def _owner_of(binding: Binding) -> object:
-    return binding.entity.path if binding.entity is not None else binding.key.key
 
 
 def _check_remote_parameters(
@@ -205,6 +200,4 @@ def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec 
 
 
 def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return any(
-        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
-    )
+    return any(each.reaches_ros for each in context.readings(node))

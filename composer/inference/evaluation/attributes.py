@@ -11,7 +11,6 @@ from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
     BY_PARAMETER,
-    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -42,6 +41,7 @@ from composer.inference.values import (
     alternatives,
     constant,
     is_chosen,
+    is_none,
     join,
 )
 from composer.interfaces.field_errors import unknown_field
@@ -85,10 +85,12 @@ NAMES_OF_PART: dict[str, frozenset[str]] = {
         }
     ),
     'time': frozenset({'clock_type', 'from_msg', 'nanoseconds', 'seconds_nanoseconds', 'to_msg'}),
+    'duration': frozenset({'from_msg', 'get_c_duration', 'nanoseconds', 'to_msg'}),
     'goal': frozenset({'cancel', 'feedback', 'result', 'result_async', 'status'}),
 }
 _SHOWN_PARTS = {
     'logger': "the node's logger",
+    'duration': 'a duration',
     'time': 'a time',
     'goal': 'a goal',
     'own_state': 'own_state',
@@ -113,7 +115,10 @@ class Attributes(Part):
         """Return what an attribute may be; one that no alternative has is a problem."""
         found: list[Value] = []
         problem: tuple[str, str, str | None] | None = None
-        for each in alternatives(owner):
+        several = alternatives(owner)
+        # What may be None is read where it is something else.
+        values = [each for each in several if not is_none(each)] or several
+        for each in values:
             value = self._read(each, name, place)
             if isinstance(value, tuple):
                 problem = problem or value
@@ -202,7 +207,7 @@ class Attributes(Part):
                 run.use_state(name, place)
                 if run.probed is not None:
                     run.probed.add(Held('state', name))
-                return self._evaluator.kept.get(name, Unknown(BY_STATE))
+                return self._evaluator.kept_value(name)
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -218,6 +223,8 @@ class Attributes(Part):
             return Generated(Message(f'{owner.type}_Feedback') if owner.type else UNKNOWN, UNKNOWN)
         if name in ('status', 'name'):
             return Scalar(str)
+        if name == 'nanoseconds':
+            return Scalar(int)
         return BoundMethod(owner, name)
 
     def _read_message(
@@ -293,7 +300,7 @@ class Attributes(Part):
             else:
                 run.reading.is_own_state_open = True
             key = str(index.value) if isinstance(index, Constant) else ''
-            return self._evaluator.kept.get(f'[{key}]', Unknown(BY_STATE))
+            return self._evaluator.kept_value(f'[{key}]')
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []

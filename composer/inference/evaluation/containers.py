@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
+from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
 from composer.inference.values import (
     CHOSEN,
@@ -37,8 +40,8 @@ class Containers(Part):
                 return self._evaluator.node_calls.read_parameters(owner, name, arguments)
             case PartOfNode(name='own_state'):
                 return self._evaluator.node_calls.call_own_state(name, arguments)
-            case PartOfNode(name='time') if name == 'to_msg':
-                return Message('builtin_interfaces/msg/Time')
+            case PartOfNode(name='time' | 'duration' as part) if name == 'to_msg':
+                return Message(f'builtin_interfaces/msg/{part.title()}')
             case PartOfNode(name='logger') if name == 'get_child':
                 return owner
             case Mapping() | Sequence() | Constant() | Scalar() | Instance():
@@ -62,14 +65,30 @@ class Containers(Part):
 
     def update_mapping(self, owner: Mapping, value: Value, place: Place) -> None:
         """Add the entries of another mapping."""
-        if isinstance(value, Mapping) and not value.is_lost:
-            for key, (held, where) in value.entries.items():
-                self.set_item(owner, key, held, where)
-            owner.is_open |= value.is_open
-        else:
-            del place
-            self._evaluator.escape(value)
-            owner.is_open = True
+        several = alternatives(value)
+        for each in several:
+            if isinstance(each, Mapping) and not each.is_lost:
+                # Of several, only one has these entries.
+                with self._evaluator.run.condition() if len(several) > 1 else nullcontext():
+                    for key, (held, where) in each.entries.items():
+                        self.set_item(owner, key, held, where)
+                owner.is_open |= each.is_open
+            else:
+                self._add_pairs(owner, each, place)
+
+    def _add_pairs(self, owner: Mapping, value: Value, place: Place) -> None:
+        """Add entries that are given as pairs: `dict([('x', 1.0)])`."""
+        try:
+            pairs = [each.value for each in leaves_of(value, place)]
+        except NotKnownError:
+            pairs = [UNKNOWN]
+        for pair in pairs:
+            match pair:
+                case Sequence(items=[(Constant() as key, at), (held, _)]) if pair.is_whole:
+                    self.set_item(owner, key.value, held, key.origin or at)
+                case _:
+                    self._evaluator.escape(pair)
+                    owner.is_open = True
 
     def set_item(self, owner: Mapping, key: object, value: Value, place: Place) -> None:
         """Store an entry of a dictionary."""

@@ -32,6 +32,7 @@ from composer.inference.values import (
     BY_STATE,
     CHOSEN,
     NODE,
+    NONE,
     UNKNOWN,
     Alternatives,
     ArrayField,
@@ -44,6 +45,7 @@ from composer.inference.values import (
     Held,
     Instance,
     Mapping,
+    Message,
     NodeValue,
     Partial,
     PartOfNode,
@@ -222,7 +224,7 @@ class Evaluator:
     def _item_of(self, value: Value) -> Value:
         match value:
             case ArrayField():
-                return item_of(value.type)
+                return item_of(value.type, is_made=value.is_made)
             case Sequence():
                 return value.item()
             case Generated():
@@ -279,11 +281,18 @@ class Evaluator:
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
+        kept = self.run.reading.kept
+        found = join(map(_lasting, alternatives(value)))
+        kept[name] = join([kept[name], found]) if name in kept else found
         if isinstance(value, Instance) and not value.is_member:
             value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
+
+    def kept_value(self, name: str) -> Value:
+        """Return what is kept under a name in `node.state`; `[name]` is of `node.own_state`."""
+        return self.kept[name] if name in self.kept else self.run.facts.kept_value(name)
 
     def escape(self, value: Value) -> None:
         """Note that something unknown has a value: it may change it, or call it."""
@@ -325,3 +334,15 @@ class Evaluator:
             self.run.reading.open_kinds.add(kind)
         elif method.name == 'get_parameters':
             self.run.reading.reads_others = True
+
+
+def _lasting(value: Value) -> Value:
+    """Return what of a value holds in other calls, too."""
+    match value:
+        case Message():
+            return Message(value.type, is_made=True)
+        case Constant(value=None):
+            return NONE
+        case PartOfNode(name='time' | 'goal'):
+            return value
+    return UNKNOWN

@@ -299,7 +299,7 @@ class Expressions(Part):
     def _item(self, owner: Value, index: Value, place: Place, *, is_slice: bool) -> Value:
         match owner:
             case ArrayField():
-                return owner if is_slice else item_of(owner.type)
+                return owner if is_slice else item_of(owner.type, is_made=owner.is_made)
             case Mapping() if not owner.is_lost:
                 if isinstance(index, Constant):
                     held = owner.entries.get(index.value)

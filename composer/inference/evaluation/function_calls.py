@@ -9,6 +9,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.values import (
+    AGAIN,
     NEVER,
     NONE,
     UNKNOWN,
@@ -139,7 +140,9 @@ class Functions(Part):
             return self._results[key]
         if function.definition in self.active or len(self.active) >= _DEEPEST:
             self._evaluator.calls.escape_all(arguments)
-            return UNKNOWN
+            # What a call of itself gives, the other ways through it give, too.
+            is_plain = self.kind_of(function) is FunctionKind.PLAIN
+            return AGAIN if is_plain and function.definition in self.active else UNKNOWN
         if not self.fits(function, arguments):
             return UNKNOWN
         scope = self.enter(function, arguments, waits=waits)

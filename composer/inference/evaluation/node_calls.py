@@ -26,6 +26,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -176,9 +177,13 @@ class NodeCalls(Part):
         key, value = arguments.get(0, ''), arguments.get(1, '')
         if name == 'update':
             reading.own_state_set |= {each for each, _ in arguments.named}
+            for field, argument in arguments.named:
+                self._evaluator.keep(f'[{field}]', argument.value)
             for argument in arguments.positional:
                 if isinstance(argument.value, Mapping) and not argument.value.is_open:
                     reading.own_state_set |= {str(each) for each in argument.value.entries}
+                    for key_of, (held, _) in argument.value.entries.items():
+                        self._evaluator.keep(f'[{key_of}]', held)
                 else:
                     reading.is_own_state_open = True
         elif key and name in ('get', 'setdefault', 'pop'):
@@ -189,18 +194,18 @@ class NodeCalls(Part):
                     self._evaluator.run.use_own_state(str(each.value), where)
             reading.own_state_set |= {str(each.value) for each in constants}
             reading.is_own_state_open |= not constants
-        kept = value.value if value else UNKNOWN
+        given = value.value if value else NONE
         found = alternatives(key.value) if key else ()
         keys = [str(each.value) for each in found if isinstance(each, Constant)]
-        if isinstance(kept, Instance):
+        if name == 'setdefault':
             for name_of_key in keys:
-                self._evaluator.keep(f'[{name_of_key}]', kept)
-        if isinstance(kept, Instance | Message):
-            return kept
-        if name in ('get', 'setdefault') and len(keys) == 1:
-            held = self._evaluator.kept.get(f'[{keys[0]}]')
-            if held is not None:
-                return held
+                self._evaluator.keep(f'[{name_of_key}]', given)
+        if isinstance(given, Instance | Message):
+            return given
+        if name in ('get', 'pop', 'setdefault') and len(keys) == 1:
+            held = self._evaluator.kept_value(f'[{keys[0]}]')
+            if not isinstance(held, Unknown):
+                return join([held, given]) if name != 'setdefault' else held
         self._evaluator.calls.escape_all(arguments)
         return UNKNOWN
 

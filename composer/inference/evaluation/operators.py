@@ -7,6 +7,7 @@ import operator
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
+    AGAIN,
     UNKNOWN,
     Constant,
     Instance,
@@ -14,6 +15,7 @@ from composer.inference.values import (
     Message,
     MessageClass,
     NodeValue,
+    PartOfNode,
     Scalar,
     Sequence,
     Unknown,
@@ -21,6 +23,7 @@ from composer.inference.values import (
     alternatives,
     constant,
     is_chosen,
+    is_none,
     join,
     truth_of,
 )
@@ -67,7 +70,12 @@ _MOST_ITEMS = 256
 
 def combine(sign: ast.operator, left: Value, right: Value) -> Value:
     """Return what a binary operator makes of two values."""
-    pairs = [(one, other) for one in alternatives(left) for other in alternatives(right)]
+    # What may be None is combined where it is something else.
+    ones, others = (
+        [each for each in alternatives(value) if not is_none(each)] or [value]
+        for value in (left, right)
+    )
+    pairs = [(one, other) for one in ones for other in others]
     if len(pairs) > _MOST_PAIRS:
         return UNKNOWN
     return join(_combine(sign, *pair) for pair in pairs)
@@ -83,6 +91,13 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
                 return constant(compute(left.value, right.value), is_chosen=chosen)
             except (ArithmeticError, TypeError, ValueError):
                 return Unknown(chosen)
+    if isinstance(left, PartOfNode) and isinstance(right, PartOfNode):
+        is_difference = left.name == right.name == 'time' and isinstance(sign, ast.Sub)
+        return PartOfNode('duration') if is_difference else UNKNOWN
+    if AGAIN in (left, right) and isinstance(sign, ast.Add):
+        other = right if left == AGAIN else left
+        if isinstance(other, Sequence) and not other.is_lost:
+            return Sequence(list(other.items), other.kind, is_open=True)
     if isinstance(left, Sequence):
         return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))

@@ -159,7 +159,10 @@ class _Fit:
                 yield from self._other_message(description, value, place, path)
             case Mapping() if not value.is_lost:
                 yield from self._entries(description, value, path)
-            case Mapping() | NodeValue() | PartOfNode(name='time'):
+            case PartOfNode(name='time' | 'duration' as part):
+                stamp = Message(f'builtin_interfaces/msg/{part.title()}')
+                yield from self._other_message(description, stamp, place, path)
+            case Mapping() | NodeValue():
                 return
             case Constant() | Scalar() | Sequence() | ArrayField() | PartOfNode():
                 yield from self._bare(description, value, place, path)

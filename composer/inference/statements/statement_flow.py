@@ -126,11 +126,16 @@ class Statements(Part):
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
+                self._evaluator.keep(node.target.attr, UNKNOWN)
                 self._evaluator.waiting.fill(Held('state', node.target.attr))
                 return
         if isinstance(node.target, ast.Subscript):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('own_state'):
+                index = self._evaluator.evaluate(node.target.slice, scope)
+                for each in alternatives(index):
+                    if isinstance(each, Constant):
+                        self._evaluator.keep(f'[{each.value}]', UNKNOWN)
                 return
         is_union = isinstance(node.op, ast.BitOr)
         if isinstance(before, Mapping) and isinstance(value, Mapping) and is_union:

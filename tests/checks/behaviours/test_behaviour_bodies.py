@@ -49,7 +49,7 @@ import functools
 import itertools
 import math
 from geometry_msgs.msg import Twist, Vector3
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
 
 
@@ -163,6 +163,9 @@ WRONG = {
     "node.call('enable', sum([True, True]))": 'field-type',
     "node.publish('cover', {'pose': {'covariance': ([0.0] * 36)[1:]}})": 'field-length',
     "ranges = [1.0]; ranges.append('x'); node.publish('scan', {'ranges': ranges})": 'field-type',
+    "node.publish('command', {**({'angul': {}} if m.pose else {})})": 'unknown-field',
+    "node.publish('command', {'linear': node.now()})": 'field-type',
+    'for each in Path(poses=[]).poses: each.pose.x = 1.0': 'unknown-field',
     # what is read of the items of arrays
     'print(next(each for each in poses(node)).pos)': 'unknown-field',
     'print([b.pos for a, b in itertools.pairwise(poses(node))])': 'unknown-field',
@@ -261,6 +264,54 @@ def test_an_idiom_has_no_finding(folder, monkeypatch):
     monkeypatch.chdir(folder.parent)
     found = check_system(load_system(Path('system.yaml')), InterfaceCatalogue())
     assert [render_finding(each) for each in found] == []
+
+
+KEPT = """
+  rover:
+    state: {last: null, count: 0}
+    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
+    subscriptions:
+      odom: {type: nav_msgs/msg/Odometry, external: true, behaviour: parts:hear}
+    timers: {tick: {period: 1.0, behaviour: parts:tick, publish: level}}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('kept', 'read', 'rule'),
+    [
+        ('state.last = m', 'state.last.positon', 'unknown-field'),
+        ('state.last = m', 'state.last and node.state.last.pose.positon', 'unknown-field'),
+        ('state.last = node.now()', '(node.now() - node.state.last).seconds', 'unknown-attribute'),
+        ('state.last = m if m.child_frame_id else node.now()', 'state.last.nanoseconds', None),
+        ('state.count = m', 'state.count.positon', None),
+        ('state.last = m; setattr(node.state, str(m), 3)', 'state.last.positon', None),
+        ('state.last = m; node.state.last += 1', 'state.last.positon', None),
+    ],
+)
+def test_what_is_kept_in_the_state_is_known_to_other_behaviours(check, kept, read, rule):
+    read = read if read.startswith('(') else f'node.{read}'
+    code = f'def hear(node, m):\n    node.{kept}\n\n\ndef tick(node):\n    print({read})\n    return 1\n'
+    assert check(KEPT, code) == ([(6, rule)] if rule else [])
+
+
+@pytest.mark.ros
+def test_what_a_behaviour_keeps_for_itself_is_known_to_it(check):
+    code = """
+        def hear(node, m):
+            before = node.own_state.get('before')
+            if before is not None:
+                print(before.positon)
+            node.own_state['before'] = m
+
+
+        def tick(node):
+            begin = node.own_state.setdefault('begin', node.now())
+            yield (node.now() - begin).seconds
+            return 'high'
+        """
+    found = check(KEPT, code)
+    assert found == [(5, 'unknown-field'), (11, 'unknown-attribute'), (12, 'field-type')]
 
 
 def test_a_comment_in_python_silences_a_finding(check):
