@@ -733,7 +733,7 @@ PLANTED = {
     'an async iterator': """
         class Names:
             def __init__(self):
-                self.left = ['<comand|command>']
+                self.left = [1]
             def __aiter__(self):
                 return self
             async def __anext__(self):
