@@ -164,14 +164,48 @@ class Mapping:
 
     Attributes:
         entries: The values by their keys, and where each is written.
-        is_open: Whether it may have further entries.
+        has_unknown: Whether it may have further entries, of which nothing is known.
         depth: On how many conditions it was made.
+        others: What it holds under keys that are not known, if it has any.
     """
 
     entries: dict[object, tuple[Value, Place]]
-    is_open: bool = False
+    has_unknown: bool = False
     depth: int = 0
     is_lost: bool = False
+    others: Value | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it may have further entries."""
+        return self.has_unknown or self.others is not None
+
+    @is_open.setter
+    def is_open(self, is_open: bool) -> None:
+        self.has_unknown = is_open
+
+    def set_other(self, value: Value) -> None:
+        """Store a value under a key that is not known."""
+        self.others = value if self.others is None else join([self.others, value])
+
+    def value_of(self, key: Value) -> Value | None:
+        """Return what it may hold under a key, `None` if that is nothing."""
+        if self.is_lost:
+            return UNKNOWN
+        if not isinstance(key, Constant):
+            return self.any_value()
+        held = self.entries.get(key.value)
+        found = [*([held[0]] if held else []), *([self.others] if self.others else [])]
+        if not held and self.has_unknown:
+            return UNKNOWN
+        return join(found) if found else None
+
+    def any_value(self) -> Value:
+        """Return what any of its entries may hold."""
+        if self.is_lost or self.has_unknown:
+            return UNKNOWN
+        values = [value for value, _ in self.entries.values()]
+        return join([*values, *([self.others] if self.others else [])] or [UNKNOWN])
 
     def set(self, key: object, value: Value, place: Place, depth: int) -> None:
         """Store a value; one that is stored on a condition is one of two."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.classes.project_classes import CLASS_NAMES
 from composer.inference.current_run import name_place
+from composer.inference.evaluation.library.known_functions import MAPPINGS
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
@@ -281,7 +282,8 @@ class Attributes(Part):
         kind = dict if isinstance(owner, Mapping) else owner.kind
         if kind is type(None):
             return UNKNOWN
-        if hasattr(kind, name):
+        kinds = MAPPINGS if isinstance(owner, Mapping) else (kind,)
+        if any(hasattr(each, name) for each in kinds):
             return BoundMethod(owner, name)
         help_text = suggest(name, [each for each in dir(kind) if each[0] != '_'])
         return 'unknown-attribute', f"a {kind.__name__} has no attribute '{name}'", help_text

@@ -72,7 +72,9 @@ class Containers(Part):
                 with self._evaluator.run.condition() if len(several) > 1 else nullcontext():
                     for key, (held, where) in each.entries.items():
                         self.set_item(owner, key, held, where)
-                owner.is_open |= each.is_open
+                owner.has_unknown |= each.has_unknown
+                if each.others is not None:
+                    owner.set_other(each.others)
             else:
                 self._add_pairs(owner, each, place)
 
@@ -102,7 +104,7 @@ class Containers(Part):
                     if isinstance(index, Constant):
                         self.set_item(each, index.value, value, place)
                     else:
-                        each.is_open = True
+                        each.set_other(value)
                         self._evaluator.escape(value)
                 case Sequence():
                     each.items.append((value, place))

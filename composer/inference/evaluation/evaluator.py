@@ -319,6 +319,8 @@ class Evaluator:
                 held = value.entries.values() if isinstance(value, Mapping) else value.items
                 for each, _ in list(held):
                     self.escape(each)
+                if isinstance(value, Mapping) and value.others is not None:
+                    self.escape(value.others)
             case Function() if not value.is_read and value.definition not in self.functions.active:
                 self.functions.follow_later(value)
             case Partial():

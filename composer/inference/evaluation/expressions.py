@@ -301,10 +301,7 @@ class Expressions(Part):
             case ArrayField():
                 return owner if is_slice else item_of(owner.type, is_made=owner.is_made)
             case Mapping() if not owner.is_lost:
-                if isinstance(index, Constant):
-                    held = owner.entries.get(index.value)
-                    return held[0] if held else UNKNOWN
-                return join([v for v, _ in owner.entries.values()] or [UNKNOWN])
+                return owner.value_of(index) or UNKNOWN
             case Sequence() if not owner.is_lost:
                 if is_slice:
                     return self._slice_of(owner, index, place)
@@ -412,12 +409,12 @@ class Expressions(Part):
         for inner, is_certain in self._evaluator.loops.rounds(node.generators, scope):
             keys = self.evaluate(node.key, inner)
             value = self.evaluate(node.value, inner)
-            made.is_open |= not is_certain
             for key in alternatives(keys):
                 if isinstance(key, Constant):
                     made.set(key.value, value, Place(scope.module, node.key), run.conditions)
+                    made.has_unknown |= not is_certain
                 else:
-                    made.is_open = True
+                    made.set_other(value)
         return made
 
 

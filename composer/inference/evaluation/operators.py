@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from composer.inference.values import (
     AGAIN,
     UNKNOWN,
+    ArrayField,
     Constant,
     Instance,
     Mapping,
@@ -94,6 +95,8 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     if isinstance(left, PartOfNode) and isinstance(right, PartOfNode):
         is_difference = left.name == right.name == 'time' and isinstance(sign, ast.Sub)
         return PartOfNode('duration') if is_difference else UNKNOWN
+    if isinstance(left, ArrayField) and left == right and left.type.nested:
+        return left
     if AGAIN in (left, right) and isinstance(sign, ast.Add):
         other = right if left == AGAIN else left
         if isinstance(other, Sequence) and not other.is_lost:
@@ -184,6 +187,8 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
             return Constant(value.kind, -value.value, value.is_chosen, value.origin)
         if isinstance(sign, ast.UAdd):
             return value
+    if isinstance(value, Constant) and value.kind is int and isinstance(sign, ast.Invert):
+        return Constant(int, ~value.value, value.is_chosen, value.origin)
     if isinstance(value, Scalar) and value.kind in (int, float):
         return value
     return UNKNOWN

@@ -43,13 +43,14 @@ def use(node):
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
-from collections import namedtuple
+from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
 from types import SimpleNamespace
 import copy
 import dataclasses
 import functools
 import itertools
 import math
+import random
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
@@ -177,6 +178,27 @@ WRONG = {
     "node.publish('command', {**({'angul': {}} if m.pose else {})})": 'unknown-field',
     "node.publish('command', {'linear': node.now()})": 'field-type',
     'for each in Path(poses=[]).poses: each.pose.x = 1.0': 'unknown-field',
+    "node.publish('level', poses)": 'field-type',
+    "node.publish('level', len)": 'field-type',
+    "node.publish('command', Twist)": 'field-type',
+    "node.publish('level', ~0)": 'field-range',
+    "node.publish('level', [1, 2][0:1])": 'field-type',
+    "node.publish('level', {'a': 1, 'b': 300}.get('b'))": 'field-range',
+    "node.publish('level', '%d' % 3)": 'field-type',
+    "node.publish('level', random.choice(['a', 'b']))": 'field-type',
+    "node.publish('scan', {'ranges': list(zip([1.0], [2.0]))})": 'field-type',
+    "node.publish('scan', {'header': {'stamp': node.now().nanoseconds}})": 'field-type',
+    "node.publish('cover', {'pose': {'covariance': sum([[0.0] * 6] * 5, [])}})": 'field-length',
+    "p = {'linear': {}}; p |= {'angul': {}}; node.publish('command', p)": 'unknown-field',
+    # what is read of what holds messages
+    'print([each.positon for each in poses(node) + poses(node)])': 'unknown-field',
+    'by = {p.header.frame_id: p for p in poses(node)}; print(by["map"].positon)': 'unknown-field',
+    'by = {}; by[m.child_frame_id] = m; print(by[m.child_frame_id].positon)': 'unknown-field',
+    'by = {}; by[m.child_frame_id] = m; print([p.positon for p in by.values()])': 'unknown-field',
+    'q = deque(maxlen=3); q.append(m); print(q.popleft().positon)': 'unknown-field',
+    'pair = (m, 1); print(pair[0].positon)': 'unknown-field',
+    "print({'m': m}.get('m').positon)": 'unknown-field',
+    'print((m or None).positon)': 'unknown-field',
     # what is read of the items of arrays
     'print(next(each for each in poses(node)).pos)': 'unknown-field',
     'print([b.pos for a, b in itertools.pairwise(poses(node))])': 'unknown-field',
@@ -227,6 +249,20 @@ RIGHT = [
     "for i in range(3):\n    if i == m.twist.twist.linear.x: break\nelse: node.publish('never', 1)",
     'if m.__class__ in (Twist,): print(m.linear)',
     "match 3:\n    case str(): node.publish('level', 'three')\n    case int(level): node.publish('level', level)",
+    "by = {'a': m}; by[m.child_frame_id] = Twist(); print(by['b'].linear, by['a'].linear)",
+    "node.publish('level', random.choice([1, 'x']))",
+    'q = deque([m], maxlen=3); q.appendleft(m); q.rotate(); print(q.pop().pose, tuple([m]).count(m))',
+    'q = deque(maxlen=3); q.extend([m, m]); print(q.maxlen, q[0].pose, list(q).sort())',
+    's = set(); s.add(1); s.update([2]); s.discard(1); print(s.pop() + 1, frozenset(s).union(s))',
+    "c = Counter('abc'); c.update('d'); print(c.most_common(1)[0][0], c['a'] + 1, c.total())",
+    "d = defaultdict(list); d['a'].append(m); print(d['a'][0].pose, d.default_factory)",
+    "o = OrderedDict(a=1); o.move_to_end('a'); print(o.popitem(last=False))",
+    'i = iter([1, 2]); next(i); print(next(i), list(i), i.__next__)',
+    'z = zip([1], [2]); print(next(z)[0] + 1, list(z)); e = enumerate([1]); print(next(e))',
+    'v = {1: 2}.items(); print(v.isdisjoint([]), {1: 2}.keys() | {3}, len(v), sorted(v)[0][0])',
+    "print((5).real, (5.5).is_integer(), (5).to_bytes(2, 'big').hex(), 'a'.encode().decode().upper())",
+    "print(range(3).start, range(3)[1].bit_length(), slice(1, 2).start, 'ab'[0].upper())",
+    "t = Twist(); t.linear = {'x': 1.0}; node.publish('command', t)",
     "try: node.parameters.get(m)\nexcept AttributeError: pass\nelse: node.publish('never', 1)",
 ]
 

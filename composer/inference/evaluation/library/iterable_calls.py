@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +53,7 @@ class IterableCalls(Part):
             'builtins.filter': self._filter,
             'builtins.iter': self._iterate,
             'builtins.len': self._length,
-            'builtins.list': self._list,
+            'builtins.list': partial(self._list, list),
             'builtins.map': self._map,
             'builtins.max': partial(self._extreme, max),
             'builtins.min': partial(self._extreme, min),
@@ -62,9 +63,9 @@ class IterableCalls(Part):
             'builtins.set': self._set,
             'builtins.sorted': self._sorted,
             'builtins.sum': self._sum,
-            'builtins.tuple': self._list,
+            'builtins.tuple': partial(self._list, tuple),
             'builtins.zip': self._zip,
-            'collections.deque': self._list,
+            'collections.deque': partial(self._list, deque),
             'functools.reduce': self._reduce,
             'heapq.nlargest': self._largest,
             'heapq.nsmallest': self._largest,
@@ -83,7 +84,7 @@ class IterableCalls(Part):
             'itertools.takewhile': self._filter,
             'itertools.zip_longest': self._zip,
             'random.choice': self._pick,
-            'random.sample': self._list,
+            'random.sample': partial(self._list, list),
         }
 
     # Functions that are called with items
@@ -229,17 +230,19 @@ class IterableCalls(Part):
     def _iterate(self, arguments: Arguments, _: Place) -> Value:
         return Generated(self._item(arguments.get(0, '')), NONE)
 
-    def _list(self, arguments: Arguments, place: Place) -> Value:
+    def _list(self, kind: type, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, 'iterable')
+        # Of a `deque` with a limit, items go by themselves.
+        is_open = bool(arguments.named) or len(arguments.positional) > 1 or arguments.is_open
         if first is None:
-            return Sequence([], list)
+            return Sequence([], kind, is_open)
         if isinstance(first.value, Sequence) and first.value.is_lost:
             return UNKNOWN
         items = [(self._item(first), place)]
         if isinstance(first.value, Sequence) and first.value.is_whole:
             # The order of a set is not known.
-            return Sequence(items * len(first.value.items), list)
-        return Sequence(items, list, is_open=True)
+            return Sequence(items * len(first.value.items), kind, is_open)
+        return Sequence(items, kind, is_open=True)
 
     def _set(self, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, '')
@@ -343,5 +346,7 @@ def _kind_of(value: Value) -> Value:
 
 def _in_doubt(value: Value) -> Value:
     """Return one of several values, of which nobody knows whether it is a certain one."""
-    several = alternatives(value)
-    return UNKNOWN if any(isinstance(each, Constant) for each in several) else value
+    return join(
+        Scalar(each.kind, each.is_chosen) if isinstance(each, Constant) else each
+        for each in alternatives(value)
+    )

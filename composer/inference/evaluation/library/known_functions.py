@@ -9,7 +9,7 @@ import operator
 import re
 import statistics
 import struct
-from collections import Counter, OrderedDict, deque
+from collections import ChainMap, Counter, OrderedDict, defaultdict, deque
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import NONE, Scalar, Value
@@ -22,10 +22,12 @@ _BY_TYPE: dict[type, str] = {
     bool: 'builtins.all builtins.any builtins.bool builtins.callable builtins.issubclass '
     'math.isclose math.isfinite math.isinf math.isnan operator.contains operator.is_ '
     'operator.is_not operator.not_ operator.truth os.path.exists os.path.isfile os.path.isdir',
-    int: 'builtins.hash builtins.id builtins.int builtins.len builtins.ord math.ceil math.comb '
-    'math.factorial math.floor math.gcd math.isqrt math.lcm math.perm math.trunc operator.countOf '
-    'operator.indexOf os.getpid random.getrandbits random.randint random.randrange '
-    'struct.calcsize time.monotonic_ns time.perf_counter_ns time.process_time_ns time.time_ns',
+    int: 'builtins.hash builtins.id builtins.int builtins.int.from_bytes builtins.len '
+    'builtins.ord '
+    'math.ceil math.comb math.factorial math.floor math.gcd math.isqrt math.lcm math.perm '
+    'math.trunc operator.countOf operator.indexOf os.getpid random.getrandbits random.randint '
+    'random.randrange struct.calcsize time.monotonic_ns time.perf_counter_ns '
+    'time.process_time_ns time.time_ns',
     float: 'builtins.float math.acos math.acosh math.asin math.asinh math.atan math.atan2 '
     'math.atanh math.cbrt math.copysign math.cos math.cosh math.degrees math.dist math.erf '
     'math.erfc math.exp math.exp2 math.expm1 math.fabs math.fmod math.fsum math.gamma math.hypot '
@@ -115,7 +117,8 @@ ARRANGED: dict[str, Callable[..., Any]] = {
     'itertools.permutations': itertools.permutations,
     'itertools.product': itertools.product,
 }
-MAPPINGS = (dict, OrderedDict, Counter)
+# What a dictionary may be.
+MAPPINGS = (dict, ChainMap, Counter, OrderedDict, defaultdict)
 
 # Methods, by the types whose values they are called on; and the type of what they return.
 _METHODS: dict[type, dict[type, str]] = {

@@ -129,7 +129,9 @@ class MappingCalls(Part):
         match value:
             case Mapping() as given:
                 depth = self._evaluator.run.conditions
-                return Mapping(dict(given.entries), given.is_open, depth, given.is_lost)
+                return Mapping(
+                    dict(given.entries), given.has_unknown, depth, given.is_lost, given.others
+                )
             case Sequence() as given:
                 return Sequence(list(given.items), given.kind, given.is_open, given.is_lost)
             case Instance() as given:

@@ -149,14 +149,13 @@ class MethodCalls(Part):
         first, second = arguments.get(0, ''), arguments.get(1, '')
         if first is None:
             return UNKNOWN
-        key = first.value
-        found = owner.entries.get(key.value) if isinstance(key, Constant) else None
-        if found:
-            return found[0] if not second else join([found[0], second.value])
-        if isinstance(key, Constant) and not owner.is_open:
+        found = owner.value_of(first.value)
+        if found is None:
             return second.value if second else NONE
-        values = [value for value, _ in owner.entries.values()]
-        return join([*values, *([second.value] if second else [])] or [UNKNOWN])
+        # One that is not there is an error elsewhere.
+        is_there = isinstance(first.value, Constant) and first.value.value in owner.entries
+        others = [second.value] if second else [] if is_there else [NONE]
+        return join([found, *others])
 
     def _take(self, owner: Mapping, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, '')
@@ -191,7 +190,10 @@ class MethodCalls(Part):
         self, name: str, owner: Mapping, items: list[tuple[Value, Place]], place: Place
     ) -> Value:
         if owner.is_open:
-            return Generated(UNKNOWN, NONE)
+            value = owner.any_value()
+            pair = Sequence([(UNKNOWN, place), (value, place)], tuple)
+            of_view = {'keys': UNKNOWN, 'values': value, 'items': pair}
+            return Generated(of_view[name], NONE)
         return Sequence(items, _VIEWS[name], origin=place)
 
     def _lose(self, owner: Mapping | Sequence, arguments: Arguments) -> Value:
