@@ -35,7 +35,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in context.bindings[node.key]
+            for binding in context.bindings(node)
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
