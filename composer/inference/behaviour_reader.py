@@ -74,6 +74,7 @@ class BehaviourReader:
         # By behaviour and what it is given: by questions, and by their answers.
         self._read: dict[object, dict[tuple[Question, ...], dict[object, Reading]]] = {}
         self._by_place: dict[DataPath, Reading] = {}
+        self._wires: dict[DataPath, Wire] = {}
         self._read_once: dict[DataPath, Reading] = {}
         self._mentions: dict[int, Mentions] = {}
         self._steps_left = _MOST_STEPS
@@ -132,8 +133,8 @@ class BehaviourReader:
     ) -> Reading:
         """Return a reading that other nodes share if they answer alike."""
         facts = NodeFacts(node, self._has_real_type, tells_values, kept)
-        # Part of the key below; nodes call their publishers differently.
-        wire = wire_of(binding, NodeFacts(node, self._has_real_type))
+        wire = self.wire_of(node, binding)
+        # With the wire, as nodes call their publishers differently.
         key = (binding.behaviour.name, wire, tells_values, _frozen(binding.behaviour.arguments))
         known = self._read.setdefault(key, {})
         for questions, readings in known.items():
@@ -143,6 +144,13 @@ class BehaviourReader:
         reading = self._read_anew(binding, facts, wire)
         known.setdefault(tuple(facts.log), {})[tuple(facts.log.values())] = reading
         return reading
+
+    def wire_of(self, node: NodeSpec, binding: Binding) -> Wire:
+        """Return the types around a behaviour."""
+        place = binding.behaviour.path
+        if place not in self._wires:
+            self._wires[place] = wire_of(binding, NodeFacts(node, self._has_real_type))
+        return self._wires[place]
 
     def mentions(self, reading: Reading) -> Mentions:
         """Return what the modules of a behaviour may use beside what was read of it."""

@@ -138,6 +138,7 @@ class Reading:
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
             are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
+        unpublished: Where it gives away payloads that nothing publishes.
         kept: What it keeps in `node.state`, and as `[name]` in `node.own_state`.
         kept_read: The names of what it reads of these.
         remote_parameters: Parameters of nodes that it sets or reads by their names.
@@ -163,6 +164,7 @@ class Reading:
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
+    unpublished: list[Span] = field(default_factory=list)
     kept: dict[str, Value] = field(default_factory=dict)
     kept_read: set[str] = field(default_factory=set)
     remote_parameters: list[RemoteParameter] = field(default_factory=list)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Span, diagnostic_at
-from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 from composer.records import record
@@ -47,7 +46,7 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the imports of the modules of behaviours, and of what these import of the project."""
     walk = _Walk(context)
     for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
+        for binding in context.bindings[node.key]:
             if not context.was_dropped(binding.behaviour.path):
                 walk.visit(binding.behaviour.module, binding)
                 walk.visit_function(binding)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.transforms import is_shipped
-from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.spelling import suggest
 
@@ -24,7 +23,7 @@ def check_monitors(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that for each topic that is watched, the same node counts messages."""
     for node in context.spec.nodes.values():
         is_whole = not any(path[:2] == node.path for path in context.system.dropped)
-        behaviours = [binding.behaviour for binding in node_bindings(node)]
+        behaviours = [binding.behaviour for binding in context.bindings[node.key]]
         if is_whole and any(each.module == _MODULE for each in behaviours):
             yield from _check_node(context, node)
 
@@ -42,7 +41,7 @@ def _may_count(context: CheckContext, behaviour: BehaviourSpec) -> bool:
 
 
 def _check_node(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
-    behaviours = [binding.behaviour for binding in node_bindings(node)]
+    behaviours = [binding.behaviour for binding in context.bindings[node.key]]
     if not is_shipped(context, _MODULE) or any(_may_count(context, each) for each in behaviours):
         # Others may call its functions themselves.
         return

@@ -14,7 +14,6 @@ from composer.entity_kinds import (
     NODE_BEHAVIOURS,
     USED_KINDS,
 )
-from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
 from composer.spelling import find_nearest, is_typo, suggest
 
@@ -57,7 +56,7 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
-    bindings = node_bindings(node)
+    bindings = context.bindings[node.key]
     return [each for each in bindings if not context.was_dropped(each.behaviour.path)]
 
 

@@ -14,7 +14,6 @@ from composer.checks.connections.cycles import find_knots, find_way
 from composer.checks.connections.wait_conditions import StartOrder
 from composer.diagnostics import Related
 from composer.entity_kinds import KIND_OF_NOUN
-from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec
 from composer.records import record
 
@@ -89,7 +88,7 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     if not servers:
         return
     for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
+        for binding in context.bindings[node.key]:
             if context.was_dropped(binding.behaviour.path):
                 continue
             group = group_in(node, binding)

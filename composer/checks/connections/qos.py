@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from composer.language.bindings import node_bindings
 from composer.language.qos import (
     BEST_OF_PUBLISHERS,
     BEST_OF_SERVICES,
@@ -110,7 +109,7 @@ def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _published_by_behaviours(context: CheckContext, node: NodeSpec) -> set[str] | None:
     """Return what the behaviours of a node publish by themselves; `None` if anything."""
-    readings = [context.behaviours.read(node, binding) for binding in node_bindings(node)]
+    readings = context.readings(node)
     if any(each.reaches_ros or 'publisher' in each.open_kinds for each in readings):
         return None
     return {use.name for each in readings for use in each.uses if use.kind == 'publisher'}

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from composer.ament import remaps_actions
 from composer.checks.connections.topology import TOPICS_OF_ROS, full_name
 from composer.checks.connections.wait_conditions import waiters
-from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
 from composer.names import expand_name, find_topic_name_problem, with_article
 from composer.spelling import count_edits, did_you_mean, find_nearest
@@ -198,9 +197,7 @@ def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
     depth = len(node.path)
     if any(path[:depth] == node.path for path in context.system.dropped):
         return True
-    return any(
-        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
-    )
+    return any(each.reaches_ros for each in context.readings(node))
 
 
 def _is_of_ros(context: CheckContext, name: str) -> bool:

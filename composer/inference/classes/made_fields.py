@@ -32,7 +32,7 @@ class MadeFields(Part):
 
     def has_fields(self, of: Class) -> bool:
         """Return whether Python writes the `__init__` of a class from its fields."""
-        return self.is_tuple(of) or self._is_dataclass(of)
+        return self.is_tuple(of) or self._is_dataclass(of) or self.is_namespace(of)
 
     def is_tuple(self, of: Class) -> bool:
         """Return whether a class is that of a named tuple."""
@@ -65,9 +65,15 @@ class MadeFields(Part):
                             found[name] = _Field(name, each, target, default)
         return found
 
+    def is_namespace(self, of: Class) -> bool:
+        """Return whether a class is that of a plain namespace."""
+        return 'types.SimpleNamespace' in self._evaluator.classes.bodies.externals(of)
+
     def store(self, instance: Instance, arguments: Arguments) -> None:
         """Store the arguments of a call in the fields, and the defaults of others."""
         fields = self._fields(instance.of)
+        for name, argument in arguments.named:
+            instance.set(name, argument.value)
         given = dict(zip(fields, arguments.positional, strict=False))
         given |= dict(arguments.named)
         for name, field in fields.items():
@@ -102,6 +108,9 @@ class MadeFields(Part):
         """Return the fields of an object, and where each is declared."""
         if not self.has_fields(owner.of):
             return None
+        if self.is_namespace(owner.of):
+            place = Place(owner.of.module, owner.of.definition)
+            return {name: (value, place) for name, value in owner.attributes.items()}
         return {
             name: (owner.attributes.get(name, UNKNOWN), Place(field.of.module, field.target))
             for name, field in self._fields(owner.of).items()

@@ -113,6 +113,11 @@ class Evaluator:
         current: Scope | None = scope
         while current is not None:
             is_later = current.is_body and name not in (current.names or ())
+            if current is scope and name not in current.local and name in (current.names or ()):
+                held = current.names[name] if current.names else UNKNOWN
+                if all(isinstance(each, Instance | Unknown) for each in alternatives(held)):
+                    # A global one that was just stored.
+                    return held
             if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
@@ -241,8 +246,13 @@ class Evaluator:
         if isinstance(value, Class):
             return UNKNOWN
         iterator = self.classes.call_method(value, '__iter__')
+        if iterator is None:
+            iterator = self.classes.call_method(value, '__aiter__')
         if isinstance(iterator, Instance):
-            return self.classes.call_method(iterator, '__next__') or UNKNOWN
+            item = self.classes.call_method(iterator, '__next__')
+            if item is None:
+                item = self.classes.call_method(iterator, '__anext__')
+            return item.result if isinstance(item, Awaitable) else item or UNKNOWN
         return UNKNOWN if iterator is None else self.item_of(iterator)
 
     def entered(self, value: Value) -> Value:

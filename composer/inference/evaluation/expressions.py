@@ -275,6 +275,9 @@ class Expressions(Part):
         owner = self.evaluate(node.value, scope)
         index = self.evaluate(node.slice, scope)
         self._evaluator.run.decide(index)
+        if _is_globals(node.value) and isinstance(index, Constant):
+            is_known = self._evaluator.run.modules.has_name(scope.module, index.value)
+            return self._evaluator.top_value(scope.module, index.value) if is_known else UNKNOWN
         is_slice = isinstance(node.slice, _UNREAD)
         place = Place(scope.module, node.slice)
         return join(
@@ -416,3 +419,10 @@ class Expressions(Part):
                 else:
                     made.is_open = True
         return made
+
+
+def _is_globals(node: ast.expr) -> bool:
+    match node:
+        case ast.Call(func=ast.Name('globals')):
+            return True
+    return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
@@ -22,6 +22,7 @@ from composer.inference.values import (
     Function,
     Generated,
     Held,
+    Instance,
     Mapping,
     PartOfNode,
     Place,
@@ -317,10 +318,13 @@ class Statements(Part):
         caught = join_names([before, after])
         for handler in node.handlers:
             scope.names = None if caught is None else dict(caught)
-            if handler.type is not None:
-                self._evaluator.evaluate(handler.type, scope)
+            kind: Value = (
+                self._evaluator.evaluate(handler.type, scope) if handler.type else UNKNOWN
+            )
             if handler.name:
-                scope.set(handler.name, UNKNOWN)
+                is_own = isinstance(kind, Class)
+                error = Instance(cast('Class', kind), is_unmade=True) if is_own else UNKNOWN
+                scope.set(handler.name, error)
             is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
             with run.condition(is_doubt=is_doubt):
                 self.follow_all(handler.body, scope)

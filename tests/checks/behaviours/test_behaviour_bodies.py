@@ -43,6 +43,8 @@ def use(node):
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
+from collections import namedtuple
+from types import SimpleNamespace
 import copy
 import dataclasses
 import functools
@@ -67,7 +69,16 @@ class Keeper:
 @dataclasses.dataclass
 class Turn:
     linear: dict
-    angul: dict  # of ASDICT
+    angul: dict  # of VARS
+
+
+Move = namedtuple('Move', 'linear angul')  # of ASDICT
+
+
+def nested(depth):
+    if depth:
+        return nested(depth - 1)
+    return {'angul': {}}  # of NESTED
 
 
 def poses(node):
@@ -238,7 +249,13 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
 @pytest.mark.parametrize(
     ('lines', 'mark'),
     [
-        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of ASDICT'),
+        (
+            "t = SimpleNamespace(linear={}, angul={})  # here\nnode.publish('command', vars(t))",
+            '# here',
+        ),
+        ("node.publish('command', nested(2))", '# of NESTED'),
+        ("node.publish('command', Move({}, {})._asdict())", '# of ASDICT'),
+        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of VARS'),
         ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
     ],
 )
@@ -312,6 +329,31 @@ def test_what_a_behaviour_keeps_for_itself_is_known_to_it(check):
         """
     found = check(KEPT, code)
     assert found == [(5, 'unknown-field'), (11, 'unknown-attribute'), (12, 'field-type')]
+
+
+UNPUBLISHED = """
+  rover:
+    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
+    timers:
+      tick: {period: 1.0, behaviour: parts:tick}
+      send: {period: 1.0, behaviour: parts:send, publish: level}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('code', 'found'),
+    [
+        ('def tick(node):\n    return {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    yield {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    return 1\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nprint(tick)\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nsend = tick\n', []),
+    ],
+)
+def test_a_payload_is_for_something(check, code, found):
+    other = '' if 'send' in code else '\n\ndef send(node):\n    return 1\n'
+    assert check(UNPUBLISHED, code + other) == found
 
 
 def test_a_comment_in_python_silences_a_finding(check):

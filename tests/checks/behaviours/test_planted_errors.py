@@ -453,6 +453,552 @@ PLANTED = {
         def hear(node, m):
             show(m, node)
         """,
+    'closure factory': """
+        def sender(node, name):
+            def send(payload):
+                node.publish(name, payload)
+            return send
+        def hear(node, m):
+            send = sender(node, '<comand|command>')
+            send({})
+        """,
+    'closures over a loop': """
+        def hear(node, m):
+            senders = []
+            for name in ('level', '<levle|level>'):
+                senders.append(lambda value, name=name: node.publish(name, value))
+            for each in senders:
+                each(1)
+        """,
+    'nonlocal': """
+        def hear(node, m):
+            name = 'level'
+            def change():
+                nonlocal name
+                node.publish('<levle|level>', 1)
+                name = 'command'
+            change()
+        """,
+    'match on a class': """
+        from dataclasses import dataclass
+        @dataclass
+        class Go:
+            speed: float
+        @dataclass
+        class Stop:
+            reason: str
+        def act(node, order):
+            match order:
+                case Go(speed=speed):
+                    node.publish('command', {'<liner|linear>': {'x': speed}})
+                case Stop():
+                    node.publish('level', 0)
+        def hear(node, m):
+            act(node, Go(1.0))
+            act(node, Stop('x'))
+        """,
+    'match on a class by position': """
+        from dataclasses import dataclass
+        @dataclass
+        class Send:
+            name: str
+            payload: object
+        def act(node, order):
+            match order:
+                case Send(name, payload):
+                    node.publish(name, payload)
+        def hear(node, m):
+            act(node, Send('<comand|command>', {}))
+        """,
+    'match on a literal': """
+        def hear(node, m):
+            match m.child_frame_id:
+                case 'base' | 'odom':
+                    node.publish('<comand|command>', {})
+                case _:
+                    node.publish('level', 1)
+        """,
+    'match on a tuple': """
+        def hear(node, m):
+            for each in (('level', 1), ('<comand|command>', {})):
+                match each:
+                    case (name, payload):
+                        node.publish(name, payload)
+        """,
+    'match on a dict': """
+        def hear(node, m):
+            for order in ({'topic': 'level', 'value': 1}, {'topic': '<comand|command>', 'value': {}}):
+                match order:
+                    case {'topic': name, 'value': value}:
+                        node.publish(name, value)
+        """,
+    'walrus in a condition': """
+        def hear(node, m):
+            if (reply := node.call('enable', True)) and not reply.<sucess|success>:
+                node.publish('level', 1)
+        """,
+    'walrus of a name': """
+        def hear(node, m):
+            node.publish(name := '<comand|command>', {})
+            node.logger.info(name)
+        """,
+    'a chained comparison': """
+        def hear(node, m):
+            if 0.0 < m.twist.twist.linear.<X|x> < 1.0:
+                node.publish('level', 1)
+        """,
+    'a nested comprehension': """
+        def hear(node, m):
+            [node.publish(a + b, 1) for a in ('le', 'le') for b in ('vel', '<val|vel>')]
+        """,
+    'a dispatch table of methods': """
+        class Robot:
+            def __init__(self, node):
+                self.node = node
+                self.actions = {'go': self.go, 'stop': self.stop}
+            def go(self):
+                self.node.publish('<comand|command>', {})
+            def stop(self):
+                self.node.publish('level', 0)
+            def act(self, what):
+                self.actions[what]()
+        def hear(node, m):
+            Robot(node).act(m.child_frame_id)
+        """,
+    'a dispatch by getattr': """
+        class Robot:
+            def __init__(self, node):
+                self.node = node
+            def do_go(self):
+                self.node.publish('<comand|command>', {})
+            def act(self, what):
+                getattr(self, f'do_{what}')()
+        def hear(node, m):
+            Robot(node).act('go')
+        """,
+    'a table of classes': """
+        class Go:
+            def run(self, node):
+                node.publish('<comand|command>', {})
+        class Stop:
+            def run(self, node):
+                node.publish('level', 0)
+        KINDS = {'go': Go, 'stop': Stop}
+        def hear(node, m):
+            KINDS.get(m.child_frame_id, Stop)().run(node)
+        """,
+    'a table of names in a class': """
+        class Robot:
+            TOPICS = {'go': '<comand|command>', 'stop': 'level'}
+            def go(self, node):
+                node.publish(self.TOPICS['go'], {})
+        def hear(node, m):
+            Robot().go(node)
+        """,
+    'all subclasses': """
+        class Action:
+            def run(self, node):
+                node.publish(self.topic, self.payload)
+        class Go(Action):
+            topic, payload = '<comand|command>', {}
+        class Stop(Action):
+            topic, payload = 'level', 0
+        def hear(node, m):
+            for each in Action.__subclasses__():
+                each().run(node)
+        """,
+    'slots': """
+        class Talker:
+            __slots__ = ('node', 'topic')
+            def __init__(self, node, topic='<comand|command>'):
+                self.node = node
+                self.topic = topic
+            def go(self):
+                self.node.publish(self.topic, {})
+        def hear(node, m):
+            Talker(node).go()
+        """,
+    'a namespace': """
+        from types import SimpleNamespace
+        NAMES = SimpleNamespace(drive='<comand|command>', lift='level')
+        def hear(node, m):
+            node.publish(NAMES.drive, {})
+        """,
+    'a class as a namespace': """
+        class Names:
+            class Out:
+                DRIVE = '<comand|command>'
+        def hear(node, m):
+            node.publish(Names.Out.DRIVE, {})
+        """,
+    'collections.namedtuple': """
+        from collections import namedtuple
+        Step = namedtuple('Step', ['topic', 'payload'])
+        def hear(node, m):
+            for step in [Step('level', 1), Step('<comand|command>', {})]:
+                node.publish(step.topic, step.payload)
+        """,
+    'a default dict': """
+        from collections import defaultdict
+        NAMES = defaultdict(lambda: 'level', go='<comand|command>')
+        def hear(node, m):
+            node.publish(NAMES['go'], {})
+        """,
+    'format': """
+        def hear(node, m):
+            node.publish('{}{}'.format('le', '<val|vel>'), 1)
+        """,
+    'percent': """
+        def hear(node, m):
+            node.publish('%s' % '<levle|level>', 1)
+        """,
+    'join': """
+        def hear(node, m):
+            node.publish(''.join(['le', '<val|vel>']), 1)
+        """,
+    'a reduced call': """
+        from functools import reduce
+        def hear(node, m):
+            reduce(lambda made, name: node.publish(name, 1), ['level', '<levle|level>'], None)
+        """,
+    'a thread': """
+        import threading
+        def work(node, name):
+            node.publish(name, {})
+        def hear(node, m):
+            threading.Thread(target=work, args=(node, '<comand|command>')).start()
+        """,
+    'a thread class': """
+        import threading
+        class Worker(threading.Thread):
+            def __init__(self, node):
+                super().__init__(daemon=True)
+                self.node = node
+            def run(self):
+                self.node.publish('<comand|command>', {})
+        def hear(node, m):
+            Worker(node).start()
+        """,
+    'a pool': """
+        from concurrent.futures import ThreadPoolExecutor
+        def work(node, name):
+            node.publish(name, {})
+        def hear(node, m):
+            with ThreadPoolExecutor() as pool:
+                pool.submit(work, node, '<comand|command>')
+        """,
+    'star arguments': """
+        def send(node, *names):
+            for name in names:
+                node.publish(name, 1)
+        def hear(node, m):
+            send(node, 'level', '<levle|level>')
+        """,
+    'keyword arguments': """
+        def send(node, **values):
+            for name, value in values.items():
+                node.publish(name, value)
+        def hear(node, m):
+            send(node, level=1, <comand|command>={})
+        """,
+    'a coroutine of a generator': """
+        def talk(node):
+            while True:
+                value = yield
+                node.publish('<levle|level>', value)
+        def hear(node, m):
+            talker = talk(node)
+            next(talker)
+            talker.send(3)
+        """,
+    'yield from': """
+        def names():
+            yield from ('level', '<levle|level>')
+        def hear(node, m):
+            for name in names():
+                node.publish(name, 1)
+        """,
+    'an async context manager': """
+        class Busy:
+            def __init__(self, node):
+                self.node = node
+            async def __aenter__(self):
+                return self.node.publish
+            async def __aexit__(self, *reason):
+                self.node.publish('level', 0)
+        async def hear(node, m):
+            async with Busy(node) as publish:
+                publish('<comand|command>', {})
+        """,
+    'an async iterator': """
+        class Names:
+            def __init__(self):
+                self.left = [1]
+            def __aiter__(self):
+                return self
+            async def __anext__(self):
+                if not self.left:
+                    raise StopAsyncIteration
+                return '<comand|command>'
+        async def hear(node, m):
+            async for name in Names():
+                node.publish(name, {})
+        """,
+    'an async method of a base': """
+        class Base:
+            def __init__(self, node):
+                self.node = node
+            async def ask(self, value):
+                return await self.node.call_async('<enabel|enable>', value)
+        class Sub(Base):
+            async def ask(self):
+                return (await super().ask(True)).success
+        async def hear(node, m):
+            await Sub(node).ask()
+        """,
+    'an exception of the project': """
+        class Late(Exception):
+            topic = '<levle|level>'
+        def hear(node, m):
+            try:
+                raise Late('x')
+            except Late as error:
+                node.publish(error.topic, 1)
+        """,
+    'an object in another object': """
+        class Out:
+            def __init__(self, node):
+                self.node = node
+            def send(self, name):
+                self.node.publish(name, {})
+        class Robot:
+            def __init__(self, node):
+                self.out = Out(node)
+            def go(self):
+                self.out.send('<comand|command>')
+        def hear(node, m):
+            Robot(node).go()
+        """,
+    'a fluent builder': """
+        class Twister:
+            def __init__(self):
+                self.made = {}
+            def turn(self, z):
+                self.made['<angulr|angular>'] = {'z': z}
+                return self
+            def build(self):
+                return self.made
+        def hear(node, m):
+            node.publish('command', Twister().turn(1.0).build())
+        """,
+    'a singleton': """
+        class Robot:
+            _one = None
+            @classmethod
+            def get(cls, node):
+                if cls._one is None:
+                    cls._one = cls(node)
+                return cls._one
+            def __init__(self, node):
+                self.node = node
+            def go(self):
+                self.node.publish('<comand|command>', {})
+        def hear(node, m):
+            Robot.get(node).go()
+        """,
+    'a global object': """
+        ROBOT = None
+        class Robot:
+            def __init__(self, node):
+                self.node = node
+            def go(self):
+                self.node.publish('<comand|command>', {})
+        def hear(node, m):
+            global ROBOT
+            if ROBOT is None:
+                ROBOT = Robot(node)
+            ROBOT.go()
+        """,
+    'an observer': """
+        class Bus:
+            def __init__(self):
+                self.listeners = []
+            def on(self, listener):
+                self.listeners.append(listener)
+            def emit(self, value):
+                for each in self.listeners:
+                    each(value)
+        def hear(node, m):
+            bus = Bus()
+            bus.on(lambda value: node.publish('<levle|level>', value))
+            bus.emit(3)
+        """,
+    'a state of a state machine': """
+        class State:
+            def __init__(self, machine):
+                self.machine = machine
+        class Idle(State):
+            def step(self):
+                self.machine.node.publish('level', 0)
+                return Drive(self.machine)
+        class Drive(State):
+            def step(self):
+                self.machine.node.publish('<comand|command>', {})
+                return Idle(self.machine)
+        class Machine:
+            def __init__(self, node):
+                self.node = node
+                self.state = Idle(self)
+            def step(self):
+                self.state = self.state.step()
+        def hear(node, m):
+            machine = Machine(node)
+            machine.step()
+            machine.step()
+        """,
+    'an abstract property': """
+        from abc import ABC, abstractmethod
+        class Base(ABC):
+            @property
+            @abstractmethod
+            def topic(self): ...
+            def go(self, node):
+                node.publish(self.topic, {})
+        class Sub(Base):
+            @property
+            def topic(self):
+                return '<comand|command>'
+        def hear(node, m):
+            Sub().go(node)
+        """,
+    'an alternative of two classes': """
+        class Fast:
+            def go(self, node):
+                node.publish('<comand|command>', {})
+        class Slow:
+            def go(self, node):
+                node.publish('level', 1)
+        def hear(node, m):
+            kind = Fast if m.child_frame_id else Slow
+            kind().go(node)
+        """,
+    'a function by name': """
+        def go(node):
+            node.publish('<comand|command>', {})
+        def hear(node, m):
+            globals()['go'](node)
+        """,
+    'a condition that joins two things': """
+        def hear(node, m):
+            if m.child_frame_id and node.parameters.speed > 1.0:
+                node.publish('<comand|command>', {})
+        """,
+    'a container of the project': """
+        class Names:
+            def __init__(self, **names):
+                self._names = names
+            def __getitem__(self, key):
+                return self._names[key]
+        def hear(node, m):
+            node.publish(Names(go='<comand|command>')['go'], {})
+        """,
+    'an exit stack': """
+        from contextlib import ExitStack
+        def hear(node, m):
+            with ExitStack() as stack:
+                stack.callback(node.publish, '<levle|level>', 0)
+        """,
+    'finally': """
+        def hear(node, m):
+            try:
+                node.publish('level', 1)
+            finally:
+                node.publish('<levle|level>', 0)
+        """,
+    'a retry decorator': """
+        import functools
+        def retry(times):
+            def wrap(function):
+                @functools.wraps(function)
+                def wrapper(*args, **kwargs):
+                    for _ in range(times):
+                        if function(*args, **kwargs):
+                            return True
+                    return False
+                return wrapper
+            return wrap
+        @retry(times=3)
+        def ask(node, value):
+            return node.call('<enabel|enable>', value).success
+        def hear(node, m):
+            ask(node, True)
+        """,
+    'a decorator class': """
+        import functools
+        class Counted:
+            def __init__(self, function):
+                functools.update_wrapper(self, function)
+                self.function = function
+                self.count = 0
+            def __call__(self, node, m):
+                self.count += 1
+                node.publish('<levle|level>', self.count % 256)
+                return self.function(node, m)
+        @Counted
+        def hear(node, m):
+            node.publish('command', {})
+        """,
+    'a decorator class with arguments': """
+        class announced:
+            def __init__(self, topic):
+                self.topic = topic
+            def __call__(self, function):
+                def wrapper(node, m):
+                    node.publish(self.topic, 1)
+                    return function(node, m)
+                return wrapper
+        @announced('<levle|level>')
+        def hear(node, m):
+            node.publish('command', {})
+        """,
+    'two decorators': """
+        from functools import wraps
+        def first(function):
+            @wraps(function)
+            def inner(node, m):
+                return function(node, m)
+            return inner
+        def second(function):
+            @wraps(function)
+            def inner(node, m):
+                function(node, m)
+                node.publish('<levle|level>', 1)
+            return inner
+        @first
+        @second
+        def hear(node, m):
+            node.publish('command', {})
+        """,
+    'a decorated body': """
+        from functools import wraps
+        def quiet(function):
+            @wraps(function)
+            def inner(*args, **kwargs):
+                return function(*args, **kwargs)
+            return inner
+        @quiet
+        def hear(node, m):
+            node.publish('<comand|command>', {})
+        """,
+    'a decorator of the behaviour with a payload': """
+        def scaled(function):
+            def inner(node, m):
+                node.publish('command', {'linear': {'x': function(node, m)}})
+            return inner
+        @scaled
+        def hear(node, m):
+            return m.twist.twist.linear.<X|x>
+        """,
 }
 PLACE = re.compile(r'<(\w+)\|(\w+)>')
 

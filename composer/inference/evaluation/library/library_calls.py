@@ -9,6 +9,7 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from composer.inference.classes.made_records import MadeRecords
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.library.iterable_calls import IterableCalls
 from composer.inference.evaluation.library.known_functions import (
@@ -36,6 +37,7 @@ from composer.inference.values import (
     Constant,
     External,
     Function,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -83,6 +85,7 @@ class LibraryCalls(Part):
             'functools.partial': self._partial,
             **self.iterables.handlers(),
             **self.mappings.handlers(),
+            **MadeRecords(evaluator).handlers(),
         }
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
@@ -205,7 +208,11 @@ class LibraryCalls(Part):
             return Scalar(bool)
         wanted = classes.value
         several = [item for item, _ in wanted.items] if isinstance(wanted, Sequence) else [wanted]
-        answers = {is_instance(value.value, each) for each in several}
+        given = value.value
+        if isinstance(given, Instance):
+            answers = {self._evaluator.classes.is_instance(given, each) for each in several}
+        else:
+            answers = {is_instance(given, each) for each in several}
         if True in answers:
             return constant(value=True)
         return Scalar(bool) if None in answers else constant(value=False)
@@ -226,7 +233,7 @@ class LibraryCalls(Part):
         del place
         if first is not None and isinstance(first.value, Message):
             return MessageClass(first.value.type)
-        return UNKNOWN
+        return first.value.of if first and isinstance(first.value, Instance) else UNKNOWN
 
     def _round(self, arguments: Arguments, place: Place) -> Value:
         digits = arguments.get(1, 'ndigits')
