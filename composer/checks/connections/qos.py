@@ -157,8 +157,20 @@ def _explain_deadline(
         f"publisher '{publisher.name}' promises a message every {deadline_sec:g} s, and {who} "
         f'one every {period_sec:g} s',
         help='make the deadline longer than the period',
-        related=[context.related(timer.path, 'this publishes on it') for timer in timers],
+        related=[
+            *_place_of_deadline(context, publisher),
+            *(context.related(timer.path, 'this publishes on it') for timer in timers),
+        ],
     )
+
+
+def _place_of_deadline(context: CheckContext, publisher: PublisherSpec) -> Iterator[Related]:
+    """Yield where a profile that the publisher uses promises its deadline."""
+    for source in _sources(context, publisher.qos):
+        path = (*source, 'deadline')
+        if source[:1] == ('qos',) and path in context.system.positions.values:
+            yield context.related(path, 'it is promised here')
+            return
 
 
 def _find_conflicts(
