@@ -214,6 +214,8 @@ class Calls(Part):
                         method, arguments, place, waits=waits, is_awaited=is_awaited
                     )
             case External():
+                if is_awaited:
+                    self._evaluator.waiting.await_asyncio(function.name, arguments, place)
                 made = self._evaluator.callables.call(function.name, arguments, place)
                 if made is not None:
                     return made

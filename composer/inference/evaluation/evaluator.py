@@ -190,6 +190,10 @@ class Evaluator:
             text = 'this is an async generator'
             place = Place(scope.module, node)
             self.run.report('missing-await', place, text, "go through it with 'async for'")
+        elif is_async and all(map(_is_plain, alternatives(value))):
+            text = 'this is no async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'for'")
         return value
 
     @contextmanager
@@ -347,3 +351,10 @@ def _lasting(value: Value) -> Value:
         case PartOfNode(name='time' | 'goal'):
             return value
     return UNKNOWN
+
+
+def _is_plain(value: Value) -> bool:
+    """Return whether a value is gone through without waiting."""
+    if isinstance(value, Generated):
+        return not value.is_async
+    return isinstance(value, Sequence | Mapping | ArrayField | Constant | Scalar)

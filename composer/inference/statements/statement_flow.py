@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
+from composer.inference.evaluation.waiting import THREAD
 from composer.inference.scopes import Names, Scope, join_names, own_nodes
 from composer.inference.values import (
     BY_STATE,
@@ -17,6 +18,7 @@ from composer.inference.values import (
     Argument,
     Arguments,
     Awaitable,
+    BoundMethod,
     Class,
     Constant,
     Function,
@@ -24,8 +26,10 @@ from composer.inference.values import (
     Held,
     Instance,
     Mapping,
+    NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Value,
@@ -113,8 +117,25 @@ class Statements(Part):
 
     def _assign(self, node: ast.Assign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
+        if isinstance(value, Awaitable):
+            self._check_kept(node, scope)
         for target in node.targets:
             self.store(target, value, scope)
+
+    def _check_kept(self, node: ast.Assign, scope: Scope) -> None:
+        """Report a coroutine that is kept under a name that nothing uses."""
+        match node.targets:
+            case [ast.Name(id=name)] if scope.function and name in scope.local:
+                uses = (
+                    isinstance(each, ast.Name)
+                    and each.id == name
+                    and isinstance(each.ctx, ast.Load)
+                    for each in ast.walk(scope.function.definition)
+                )
+                if not any(uses):
+                    text = f"'{name}' is a coroutine that is never awaited, so it never runs"
+                    place = Place(scope.module, node.value)
+                    self._evaluator.run.report('missing-await', place, text, 'put await before it')
 
     def _annassign(self, node: ast.AnnAssign, scope: Scope) -> None:
         if node.value is not None:
@@ -202,6 +223,9 @@ class Statements(Part):
         if isinstance(node.value, _WITHOUT_EFFECT) and is_plain:
             place = Place(scope.module, node.value)
             run.report('no-effect', place, 'this has no effect', 'return it, or remove it')
+        elif isinstance(node.value, ast.Attribute) and _is_method(value):
+            place = Place(scope.module, node.value)
+            run.report('no-effect', place, 'this is not called', f'write {node.value.attr}()')
         elif isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
             called = ast.unparse(node.value.func)
             run.report(
@@ -210,6 +234,9 @@ class Statements(Part):
                 f"'{called}(…)' is never awaited, so it never runs",
                 'put await before it',
             )
+        elif isinstance(value, Primitive) and value.kind == THREAD:
+            place = Place(scope.module, node.value)
+            run.report('no-effect', place, 'this thread is never started', 'write .start()')
         elif isinstance(value, Generated) and isinstance(node.value, ast.Call | ast.GeneratorExp):
             run.report(
                 'no-effect',
@@ -344,7 +371,12 @@ class Statements(Part):
         managers: list[Value] = []
         is_guard = False
         for item in node.items:
-            value = self._evaluator.evaluate(item.context_expr, scope)
+            is_call = isinstance(item.context_expr, ast.Call) and isinstance(node, ast.AsyncWith)
+            value = (
+                self._evaluator.calls.call(item.context_expr, scope, is_awaited=True)
+                if is_call
+                else self._evaluator.evaluate(item.context_expr, scope)
+            )
             managers.append(value)
             place = Place(scope.module, item.context_expr)
             locks.enter_context(self._evaluator.waiting.holding(value, place))
@@ -374,6 +406,12 @@ class Statements(Part):
         return any(_is_guard(each) or _is_broad(each) for each in handlers)
 
     _asyncwith = _with
+
+
+def _is_method(value: Value) -> bool:
+    """Return whether a value does nothing until it is called."""
+    owner = value.owner if isinstance(value, BoundMethod) else None
+    return isinstance(value, Function) or isinstance(owner, NodeValue | PartOfNode | Primitive)
 
 
 def _is_guard(handler: ast.ExceptHandler) -> bool:
