@@ -328,6 +328,7 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
+                value.is_open = True
                 for each in value.attributes.values():
                     if isinstance(each, NodeValue | BoundMethod | PartOfNode):
                         self.escape(each)
