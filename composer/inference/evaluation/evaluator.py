@@ -22,6 +22,7 @@ from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
+from composer.inference.statements.guards import Guards
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
@@ -83,6 +84,7 @@ class Evaluator:
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.guards = Guards(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.registries = Registries(self)
@@ -328,6 +330,7 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
+                value.is_open = True
                 for each in value.attributes.values():
                     if isinstance(each, NodeValue | BoundMethod | PartOfNode):
                         self.escape(each)

@@ -218,7 +218,8 @@ class NodeCalls(Part):
         if name == 'setdefault':
             for name_of_key in keys:
                 self._evaluator.keep(f'[{name_of_key}]', given)
-        if isinstance(given, Instance | Message):
+        is_member = isinstance(given, Instance) and given.is_member
+        if isinstance(given, Instance | Message) and not is_member:
             return given
         if name in ('get', 'pop', 'setdefault') and len(keys) == 1:
             held = self._evaluator.kept_value(f'[{keys[0]}]')
