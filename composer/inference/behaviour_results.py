@@ -5,11 +5,14 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.current_run import span_of
 from composer.inference.scopes import own_nodes
 from composer.inference.values import (
     NONE,
     Constant,
     Function,
+    Mapping,
+    Message,
     Place,
     Scalar,
     Sequence,
@@ -37,6 +40,7 @@ def check_results(
     """Check what a behaviour gives away, and that it comes to an end."""
     _check_payloads(evaluator, callee, scope, wire)
     _check_answers(evaluator, scope, binding)
+    _note_unpublished(evaluator, scope, wire)
     _check_end(evaluator, callee, binding)
 
 
@@ -60,6 +64,22 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     if wire.needs_payload and wire.returned and scope.returned and nothing:
         _, place = scope.returned[-1]
         evaluator.payloads.check(wire.returned, NONE, place)
+
+
+def _note_unpublished(evaluator: Evaluator, scope: Scope, wire: Wire) -> None:
+    """Note payloads that nothing publishes: dictionaries and messages made by the behaviour."""
+    for value, place in (*scope.returned, *scope.yielded) if wire.is_unpublished else ():
+        several = alternatives(value)
+        is_payload = all(isinstance(each, Mapping | Message) for each in several)
+        if is_payload and _is_made_there(place.node):
+            evaluator.run.reading.unpublished.append(span_of(place))
+
+
+def _is_made_there(node: ast.AST) -> bool:
+    """Return whether an expression is a dictionary, or makes an object of a class."""
+    called = node.func if isinstance(node, ast.Call) else None
+    name = str(getattr(called, 'id', None) or getattr(called, 'attr', ''))
+    return isinstance(node, ast.Dict) or name[:1].isupper()
 
 
 def _is_stub(definition: FunctionNode | ast.Lambda) -> bool:

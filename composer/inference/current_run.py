@@ -269,7 +269,7 @@ def span_of(place: Place, name: str = '') -> Span:
         last += len(node.arg or '')
         line = node.lineno
         return Span(source, line, first + 1, max(last - first, 1))
-    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
         line, name = first_line, node.name
         text = source.line(line)
         first, last = 0, len(text)

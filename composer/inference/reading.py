@@ -138,6 +138,7 @@ class Reading:
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
             are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
+        unpublished: Where it gives away payloads that nothing publishes.
         kept: What it keeps in `node.state`, and as `[name]` in `node.own_state`.
         kept_by_file: The names of those of these that it has from the file, or keeps where the
             file says so.
@@ -166,6 +167,7 @@ class Reading:
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
+    unpublished: list[Span] = field(default_factory=list)
     kept: dict[str, Value] = field(default_factory=dict)
     kept_by_file: set[str] = field(default_factory=set)
     needs_state: bool = False

@@ -245,11 +245,17 @@ class Function:
 
 @dataclass(slots=True, eq=False)
 class Class:
-    """A class of the project."""
+    """A class of the project.
+
+    Attributes:
+        outer: The `Scope` around it; `None` for the module's own.
+        attributes: What was stored in it later, wherever that was.
+    """
 
     module: ModuleSource
     definition: ast.ClassDef
     outer: Any = None
+    attributes: dict[str, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -261,6 +267,8 @@ class Instance:
         is_shared: Whether other behaviours may have it, too.
         doubtful: The attributes that were stored on conditions.
         version: How often what it has changed.
+        is_open: Whether something unknown may have stored attributes in it.
+        is_unmade: Whether nobody has seen how it was made.
         is_member: Whether it is a member of an enumeration.
     """
 
@@ -269,6 +277,8 @@ class Instance:
     is_shared: bool = False
     doubtful: set[str] = field(default_factory=set)
     version: int = 0
+    is_open: bool = False
+    is_unmade: bool = False
     is_member: bool = False
 
     def set(self, name: str, value: Value) -> None:
@@ -466,9 +476,15 @@ def join(values: Iterable[Value], *, like: Value | None = None) -> Value:
     if any(isinstance(value, Unknown) for value in found):
         unknown = Unknown(max(map(is_chosen, found), default=0))
         # Of what may be called, something is known still.
-        called = [each for each in found if isinstance(each, Function | Partial | Class)]
+        called = [each for each in found if _is_acting(each)]
         return Alternatives((unknown, *called)) if called else unknown
     return Alternatives(tuple(found), isinstance(like, Alternatives) and like.is_direct)
+
+
+def _is_acting(value: Value) -> bool:
+    if isinstance(value, Instance):
+        return not value.is_member
+    return isinstance(value, Function | Partial | Class | NodeValue)
 
 
 def is_none(value: Value) -> bool:

@@ -21,6 +21,7 @@ class Wire:
         yielded: The type that each yielded payload becomes.
         returned: The type that a returned payload becomes.
         ended: The type that a payload becomes which a generator returns.
+        is_unpublished: Whether nothing publishes what it gives, although `publish:` could.
         needs_payload: Whether a response has to be returned.
     """
 
@@ -29,6 +30,7 @@ class Wire:
     returned: str | None = None
     ended: str | None = None
     needs_payload: bool = False
+    is_unpublished: bool = False
 
 
 def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
@@ -53,4 +55,5 @@ def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
         returned=type_of(key.returned),
         ended=type_of(key.returned),
         needs_payload=key.returned not in (None, PUBLISHED),
+        is_unpublished=key.returned == PUBLISHED and published is None,
     )

@@ -14,11 +14,11 @@ from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS, WORK_KEYS
 from composer.language.specs import NodeSpec
 from composer.schema.structure import lacks_keys
-from composer.spelling import did_you_mean, find_nearest, suggest
+from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -86,6 +86,8 @@ class _Merging:
                     self._report(at, f"there is no node '{key}' to change", below)
                 if key not in merged and path == ('args',) and not self._is_used(key):
                     self._report(at, f"there is no argument '{key}' to change", below)
+                if key not in merged and (near := self._find_typo(at, below)):
+                    self._report(at, f"there is no '{key}' to change", [near])
                 merged[key] = self._without_removals(value, at)
                 self.positions.replace(at, self._new_positions)
         return merged
@@ -103,6 +105,18 @@ class _Merging:
                 self._report(at, f"null removes '{key}', which does not exist", {})
         return kept
 
+    def _find_typo(self, path: DataPath, there: dict[str, Any]) -> str | None:
+        """Return the entry that a new one, which is whole in itself, is a misspelling of."""
+        *outer, name = path
+        is_simple = tuple(outer) in (('qos',), ('environment',)) or (
+            len(outer) == _IN_NODE and outer[-1] in ('env', 'parameters', 'state')
+        )
+        near = find_nearest(name, there) if is_simple else None
+        if near is None or not is_typo(str(name), near):
+            return None
+        is_used = any(name == each for user in self._users for each in _values(user.data))
+        return None if is_used else near
+
     def _is_used(self, argument: str) -> bool:
         """Return whether an expression of a layer may use an argument that it declares."""
         word = re.compile(rf'\b{re.escape(argument)}\b')
@@ -119,7 +133,7 @@ class _Merging:
         finding = diagnostic_at(span, 'missing-key', message, help=did_you_mean(meant))
         self.findings.append(finding)
 
-    def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
+    def _report(self, path: DataPath, message: str, there: Iterable[str]) -> None:
         self.findings.append(
             diagnostic_at(
                 self._new_positions.key(path),
@@ -128,6 +142,13 @@ class _Merging:
                 help=suggest(str(path[-1]), there, 'there are'),
             )
         )
+
+
+def _values(data: Any) -> Iterator[Any]:
+    """Yield the scalars of data, without its keys."""
+    inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    for each in inner:
+        yield from _values(each) if isinstance(each, dict | list) else (each,)
 
 
 def _texts(data: Any) -> Iterator[str]:

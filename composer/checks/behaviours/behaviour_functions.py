@@ -31,7 +31,7 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     # Calls without arguments that fit; many nodes may have the same.
     fitting: set[tuple[str, BehaviourKey]] = set()
     for node in context.spec.nodes.values():
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             call = (binding.behaviour.name, binding.key)
             is_known = call in fitting and not binding.behaviour.arguments
             if is_known or context.was_dropped(binding.behaviour.path):
@@ -199,7 +199,9 @@ def _check_signature(
     taken = _positional_parameters(signature)[: len(binding.parameters)]
     free = [name for name in by_keyword or () if name not in taken]
     # A misspelt name counts as the name that it means: it has a finding of its own.
-    was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
+    owner = behaviour.path[:-1]
+    # An unknown key may be `with`, misspelt.
+    was_dropped = any(path[:-1] == owner for path in context.system.dropped)
     given = set(free if was_dropped else behaviour.arguments)
     # An argument counts as given although its expression has an error.
     given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}

@@ -94,7 +94,7 @@ def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
     subscription can ask for: their deadlines are no shorter, or do not match.
     """
     for node in context.spec.nodes.values():
-        if any(path[:2] == node.path for path in context.system.dropped):
+        if node.path in context.incomplete:
             continue
         published = _published_by_behaviours(context, node)
         for publisher in node.publishers.values():
@@ -157,8 +157,20 @@ def _explain_deadline(
         f"publisher '{publisher.name}' promises a message every {deadline_sec:g} s, and {who} "
         f'one every {period_sec:g} s',
         help='make the deadline longer than the period',
-        related=[context.related(timer.path, 'this publishes on it') for timer in timers],
+        related=[
+            *_place_of_deadline(context, publisher),
+            *(context.related(timer.path, 'this publishes on it') for timer in timers),
+        ],
     )
+
+
+def _place_of_deadline(context: CheckContext, publisher: PublisherSpec) -> Iterator[Related]:
+    """Yield where a profile that the publisher uses promises its deadline."""
+    for source in _sources(context, publisher.qos):
+        path = (*source, 'deadline')
+        if source[:1] == ('qos',) and path in context.system.positions.values:
+            yield context.related(path, 'it is promised here')
+            return
 
 
 def _find_conflicts(

@@ -17,7 +17,15 @@ if TYPE_CHECKING:
 _HARMLESS = {
     *(f'builtins.{name}' for name in ('object', 'str', 'int', 'float')),
     *(f'typing.{name}' for name in ('Generic', 'NamedTuple', 'Protocol', 'TypedDict')),
-    *('abc.ABC', 'enum.Enum', 'enum.IntEnum', 'enum.StrEnum', 'enum.Flag', 'enum.IntFlag'),
+    *(
+        'types.SimpleNamespace',
+        'abc.ABC',
+        'enum.Enum',
+        'enum.IntEnum',
+        'enum.StrEnum',
+        'enum.Flag',
+        'enum.IntFlag',
+    ),
 }
 _METACLASSES = {'abc.ABCMeta'}
 
@@ -60,18 +68,23 @@ class ClassBodies(Part):
         key = (id(of.definition), id(of.outer))
         if key not in self._lines:
             self._lines[key] = [of]
-            bases = self._bases(of)
+            bases = self.bases_of(of)
             lines = [self.line_of(each) if isinstance(each, Class) else [each] for each in bases]
             self._lines[key] = [of, *_merge([*lines, bases])]
         return self._lines[key]
 
-    def _bases(self, of: Class) -> list[Value]:
-        found = []
+    def bases_of(self, of: Class) -> list[Value]:
+        """Return what a class inherits from."""
+        found: list[Value] = []
         with self._evaluator.run.silence():
             scope = of.outer or Scope(of.module)
             for base in of.definition.bases:
                 bare = base.value if isinstance(base, ast.Subscript) else base
-                found.append(self._evaluator.evaluate(bare, scope))
+                if isinstance(bare, ast.Name) and '.' in bare.id:
+                    # Of a class that the library makes: `namedtuple('Step', …)`.
+                    found.append(External(bare.id))
+                else:
+                    found.append(self._evaluator.evaluate(bare, scope))
             for keyword in of.definition.keywords:
                 value = self._evaluator.evaluate(keyword.value, scope)
                 is_known = isinstance(value, External) and value.name in _METACLASSES

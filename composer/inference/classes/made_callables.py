@@ -12,6 +12,7 @@ from composer.inference.values import (
     UNKNOWN,
     Argument,
     Arguments,
+    Class,
     Constant,
     Descriptor,
     External,
@@ -21,6 +22,7 @@ from composer.inference.values import (
     MessageClass,
     Partial,
     Place,
+    Scalar,
     Sequence,
     Value,
     alternatives,
@@ -45,6 +47,8 @@ class MadeCallables(Part):
         if name in _MAKERS and arguments.positional and not arguments.is_open:
             return Partial(External(f'{name}()'), arguments)
         calls: dict[str, Callable[[Arguments, Place], Value]] = {
+            'collections.namedtuple': self._make_tuple,
+            'types.SimpleNamespace': self._make_namespace,
             'functools.partialmethod': self._make_method,
             'functools.singledispatch()': self._dispatch,
             'operator.attrgetter()': self._read_attributes,
@@ -58,6 +62,24 @@ class MadeCallables(Part):
             return UNKNOWN
         rest = Arguments(arguments.positional[1:], arguments.named, arguments.is_open)
         return Descriptor('partialmethod', Partial(arguments.positional[0].value, rest))
+
+    def _make_tuple(self, arguments: Arguments, place: Place) -> Value:
+        """Return the class that `namedtuple('Step', 'topic payload')` makes."""
+        fields = arguments.get(1, 'field_names')
+        names = _texts(fields.value) if fields else None
+        if names is None or arguments.get(2, 'defaults') or arguments.get(2, 'rename'):
+            self._evaluator.calls.escape_all(arguments)
+            return UNKNOWN
+        body = [
+            ast.AnnAssign(ast.Name(name, ast.Store()), ast.Constant(None), None, 1)
+            for name in names
+        ]
+        return _class_at(place, 'typing.NamedTuple', body)
+
+    def _make_namespace(self, arguments: Arguments, place: Place) -> Value:
+        of = _class_at(place, 'types.SimpleNamespace', [])
+        made: Value = self._evaluator.classes.instantiate(of, arguments)
+        return made
 
     def _read_attributes(self, arguments: Arguments, place: Place) -> Value:
         *names, owner = arguments.positional
@@ -107,11 +129,12 @@ class MadeCallables(Part):
 
     def _registered(self, base: Function, value: Value) -> Function | None:
         """Return the function for a value; `None` if that may be any."""
-        wanted = _class_of(value)
+        line = self._line_of(value)
         name = getattr(base.definition, 'name', '')
         known = [each for each in base.module.body if isinstance(each, ast.FunctionDef)]
-        if wanted is None:
+        if line is None:
             return None
+        registered: list[tuple[Value, Function]] = []
         for each in known:
             for decorator in each.decorator_list:
                 call = decorator if isinstance(decorator, ast.Call) else None
@@ -120,9 +143,25 @@ class MadeCallables(Part):
                 first = [*each.args.posonlyargs, *each.args.args][:1]
                 classes = call.args if call else [item.annotation for item in first]
                 function = Function(base.module, each)
-                if any(self._class_at(function, item) == wanted for item in classes if item):
-                    return function
-        return base
+                registered += [
+                    (self._class_at(function, item), function) for item in classes if item
+                ]
+        if not all(_is_class(each) for each, _ in registered):
+            return None
+        ranked = [function for one in line for each, function in registered if each == one]
+        return ranked[0] if ranked else base
+
+    def _line_of(self, value: Value) -> list[Value] | None:
+        """Return the class of a value and its bases; `None` if they are not known."""
+        match value:
+            case Message(type=name):
+                return [MessageClass(name)]
+            case Instance(of=of):
+                line: list[Value] = self._evaluator.classes.bodies.line_of(of)
+                return line
+            case Constant(kind=kind) | Scalar(kind=kind):
+                return [External(f'builtins.{each.__name__}') for each in kind.__mro__]
+        return None
 
     def _class_at(self, function: Function, expression: ast.expr) -> Value:
         scope = Scope(function.module)
@@ -131,12 +170,32 @@ class MadeCallables(Part):
         return value
 
 
-def _class_of(value: Value) -> Value | None:
+def _class_at(place: Place, base: str, body: list[ast.AnnAssign]) -> Class:
+    """Return a class that the library makes at a place."""
+    definition = ast.ClassDef(
+        name=base.rpartition('.')[2],
+        bases=[ast.Name(base, ast.Load())],
+        keywords=[],
+        body=list(body),
+        decorator_list=[],
+    )
+    ast.copy_location(definition, place.node)
+    for node in ast.walk(definition):
+        ast.copy_location(node, place.node)
+    return Class(place.module, definition)
+
+
+def _texts(value: Value) -> list[str] | None:
+    """Return the names that are written as a text, or as a list of texts."""
     match value:
-        case Message(type=name):
-            return MessageClass(name)
-        case Instance(of=of):
-            return of
-        case Constant(kind=kind):
-            return External(f'builtins.{kind.__name__}')
+        case Constant(value=str(text)):
+            return text.replace(',', ' ').split()
+        case Sequence() if value.is_whole:
+            found = [item.value for item, _ in value.items if isinstance(item, Constant)]
+            return found if len(found) == len(value.items) else None
     return None
+
+
+def _is_class(value: Value) -> bool:
+    is_plain = isinstance(value, External) and value.name.startswith('builtins.')
+    return is_plain or isinstance(value, Class | MessageClass)

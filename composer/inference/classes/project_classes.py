@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.classes.class_bodies import ClassBodies
@@ -16,6 +17,7 @@ from composer.inference.values import (
     Class,
     Constant,
     Descriptor,
+    External,
     Function,
     Instance,
     Mapping,
@@ -36,6 +38,9 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from composer.inference.classes.attribute_stores import AttributeStore
 
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+# What a class and a function have that tells their name.
+CLASS_NAMES = ('__name__', '__qualname__')
 # What an object keeps, wherever else something is stored in it.
 _LASTING = (
     Primitive,
@@ -51,6 +56,7 @@ class Classes(Part):
         self.bodies = ClassBodies(evaluator)
         self.fields = MadeFields(evaluator)
         self.enumerations = Enumerations(evaluator)
+        self._made: list[Instance] = []
 
     # Objects
 
@@ -64,6 +70,7 @@ class Classes(Part):
             return made
         is_made_anew = self.bodies.find(of, '__new__') is None
         instance = Instance(of, is_shared=self._evaluator.run.is_at_top or not is_made_anew)
+        self._made.append(instance)
         init = self.class_attribute(of, '__init__', instance)
         if isinstance(init, Function):
             self._evaluator.functions.follow(init, arguments, waits=True)
@@ -72,6 +79,26 @@ class Classes(Part):
         else:
             self._evaluator.calls.escape_all(arguments)
         return instance
+
+    def mention_held(self) -> None:
+        """Note the texts in objects: methods that were not followed may use them as names."""
+        followed = self._evaluator.run.modules.followed
+        for instance in self._made:
+            line = [each for each in self.bodies.line_of(instance.of) if isinstance(each, Class)]
+            methods = [each for one in line for each in one.definition.body]
+            if any(isinstance(each, _FUNCTIONS) and id(each) not in followed for each in methods):
+                for value in instance.attributes.values():
+                    self._mention(value)
+
+    def _mention(self, value: Value) -> None:
+        for each in alternatives(value):
+            if isinstance(each, Constant) and each.kind is str:
+                self._evaluator.run.reading.mentioned.add(each.value)
+            elif isinstance(each, Mapping | Sequence):
+                held = each.entries.values() if isinstance(each, Mapping) else each.items
+                for one, _ in held:
+                    if isinstance(one, Constant):
+                        self._mention(one)
 
     # Attributes
 
@@ -98,7 +125,46 @@ class Classes(Part):
             case Instance():
                 getter = self.class_attribute(value.of, '__get__', value)
                 return value if getter is None else self._follow(getter, owner or UNKNOWN, of)
-        return UNKNOWN if self._changes(of, name, value, is_shared=True) else value
+        if not self._changes(of, name, value, is_shared=True):
+            return value
+        # Other behaviours may have stored something else, or nothing yet.
+        return join([UNKNOWN, *self._stored_in_classes(of, name)])
+
+    def _stored_in_classes(self, of: Class, name: str) -> list[Value]:
+        line = [each for each in self.bodies.line_of(of) if isinstance(each, Class)]
+        return [each.attributes[name] for each in line if name in each.attributes]
+
+    def store_in_class(self, of: Class, name: str, value: Value) -> None:
+        """Store an attribute of a class."""
+        if isinstance(value, Instance):
+            value.is_shared = True
+        else:
+            self._evaluator.escape(value)
+        stored = [of.attributes[name]] if name in of.attributes else []
+        of.attributes[name] = join([*stored, value])
+
+    def name_of(self, of: Class | Function) -> Value:
+        """Return the name of a class or function."""
+        name = getattr(of.definition, 'name', None)
+        return constant(name, Place(of.module, of.definition)) if name else UNKNOWN
+
+    def subclasses(self, of: Class) -> Value:
+        """Return the classes of the same module whose base is a class."""
+        found: list[tuple[Value, Place]] = []
+        for statement in of.module.body:
+            if isinstance(statement, ast.ClassDef) and statement.bases:
+                made = self._evaluator.top_value(of.module, statement.name)
+                if isinstance(made, Class) and of in self.bodies.bases_of(made):
+                    found.append((made, Place(of.module, statement)))
+        return Sequence(found, list, is_open=True)
+
+    def is_instance(self, value: Instance, wanted: Value) -> bool | None:
+        """Return whether an object is of a class, if that is known."""
+        line = self.bodies.line_of(value.of)
+        if wanted in line:
+            return True
+        is_closed = all(isinstance(each, Class | External) for each in line)
+        return False if is_closed and isinstance(wanted, Class) else None
 
     def _read_descriptor(
         self, descriptor: Descriptor, home: Class, of: Class, owner: Value | None
@@ -140,12 +206,25 @@ class Classes(Part):
         if held and isinstance(held[0], Descriptor):
             return found or UNKNOWN
         stored = owner.attributes.get(name)
+        if name == '__dict__':
+            owner.is_open = True
+            return UNKNOWN
+        if name == 'start' and 'threading.Thread' in self.bodies.externals(owner.of):
+            run = self.class_attribute(owner.of, 'run', owner)
+            if isinstance(run, Function):
+                self._evaluator.functions.follow_later(run)
+        if stored is None and owner.is_unmade and self._stores(name):
+            return UNKNOWN
         if stored is None:
-            return found if found is not None else self._read_of_proxy(owner, name)
+            is_kept = found is None or not owner.is_open or _is_lasting(found)
+            kept = found if is_kept else UNKNOWN
+            return kept if kept is not None else self._read_of_proxy(owner, name)
         if name in owner.doubtful and found is not None:
             stored = join([stored, found])
         if all(map(_is_lasting, alternatives(stored))):
             return stored
+        if owner.is_open:
+            return join(map(_widen, alternatives(stored)))
         if len(self._stores(name)) == 1 and not self._is_changed_inside(owner, name, stored):
             return stored
         if not self._changes(owner.of, name, stored, is_shared=owner.is_shared):
@@ -167,7 +246,8 @@ class Classes(Part):
         if held and isinstance(held[0], Descriptor) and isinstance(held[0].setter, Function):
             self._follow(_method(held[0].setter, held[1], owner), value)
             return
-        if self.bodies.find(owner.of, '__setattr__') is not None:
+        setter = self.bodies.find(owner.of, '__setattr__')
+        if setter is not None and isinstance(setter[0], Function):
             self._evaluator.escape(value)
             value = UNKNOWN
         if self._evaluator.run.conditions:

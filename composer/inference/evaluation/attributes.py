@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.classes.project_classes import CLASS_NAMES
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
@@ -20,6 +21,7 @@ from composer.inference.values import (
     Class,
     Constant,
     External,
+    Function,
     Generated,
     Held,
     Instance,
@@ -129,7 +131,9 @@ class Attributes(Part):
 
     def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
         """Return an attribute, or a problem: the rule, what is wrong, and help."""
-        if name.startswith('__') and not isinstance(owner, Instance | Super):
+        if isinstance(owner, Class | Function) and name in CLASS_NAMES:
+            return self._evaluator.classes.name_of(owner)
+        if name.startswith('__') and not isinstance(owner, Instance | Class | Super):
             if name == '__class__' and isinstance(owner, Message):
                 return MessageClass(owner.type)
             if name in ('__name__', '__qualname__') and isinstance(owner, MessageClass):
@@ -148,12 +152,16 @@ class Attributes(Part):
                 return self._evaluator.imports.external(f'{owner.name}.{name}', place)
             case ProjectModule():
                 return self._read_module(owner, name)
+            case Instance() if name in ('_asdict', '_replace'):
+                return BoundMethod(owner, name)
             case Instance():
                 self._evaluator.run.moves += name in owner.attributes
                 return (
                     owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
                 )
             case Class():
+                if name == '__subclasses__':
+                    return BoundMethod(owner, name)
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
             case Super(of=of, owner=Instance() | Class() as mine):
                 whole = mine.of if isinstance(mine, Instance) else mine
@@ -385,6 +393,8 @@ class Attributes(Part):
                 self._store_field(owner, name, value, place)
             case Instance():
                 self._evaluator.classes.store(owner, name, value)
+            case Class():
+                self._evaluator.classes.store_in_class(owner, name, value)
             case _:
                 self._evaluator.escape(value)
 
@@ -393,7 +403,7 @@ class Attributes(Part):
             'unset-parameter',
             place,
             f"this does not set the parameter '{name}'",
-            f'write node.set_parameters(node.name, {{{name!r}: …}})',
+            f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?',
         )
 
     def store_item(self, index: Value, place: Place) -> None:

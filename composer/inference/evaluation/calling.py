@@ -30,6 +30,7 @@ from composer.inference.values import (
     Place,
     Primitive,
     Scalar,
+    Sequence,
     Super,
     Unknown,
     Value,
@@ -43,6 +44,12 @@ from composer.interfaces.field_errors import unknown_field
 
 if TYPE_CHECKING:
     from composer.inference.scopes import Scope
+
+# Methods that call a function with the arguments after it, and the position of the function.
+_CALLING_LATER = {
+    **dict.fromkeys(('call_soon', 'call_soon_threadsafe', 'callback', 'submit', 'to_thread'), 0),
+    **dict.fromkeys(('call_at', 'call_later', 'run_in_executor'), 1),
+}
 
 
 class Calls(Part):
@@ -59,7 +66,10 @@ class Calls(Part):
         if function == External('builtins.locals'):
             return UNKNOWN
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
-        if isinstance(function, Unknown) and method in SENDING_METHODS:
+        if method in _CALLING_LATER or isinstance(function, External):
+            arguments = _with_work(arguments, _CALLING_LATER.get(method))
+        is_open = any(isinstance(each, Unknown) for each in alternatives(function))
+        if is_open and method in SENDING_METHODS:
             # It may be the node, in another guise.
             name = arguments.get(0, 'name')
             if name is None or not isinstance(name.value, Constant):
@@ -70,10 +80,24 @@ class Calls(Part):
         try:
             return join(
                 self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
-                for each in alternatives(function)
+                for each in self._fitting(function, arguments)
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _fitting(self, function: Value, arguments: Arguments) -> list[Value]:
+        """Return which of several functions may be called so, or all if none may."""
+        several = list(alternatives(function))
+        if len(several) == 1:
+            return several
+        with self._evaluator.run.silence():
+            found = [
+                each
+                for each in several
+                if not isinstance(each, Function)
+                or self._evaluator.functions.fits(each, arguments)
+            ]
+        return found or several
 
     def _note_wait(self, node: ast.Call, arguments: Arguments, scope: Scope) -> None:
         """Note a call of a method of what is kept in the state: `node.state.event.wait()`."""
@@ -154,6 +178,8 @@ class Calls(Part):
                 return self._evaluator.node_calls.call(
                     name, arguments, waits=waits, is_awaited=is_awaited
                 )
+            case BoundMethod(owner=Class() as owner):
+                return self._evaluator.classes.subclasses(owner)
             case BoundMethod():
                 owner, name = function.owner, function.name
                 if isinstance(owner, PartOfNode):
@@ -187,6 +213,8 @@ class Calls(Part):
                         method, arguments, place, waits=waits, is_awaited=is_awaited
                     )
             case External():
+                if is_awaited:
+                    self._evaluator.waiting.await_asyncio(function.name, arguments, place)
                 made = self._evaluator.callables.call(function.name, arguments, place)
                 if made is not None:
                     return made
@@ -222,9 +250,8 @@ class Calls(Part):
         given = partial.arguments
         arguments = Arguments(given.positional, given.named, is_open=True)
         function = partial.function
-        if (isinstance(function, Function) and given.positional) or (
-            function == BoundMethod(NODE, 'publish') and given.positional
-        ):
+        is_publish = function == BoundMethod(NODE, 'publish')
+        if given.positional and (isinstance(function, Function) or is_publish):
             with self._evaluator.run.condition():
                 self.invoke(function, arguments, given.positional[0].place, waits=False)
         else:
@@ -264,6 +291,27 @@ class Calls(Part):
                 message = str(error).replace(function.type, shown)
                 evaluator.run.report('unknown-field', argument.place, message, error.help)
         return made
+
+
+def _with_work(arguments: Arguments, position: int | None) -> Arguments:
+    """Return arguments in which a function and what it will be called with are one."""
+    named = dict(arguments.named)
+    work, given = named.get('target'), named.get('args')
+    if work is not None and given is not None and isinstance(given.value, Sequence):
+        rest = Arguments(tuple(Argument(*item) for item in given.value.items))
+        later = Argument(Partial(work.value, rest), work.place)
+        others = [(name, each) for name, each in arguments.named if name not in ('target', 'args')]
+        return Arguments(arguments.positional, (*others, ('target', later)), arguments.is_open)
+    if position is None or len(arguments.positional) <= position or arguments.is_open:
+        return arguments
+    work = arguments.positional[position]
+    if not isinstance(work.value, Function | BoundMethod):
+        return arguments
+    rest = Arguments(arguments.positional[position + 1 :])
+    return Arguments(
+        (*arguments.positional[:position], Argument(Partial(work.value, rest), work.place)),
+        arguments.named,
+    )
 
 
 def _super_in(scope: Scope) -> Value:

@@ -22,6 +22,7 @@ from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
+from composer.inference.statements.guards import Guards
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
@@ -83,6 +84,7 @@ class Evaluator:
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.guards = Guards(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.registries = Registries(self)
@@ -113,6 +115,11 @@ class Evaluator:
         current: Scope | None = scope
         while current is not None:
             is_later = current.is_body and name not in (current.names or ())
+            if current is scope and name not in current.local and name in (current.names or ()):
+                held = current.names[name] if current.names else UNKNOWN
+                if all(isinstance(each, Instance | Unknown) for each in alternatives(held)):
+                    # A global one that was just stored.
+                    return held
             if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
@@ -185,6 +192,10 @@ class Evaluator:
             text = 'this is an async generator'
             place = Place(scope.module, node)
             self.run.report('missing-await', place, text, "go through it with 'async for'")
+        elif is_async and all(map(_is_plain, alternatives(value))):
+            text = 'this is no async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'for'")
         return value
 
     @contextmanager
@@ -243,8 +254,13 @@ class Evaluator:
         if isinstance(value, Class):
             return UNKNOWN
         iterator = self.classes.call_method(value, '__iter__')
+        if iterator is None:
+            iterator = self.classes.call_method(value, '__aiter__')
         if isinstance(iterator, Instance):
-            return self.classes.call_method(iterator, '__next__') or UNKNOWN
+            item = self.classes.call_method(iterator, '__next__')
+            if item is None:
+                item = self.classes.call_method(iterator, '__anext__')
+            return item.result if isinstance(item, Awaitable) else item or UNKNOWN
         return UNKNOWN if iterator is None else self.item_of(iterator)
 
     def entered(self, value: Value) -> Value:
@@ -318,6 +334,7 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
+                value.is_open = True
                 for each in value.attributes.values():
                     if isinstance(each, NodeValue | BoundMethod | PartOfNode):
                         self.escape(each)
@@ -340,3 +357,10 @@ def _lasting(value: Value) -> Value:
         case PartOfNode(name='time' | 'goal'):
             return value
     return UNKNOWN
+
+
+def _is_plain(value: Value) -> bool:
+    """Return whether a value is gone through without waiting."""
+    if isinstance(value, Generated):
+        return not value.is_async
+    return isinstance(value, Sequence | Mapping | ArrayField | Constant | Scalar)

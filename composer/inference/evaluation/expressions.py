@@ -26,6 +26,7 @@ from composer.inference.values import (
     Instance,
     Mapping,
     Message,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
+_NOT_AWAITED = (Message, Constant, Scalar, Mapping, Sequence, PartOfNode)
 # Expressions that make a value, rather than find one.
 _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 _NO_CONVERSION = -1
@@ -275,6 +277,9 @@ class Expressions(Part):
         owner = self.evaluate(node.value, scope)
         index = self.evaluate(node.slice, scope)
         self._evaluator.run.decide(index)
+        if _is_globals(node.value) and isinstance(index, Constant):
+            is_known = self._evaluator.run.modules.has_name(scope.module, index.value)
+            return self._evaluator.top_value(scope.module, index.value) if is_known else UNKNOWN
         is_slice = isinstance(node.slice, _UNREAD)
         place = Place(scope.module, node.slice)
         return join(
@@ -343,7 +348,7 @@ class Expressions(Part):
         else:
             value = self.evaluate(node.value, scope)
         several = alternatives(value)
-        if all(isinstance(each, Message | Constant | Scalar | Mapping) for each in several):
+        if all(isinstance(each, _NOT_AWAITED) for each in several):
             place = Place(scope.module, node.value)
             text = 'what is awaited here is no coroutine'
             self._evaluator.run.report('missing-await', place, text, 'leave out the await')
@@ -416,3 +421,10 @@ class Expressions(Part):
                 else:
                     made.is_open = True
         return made
+
+
+def _is_globals(node: ast.expr) -> bool:
+    match node:
+        case ast.Call(func=ast.Name('globals')):
+            return True
+    return False

@@ -17,6 +17,7 @@ from composer.inference.values import (
     Argument,
     Arguments,
     Awaitable,
+    Constant,
     Descriptor,
     External,
     Function,
@@ -138,7 +139,10 @@ class Functions(Part):
         if key is not None and key in self._results and self._evaluator.run.probed is None:
             self._evaluator.run.tried += 1
             return self._results[key]
-        if function.definition in self.active or len(self.active) >= _DEEPEST:
+        # With known numbers and texts, one that calls itself comes to an end.
+        is_simple = all(isinstance(each.value, Constant) for each in arguments.all())
+        is_again = function.definition in self.active and not (is_simple and key)
+        if is_again or len(self.active) >= _DEEPEST:
             self._evaluator.calls.escape_all(arguments)
             # What a call of itself gives, the other ways through it give, too.
             is_plain = self.kind_of(function) is FunctionKind.PLAIN

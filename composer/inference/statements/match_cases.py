@@ -13,6 +13,7 @@ from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
     UNKNOWN,
     Constant,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -113,6 +114,8 @@ class MatchCases(Part):
 
     def _match_class(self, pattern: ast.MatchClass, subject: Value, scope: Scope) -> _Outcome:
         wanted = self._evaluator.evaluate(pattern.cls, scope)
+        if isinstance(subject, Instance):
+            return self._match_object(pattern, subject, wanted, scope)
         matches = is_instance(subject, wanted)
         value = subject if matches else UNKNOWN
         if isinstance(wanted, MessageClass) and matches is not False:
@@ -131,6 +134,24 @@ class MatchCases(Part):
                 held = self._evaluator.attributes.read(value, name, place)
             matches = _both(matches, self._match(each, held, scope)[0])
         return matches, value
+
+    def _match_object(
+        self, pattern: ast.MatchClass, subject: Instance, wanted: Value, scope: Scope
+    ) -> _Outcome:
+        classes = self._evaluator.classes
+        matches = classes.is_instance(subject, wanted)
+        if matches is False:
+            self._forget(_captured(pattern), scope)
+            return False, UNKNOWN
+        names = [*(classes.fields_of(subject) or ()), *['…'] * len(pattern.patterns)]
+        held = [
+            *zip(names, pattern.patterns, strict=False),
+            *zip(pattern.kwd_attrs, pattern.kwd_patterns, strict=True),
+        ]
+        for name, each in held:
+            value = classes.read(subject, name)
+            matches = _both(matches, self._match(each, value, scope)[0])
+        return matches, subject
 
     def _match_sequence(
         self, pattern: ast.MatchSequence, subject: Value, scope: Scope

@@ -43,6 +43,10 @@ def use(node):
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
+import asyncio
+import threading
+from collections import namedtuple
+from types import SimpleNamespace
 import copy
 import dataclasses
 import functools
@@ -60,6 +64,12 @@ class Keeper:
     def go(self, payload):
         self.publish('command', payload)
 
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *reason):
+        return None
+
     async def wait(self):
         return await self.node.call_async('enable', True)
 
@@ -67,7 +77,16 @@ class Keeper:
 @dataclasses.dataclass
 class Turn:
     linear: dict
-    angul: dict  # of ASDICT
+    angul: dict  # of VARS
+
+
+Move = namedtuple('Move', 'linear angul')  # of ASDICT
+
+
+def nested(depth):
+    if depth:
+        return nested(depth - 1)
+    return {'angul': {}}  # of NESTED
 
 
 def poses(node):
@@ -76,6 +95,11 @@ def poses(node):
 
 def pass_on(node, name, payload):
     node.publish(name, payload)
+
+
+async def run_beside(node):
+    await asyncio.sleep(1)
+    await asyncio.gather(asyncio.sleep(1), asyncio.sleep(2))
 
 
 def odometry(node):
@@ -188,6 +212,25 @@ WRONG = {
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
+    "kept = node.call_async('enable', True)": 'missing-await',
+    "await node.publish('command', {})": 'missing-await',
+    "await node.call('enable', True)": 'missing-await',
+    "await node.send_goal('count', 1)": 'missing-await',
+    "await node.send_goal('count', 1).result()": 'missing-await',
+    "async for f in node.send_goal('count', 1).feedback: print(f)": 'missing-await',
+    'await asyncio.sleep(m.pose.pose.position.x)': 'no-event-loop',
+    "await asyncio.gather(node.call_async('enable', True))": 'no-event-loop',
+    "await asyncio.wait_for(node.call_async('enable', True), 1)": 'no-event-loop',
+    "async with asyncio.timeout(1): await node.call_async('enable', True)": 'no-event-loop',
+    'node.shutdown': 'no-effect',
+    "node.send_goal('count', 1).cancel": 'no-effect',
+    "threading.Thread(target=pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Timer(1, pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1))": 'no-effect',
+    "node.get_parameters('camera', 'gain')": 'bad-call',
+    "node.set_parameters('camera', {'gain'})": 'bad-call',
+    "print(node.get_parameters('camera', ['gain']).gain)": 'unknown-attribute',
+    'if node.parameters.speed > 1: node.parameters.speed = 1.0': 'unset-parameter',
     'm': 'no-effect',
     'print(mesage)': 'undefined-name',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
@@ -219,6 +262,16 @@ RIGHT = [
     'setattr(node.state, m.child_frame_id, 1); print(node.state.anything)',
     "node.logger.info('late', throttle_duration_sec=1.0)",
     "node.publish('scan', {'ranges': map(float, range(3))})",
+    "kept = node.call_async('enable', True); await kept",
+    'await asyncio.sleep(0)',
+    'asyncio.run(run_beside(node))',
+    'threading.Thread(target=lambda: asyncio.run(run_beside(node))).start()',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1)).start()",
+    "thread = threading.Thread(target=functools.partial(pass_on, node, 'level', 1)); thread.start()",
+    "print(node.get_parameters('camera', ['gain'])['gain'], node.get_parameters('camera', ('gain',)))",
+    "values = {'gain': 1.0}; node.set_parameters('camera', values)",
+    'async with Keeper(node): pass',
+    'stop = node.shutdown; print(stop)',
     "node.publish('level', round(m.pose.pose.position.x))",
     "node.publish('level', round(m.pose.pose.position.x, None))",
     "names = ['comand', 'command']; del names[0]; node.publish(names[0], {})",
@@ -235,7 +288,8 @@ RIGHT = [
 
 def check_line(check, line):
     body = indent(line, '    ')
-    code = f'{HEAD}\n\ndef hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
+    kind = 'async def' if 'await ' in line or 'async ' in line else 'def'
+    code = f'{HEAD}\n\n{kind} hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
     found = check(SYSTEM, code)
     return code.splitlines().index(body.splitlines()[0]) + 1, found
 
@@ -266,6 +320,13 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
             'print(m.velocity)  # here',
             '# here',
         ),
+        (
+            "t = SimpleNamespace(linear={}, angul={})  # here\nnode.publish('command', vars(t))",
+            '# here',
+        ),
+        ("node.publish('command', nested(2))", '# of NESTED'),
+        ("node.publish('command', Move({}, {})._asdict())", '# of ASDICT'),
+        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of VARS'),
         ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
     ],
 )
@@ -339,6 +400,31 @@ def test_what_a_behaviour_keeps_for_itself_is_known_to_it(check):
         """
     found = check(KEPT, code)
     assert found == [(5, 'unknown-field'), (11, 'unknown-attribute'), (12, 'field-type')]
+
+
+UNPUBLISHED = """
+  rover:
+    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
+    timers:
+      tick: {period: 1.0, behaviour: parts:tick}
+      send: {period: 1.0, behaviour: parts:send, publish: level}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('code', 'found'),
+    [
+        ('def tick(node):\n    return {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    yield {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    return 1\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nprint(tick)\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nsend = tick\n', []),
+    ],
+)
+def test_a_payload_is_for_something(check, code, found):
+    other = '' if 'send' in code else '\n\ndef send(node):\n    return 1\n'
+    assert check(UNPUBLISHED, code + other) == found
 
 
 def test_a_comment_in_python_silences_a_finding(check):

@@ -9,6 +9,7 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from composer.inference.classes.made_records import MadeRecords
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.library.iterable_calls import IterableCalls
 from composer.inference.evaluation.library.known_functions import (
@@ -35,6 +36,7 @@ from composer.inference.values import (
     Constant,
     External,
     Function,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -84,12 +86,15 @@ class LibraryCalls(Part):
             'functools.partial': self._partial,
             **self.iterables.handlers(),
             **self.mappings.handlers(),
+            **MadeRecords(evaluator).handlers(),
         }
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
         """Return what a call of a function may return, by its full name: `builtins.len`."""
         if name in MADE:
             return self._evaluator.waiting.make(name, arguments, place)
+        if name == 'threading.Timer' and (function := arguments.get(1, 'function')):
+            self._evaluator.waiting.check_target(function)
         if name == 'time.sleep':
             length = arguments.get(0, 'secs') or Argument(UNKNOWN, place)
             self._evaluator.waiting.sleep(length, place)
@@ -209,7 +214,11 @@ class LibraryCalls(Part):
             return Scalar(bool)
         wanted = classes.value
         several = [item for item, _ in wanted.items] if isinstance(wanted, Sequence) else [wanted]
-        answers = {is_instance(value.value, each) for each in several}
+        given = value.value
+        if isinstance(given, Instance):
+            answers = {self._evaluator.classes.is_instance(given, each) for each in several}
+        else:
+            answers = {is_instance(given, each) for each in several}
         if True in answers:
             return constant(value=True)
         return Scalar(bool) if None in answers else constant(value=False)
@@ -230,7 +239,7 @@ class LibraryCalls(Part):
         del place
         if first is not None and isinstance(first.value, Message):
             return MessageClass(first.value.type)
-        return UNKNOWN
+        return first.value.of if first and isinstance(first.value, Instance) else UNKNOWN
 
     def _round(self, arguments: Arguments, place: Place) -> Value:
         digits = arguments.get(1, 'ndigits')

@@ -113,7 +113,7 @@ class MappingCalls(Part):
         found = self._evaluator.classes.fields_of(value)
         if found is None:
             return UNKNOWN
-        made = self._new()
+        made = self._new(is_open=not value.attributes.keys() <= found.keys())
         for name, (held, where) in found.items():
             inner = [self._attributes_of(each, place) for each in alternatives(held)]
             value = held if UNKNOWN in inner else join(inner)
