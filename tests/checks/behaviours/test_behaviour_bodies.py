@@ -305,7 +305,6 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
 @pytest.mark.parametrize(
     ('lines', 'mark'),
     [
-        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of ASDICT'),
         (
             'if m.child_frame_id != node.parameters.mode: return\nprint(m.velocity)  # here',
             '# here',
