@@ -49,9 +49,9 @@ class CheckContext:
         return BehaviourReader(self.modules, self.catalogue, self.has_real_type)
 
     @cached_property
-    def bindings(self) -> dict[str, list[Binding]]:
-        """The behaviours of each node, by its key in the file."""
-        return {name: [*node_bindings(node)] for name, node in self.spec.nodes.items()}
+    def incomplete(self) -> set[DataPath]:
+        """The nodes and other entries that lack something, because it has an error."""
+        return {path[:2] for path in self.system.dropped}
 
     @cached_property
     def types(self) -> MessageTypes:
@@ -63,9 +63,19 @@ class CheckContext:
         """What describes the types of the system."""
         return self.interfaces.catalogue
 
+    def bindings(self, node: NodeSpec) -> list[Binding]:
+        """Return the behaviours of a node; they are listed once for all checks."""
+        if node.path not in self._bindings:
+            self._bindings[node.path] = [*node_bindings(node)]
+        return self._bindings[node.path]
+
+    @cached_property
+    def _bindings(self) -> dict[DataPath, list[Binding]]:
+        return {}
+
     def readings(self, node: NodeSpec) -> list[Reading]:
         """Return what each behaviour of a node does."""
-        return [self.behaviours.read(node, each) for each in self.bindings[node.key]]
+        return [self.behaviours.read(node, each) for each in self.bindings(node)]
 
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing because of an error that was reported already."""

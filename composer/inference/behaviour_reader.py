@@ -214,6 +214,7 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
     scope = evaluator.functions.enter(callee, arguments, waits=True)
     check_results(evaluator, callee, scope, wire, binding)
     evaluator.payloads.report_unfit()
+    evaluator.classes.mention_held()
 
 
 def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Arguments] | None:

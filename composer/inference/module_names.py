@@ -8,7 +8,7 @@ import sys
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from composer.inference.classes.attribute_stores import CHANGING, find_stores
+from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
 from composer.inference.values import UNKNOWN, External, Value
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.syntax import BLOCKS
@@ -126,7 +126,7 @@ class ProjectModules:
         for key, module in tuple(self._read.items()):
             if key not in self._stores:
                 self._stores[key] = find_stores(module.body)
-            found += self._stores[key].get(name, ())
+            found += [*self._stores[key].get(name, ()), *self._stores[key].get(ANY, ())]
         return found
 
     def is_patched(self, name: str) -> bool:

@@ -265,6 +265,7 @@ class Instance:
         is_shared: Whether other behaviours may have it, too.
         doubtful: The attributes that were stored on conditions.
         version: How often what it has changed.
+        is_open: Whether something unknown may have stored attributes in it.
         is_unmade: Whether nobody has seen how it was made.
         is_member: Whether it is a member of an enumeration.
     """
@@ -274,6 +275,7 @@ class Instance:
     is_shared: bool = False
     doubtful: set[str] = field(default_factory=set)
     version: int = 0
+    is_open: bool = False
     is_unmade: bool = False
     is_member: bool = False
 

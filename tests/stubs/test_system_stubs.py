@@ -14,7 +14,7 @@ from composer.language.pipeline import load_system
 from composer.stubs.system_stubs import read_template, stubs_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-SYSTEMS = sorted((ROOT / 'configs').glob('*.yaml'))
+SYSTEMS = [*sorted((ROOT / 'configs').glob('*.yaml')), ROOT / 'tests/data/valid/everything.yaml']
 
 pytestmark = pytest.mark.ros
 

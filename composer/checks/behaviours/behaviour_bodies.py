@@ -39,7 +39,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in context.bindings[node.key]
+            for binding in context.bindings(node)
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
@@ -80,8 +80,8 @@ def _publishing_behaviours(context: CheckContext) -> set[str]:
     """Return the behaviours of whose payloads something becomes somewhere."""
     return {
         binding.behaviour.name
-        for bindings in context.bindings.values()
-        for binding in bindings
+        for node in context.spec.nodes.values()
+        for binding in context.bindings(node)
         if getattr(binding.entity, 'publish', None)
         or binding.key.returned not in (None, PUBLISHED)
     }

@@ -31,7 +31,7 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     # Calls without arguments that fit; many nodes may have the same.
     fitting: set[tuple[str, BehaviourKey]] = set()
     for node in context.spec.nodes.values():
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             call = (binding.behaviour.name, binding.key)
             is_known = call in fitting and not binding.behaviour.arguments
             if is_known or context.was_dropped(binding.behaviour.path):

@@ -28,7 +28,7 @@ def check_compared_arguments(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         if not any(parameter.choices for parameter in node.parameters.values()):
             continue
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             behaviour = binding.behaviour
             if behaviour.arguments and behaviour.name not in pairs:
                 pairs[behaviour.name] = _read_pairs(context, behaviour)

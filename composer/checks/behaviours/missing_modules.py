@@ -46,7 +46,7 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the imports of the modules of behaviours, and of what these import of the project."""
     walk = _Walk(context)
     for node in context.spec.nodes.values():
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             if not context.was_dropped(binding.behaviour.path):
                 walk.visit(binding.behaviour.module, binding)
                 walk.visit_function(binding)

@@ -22,9 +22,10 @@ _WATCHING = ('watch', 'diagnose')
 def check_monitors(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that for each topic that is watched, the same node counts messages."""
     for node in context.spec.nodes.values():
-        is_whole = not any(path[:2] == node.path for path in context.system.dropped)
-        behaviours = [binding.behaviour for binding in context.bindings[node.key]]
-        if is_whole and any(each.module == _MODULE for each in behaviours):
+        behaviours = [binding.behaviour for binding in context.bindings(node)]
+        if node.path not in context.incomplete and any(
+            each.module == _MODULE for each in behaviours
+        ):
             yield from _check_node(context, node)
 
 
@@ -41,7 +42,7 @@ def _may_count(context: CheckContext, behaviour: BehaviourSpec) -> bool:
 
 
 def _check_node(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
-    behaviours = [binding.behaviour for binding in context.bindings[node.key]]
+    behaviours = [binding.behaviour for binding in context.bindings(node)]
     if not is_shipped(context, _MODULE) or any(_may_count(context, each) for each in behaviours):
         # Others may call its functions themselves.
         return

@@ -56,7 +56,7 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
-    bindings = context.bindings[node.key]
+    bindings = context.bindings(node)
     return [each for each in bindings if not context.was_dropped(each.behaviour.path)]
 
 

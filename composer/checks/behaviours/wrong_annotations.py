@@ -29,7 +29,7 @@ def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
     # Of many nodes, the behaviours are the same.
     problems: dict[tuple[str, Wire], list[str]] = {}
     for node in context.spec.nodes.values():
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             behaviour = binding.behaviour
             if binding.entity is None or context.was_dropped(behaviour.path):
                 continue

@@ -88,7 +88,7 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     if not servers:
         return
     for node in context.spec.nodes.values():
-        for binding in context.bindings[node.key]:
+        for binding in context.bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
             group = group_in(node, binding)

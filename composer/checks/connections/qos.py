@@ -94,7 +94,7 @@ def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
     subscription can ask for: their deadlines are no shorter, or do not match.
     """
     for node in context.spec.nodes.values():
-        if any(path[:2] == node.path for path in context.system.dropped):
+        if node.path in context.incomplete:
             continue
         published = _published_by_behaviours(context, node)
         for publisher in node.publishers.values():

@@ -194,10 +194,9 @@ def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
 
 def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
     """Return whether a node may have topics and services that the file does not show."""
-    depth = len(node.path)
-    if any(path[:depth] == node.path for path in context.system.dropped):
-        return True
-    return any(each.reaches_ros for each in context.readings(node))
+    return node.path in context.incomplete or any(
+        each.reaches_ros for each in context.readings(node)
+    )
 
 
 def _is_of_ros(context: CheckContext, name: str) -> bool:

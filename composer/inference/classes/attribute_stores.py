@@ -10,6 +10,8 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+# Stands for the names of attributes that are not written out.
+ANY = '*'
 # Methods that change what they are called on.
 CHANGING = frozenset(
     {
@@ -47,6 +49,8 @@ def find_stores(body: Iterable[ast.stmt]) -> dict[str, list[AttributeStore]]:
                 known = owner if _is_first(target, method) else None
             case ast.Call(func=ast.Name('setattr'), args=[target, ast.Constant(str(name)), _]):
                 known = owner if _is_first(target, method) else None
+            case ast.Call(func=ast.Name('setattr'), args=[target, _, _]):
+                name, known = ANY, owner if _is_first(target, method) else None
             case ast.Subscript(value=ast.Attribute(value=target, attr=name)):
                 if isinstance(node.ctx, ast.Load):
                     continue

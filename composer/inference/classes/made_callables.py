@@ -22,6 +22,7 @@ from composer.inference.values import (
     MessageClass,
     Partial,
     Place,
+    Scalar,
     Sequence,
     Value,
     alternatives,
@@ -128,11 +129,12 @@ class MadeCallables(Part):
 
     def _registered(self, base: Function, value: Value) -> Function | None:
         """Return the function for a value; `None` if that may be any."""
-        wanted = _class_of(value)
+        line = self._line_of(value)
         name = getattr(base.definition, 'name', '')
         known = [each for each in base.module.body if isinstance(each, ast.FunctionDef)]
-        if wanted is None:
+        if line is None:
             return None
+        registered: list[tuple[Value, Function]] = []
         for each in known:
             for decorator in each.decorator_list:
                 call = decorator if isinstance(decorator, ast.Call) else None
@@ -141,9 +143,25 @@ class MadeCallables(Part):
                 first = [*each.args.posonlyargs, *each.args.args][:1]
                 classes = call.args if call else [item.annotation for item in first]
                 function = Function(base.module, each)
-                if any(self._class_at(function, item) == wanted for item in classes if item):
-                    return function
-        return base
+                registered += [
+                    (self._class_at(function, item), function) for item in classes if item
+                ]
+        if not all(_is_class(each) for each, _ in registered):
+            return None
+        ranked = [function for one in line for each, function in registered if each == one]
+        return ranked[0] if ranked else base
+
+    def _line_of(self, value: Value) -> list[Value] | None:
+        """Return the class of a value and its bases; `None` if they are not known."""
+        match value:
+            case Message(type=name):
+                return [MessageClass(name)]
+            case Instance(of=of):
+                line: list[Value] = self._evaluator.classes.bodies.line_of(of)
+                return line
+            case Constant(kind=kind) | Scalar(kind=kind):
+                return [External(f'builtins.{each.__name__}') for each in kind.__mro__]
+        return None
 
     def _class_at(self, function: Function, expression: ast.expr) -> Value:
         scope = Scope(function.module)
@@ -178,12 +196,6 @@ def _texts(value: Value) -> list[str] | None:
     return None
 
 
-def _class_of(value: Value) -> Value | None:
-    match value:
-        case Message(type=name):
-            return MessageClass(name)
-        case Instance(of=of):
-            return of
-        case Constant(kind=kind):
-            return External(f'builtins.{kind.__name__}')
-    return None
+def _is_class(value: Value) -> bool:
+    is_plain = isinstance(value, External) and value.name.startswith('builtins.')
+    return is_plain or isinstance(value, Class | MessageClass)

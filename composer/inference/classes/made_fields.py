@@ -25,6 +25,7 @@ class _Field:
     of: Class
     target: ast.expr
     default: ast.expr | None
+    kind: str
 
 
 class MadeFields(Part):
@@ -61,8 +62,9 @@ class MadeFields(Part):
             for statement in each.definition.body:
                 match statement:
                     case ast.AnnAssign(target=ast.Name(id=name) as target, value=default):
-                        if 'ClassVar' not in ast.unparse(statement.annotation):
-                            found[name] = _Field(name, each, target, default)
+                        kind = _kind_of(statement)
+                        if kind != 'ClassVar':
+                            found[name] = _Field(name, each, target, default, kind)
         return found
 
     def is_namespace(self, of: Class) -> bool:
@@ -74,7 +76,12 @@ class MadeFields(Part):
         fields = self._fields(instance.of)
         for name, argument in arguments.named:
             instance.set(name, argument.value)
-        given = dict(zip(fields, arguments.positional, strict=False))
+        marks = [name for name, field in fields.items() if field.kind == 'KW_ONLY']
+        by_position = [name for name, field in fields.items() if field.kind in ('', 'InitVar')]
+        if marks:
+            before = list(fields)[: list(fields).index(marks[0])]
+            by_position = [name for name in by_position if name in before]
+        given = dict(zip(by_position, arguments.positional, strict=False))
         given |= dict(arguments.named)
         for name, field in fields.items():
             if name in given:
@@ -83,7 +90,9 @@ class MadeFields(Part):
                 instance.set(name, self._default(field))
             else:
                 instance.set(name, UNKNOWN)
-        self._evaluator.classes.call_method(instance, '__post_init__')
+        extra = [name for name, field in fields.items() if field.kind == 'InitVar']
+        values = [instance.attributes.get(name, UNKNOWN) for name in extra]
+        self._evaluator.classes.call_method(instance, '__post_init__', *values)
 
     def _default(self, field: _Field) -> Value:
         bodies = self._evaluator.classes.bodies
@@ -121,3 +130,17 @@ class MadeFields(Part):
         if not self.is_tuple(owner.of):
             return None
         return [owner.attributes.get(name, UNKNOWN) for name in self._fields(owner.of)]
+
+
+def _kind_of(statement: ast.AnnAssign) -> str:
+    """Return what is special about a field: `no init` is set by the class itself."""
+    for mark in ('ClassVar', 'InitVar', 'KW_ONLY'):
+        if mark in ast.unparse(statement.annotation):
+            return mark
+    if isinstance(statement.value, ast.Call):
+        for keyword in statement.value.keywords:
+            if keyword.arg == 'init' and ast.unparse(keyword.value) == 'False':
+                return 'no init'
+            if keyword.arg == 'kw_only' and ast.unparse(keyword.value) == 'True':
+                return 'no init'
+    return ''

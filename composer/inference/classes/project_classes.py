@@ -38,6 +38,7 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from composer.inference.classes.attribute_stores import AttributeStore
 
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # What a class and a function have that tells their name.
 CLASS_NAMES = ('__name__', '__qualname__')
 # What an object keeps, wherever else something is stored in it.
@@ -55,6 +56,7 @@ class Classes(Part):
         self.bodies = ClassBodies(evaluator)
         self.fields = MadeFields(evaluator)
         self.enumerations = Enumerations(evaluator)
+        self._made: list[Instance] = []
 
     # Objects
 
@@ -68,6 +70,7 @@ class Classes(Part):
             return made
         is_made_anew = self.bodies.find(of, '__new__') is None
         instance = Instance(of, is_shared=self._evaluator.run.is_at_top or not is_made_anew)
+        self._made.append(instance)
         init = self.class_attribute(of, '__init__', instance)
         if isinstance(init, Function):
             self._evaluator.functions.follow(init, arguments, waits=True)
@@ -76,6 +79,26 @@ class Classes(Part):
         else:
             self._evaluator.calls.escape_all(arguments)
         return instance
+
+    def mention_held(self) -> None:
+        """Note the texts in objects: methods that were not followed may use them as names."""
+        followed = self._evaluator.run.modules.followed
+        for instance in self._made:
+            line = [each for each in self.bodies.line_of(instance.of) if isinstance(each, Class)]
+            methods = [each for one in line for each in one.definition.body]
+            if any(isinstance(each, _FUNCTIONS) and id(each) not in followed for each in methods):
+                for value in instance.attributes.values():
+                    self._mention(value)
+
+    def _mention(self, value: Value) -> None:
+        for each in alternatives(value):
+            if isinstance(each, Constant) and each.kind is str:
+                self._evaluator.run.reading.mentioned.add(each.value)
+            elif isinstance(each, Mapping | Sequence):
+                held = each.entries.values() if isinstance(each, Mapping) else each.items
+                for one, _ in held:
+                    if isinstance(one, Constant):
+                        self._mention(one)
 
     # Attributes
 
@@ -183,6 +206,9 @@ class Classes(Part):
         if held and isinstance(held[0], Descriptor):
             return found or UNKNOWN
         stored = owner.attributes.get(name)
+        if name == '__dict__':
+            owner.is_open = True
+            return UNKNOWN
         if name == 'start' and 'threading.Thread' in self.bodies.externals(owner.of):
             run = self.class_attribute(owner.of, 'run', owner)
             if isinstance(run, Function):
@@ -190,11 +216,15 @@ class Classes(Part):
         if stored is None and owner.is_unmade and self._stores(name):
             return UNKNOWN
         if stored is None:
-            return found if found is not None else self._read_of_proxy(owner, name)
+            is_kept = found is None or not owner.is_open or _is_lasting(found)
+            kept = found if is_kept else UNKNOWN
+            return kept if kept is not None else self._read_of_proxy(owner, name)
         if name in owner.doubtful and found is not None:
             stored = join([stored, found])
         if all(map(_is_lasting, alternatives(stored))):
             return stored
+        if owner.is_open:
+            return join(map(_widen, alternatives(stored)))
         if len(self._stores(name)) == 1 and not self._is_changed_inside(owner, name, stored):
             return stored
         if not self._changes(owner.of, name, stored, is_shared=owner.is_shared):

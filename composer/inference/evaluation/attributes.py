@@ -403,7 +403,7 @@ class Attributes(Part):
             'unset-parameter',
             place,
             f"this does not set the parameter '{name}'",
-            f'write node.set_parameters(node.name, {{{name!r}: …}})',
+            f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?',
         )
 
     def store_item(self, index: Value, place: Place) -> None:

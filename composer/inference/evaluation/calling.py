@@ -81,10 +81,24 @@ class Calls(Part):
         try:
             return join(
                 self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
-                for each in alternatives(function)
+                for each in self._fitting(function, arguments)
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _fitting(self, function: Value, arguments: Arguments) -> list[Value]:
+        """Return which of several functions may be called so, or all if none may."""
+        several = list(alternatives(function))
+        if len(several) == 1:
+            return several
+        with self._evaluator.run.silence():
+            found = [
+                each
+                for each in several
+                if not isinstance(each, Function)
+                or self._evaluator.functions.fits(each, arguments)
+            ]
+        return found or several
 
     def _note_wait(self, node: ast.Call, arguments: Arguments, scope: Scope) -> None:
         """Note a call of a method of what is kept in the state: `node.state.event.wait()`."""
@@ -200,6 +214,8 @@ class Calls(Part):
                         method, arguments, place, waits=waits, is_awaited=is_awaited
                     )
             case External():
+                if is_awaited:
+                    self._evaluator.waiting.await_asyncio(function.name, arguments, place)
                 made = self._evaluator.callables.call(function.name, arguments, place)
                 if made is not None:
                     return made

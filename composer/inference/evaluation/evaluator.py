@@ -22,6 +22,7 @@ from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
+from composer.inference.statements.guards import Guards
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
@@ -83,6 +84,7 @@ class Evaluator:
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.guards = Guards(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
         self.registries = Registries(self)
@@ -190,6 +192,10 @@ class Evaluator:
             text = 'this is an async generator'
             place = Place(scope.module, node)
             self.run.report('missing-await', place, text, "go through it with 'async for'")
+        elif is_async and all(map(_is_plain, alternatives(value))):
+            text = 'this is no async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'for'")
         return value
 
     @contextmanager
@@ -324,6 +330,7 @@ class Evaluator:
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
+                value.is_open = True
                 for each in value.attributes.values():
                     if isinstance(each, NodeValue | BoundMethod | PartOfNode):
                         self.escape(each)
@@ -346,3 +353,10 @@ def _lasting(value: Value) -> Value:
         case PartOfNode(name='time' | 'goal'):
             return value
     return UNKNOWN
+
+
+def _is_plain(value: Value) -> bool:
+    """Return whether a value is gone through without waiting."""
+    if isinstance(value, Generated):
+        return not value.is_async
+    return isinstance(value, Sequence | Mapping | ArrayField | Constant | Scalar)

@@ -26,6 +26,7 @@ from composer.inference.values import (
     Instance,
     Mapping,
     Message,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
+_NOT_AWAITED = (Message, Constant, Scalar, Mapping, Sequence, PartOfNode)
 # Expressions that make a value, rather than find one.
 _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 _NO_CONVERSION = -1
@@ -346,7 +348,7 @@ class Expressions(Part):
         else:
             value = self.evaluate(node.value, scope)
         several = alternatives(value)
-        if all(isinstance(each, Message | Constant | Scalar | Mapping) for each in several):
+        if all(isinstance(each, _NOT_AWAITED) for each in several):
             place = Place(scope.module, node.value)
             text = 'what is awaited here is no coroutine'
             self._evaluator.run.report('missing-await', place, text, 'leave out the await')

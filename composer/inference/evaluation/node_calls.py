@@ -129,10 +129,28 @@ class NodeCalls(Part):
             if names is not None and isinstance(names.value, Sequence):
                 keys = [(name, place, UNKNOWN) for name, place in names.value.items]
                 self._note_remote(arguments, keys)
+                entries = {
+                    name.value: (UNKNOWN, place)
+                    for name, place, _ in keys
+                    if isinstance(name, Constant)
+                }
+                return Mapping(
+                    dict(entries), is_open=len(entries) < len(keys) or names.value.is_open
+                )
+            if names is not None and _kind_of(names.value) is str:
+                run.report(
+                    'bad-call',
+                    names.place,
+                    "'names' is a text, and has to be a list",
+                    'put it in […]',
+                )
             return UNKNOWN
         node_name, values = arguments.get(0, 'node_name'), arguments.get(1, 'values')
         if node_name is None or values is None:
             return NONE
+        if isinstance(values.value, Sequence) or _kind_of(values.value):
+            text = "'values' has to be a mapping of names to values"
+            run.report('bad-call', values.place, text, 'write {name: value}')
         if isinstance(values.value, Mapping):
             self._note_remote(
                 arguments,
@@ -200,7 +218,8 @@ class NodeCalls(Part):
         if name == 'setdefault':
             for name_of_key in keys:
                 self._evaluator.keep(f'[{name_of_key}]', given)
-        if isinstance(given, Instance | Message):
+        is_member = isinstance(given, Instance) and given.is_member
+        if isinstance(given, Instance | Message) and not is_member:
             return given
         if name in ('get', 'pop', 'setdefault') and len(keys) == 1:
             held = self._evaluator.kept_value(f'[{keys[0]}]')
@@ -240,3 +259,7 @@ class NodeCalls(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+
+def _kind_of(value: Value) -> type | None:
+    return value.kind if isinstance(value, Constant | Scalar) else None

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 from composer.inference.values import (
     AGAIN,
     UNKNOWN,
+    Class,
     Constant,
+    Function,
     Instance,
     Mapping,
     Message,
@@ -203,7 +205,7 @@ def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
 
 
 def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:
-    if isinstance(sign, ast.Eq | ast.NotEq) and isinstance(left, Instance):
+    if isinstance(sign, ast.Eq | ast.NotEq) and isinstance(left, Class | Function | Instance):
         same = _is_same(left, right)
         return None if same is None else same == isinstance(sign, ast.Eq)
     if isinstance(sign, ast.Is | ast.IsNot):
@@ -236,6 +238,8 @@ def _are_one(left: Value, right: Value) -> bool | None:
         return True
     if isinstance(left, Instance) and isinstance(right, Instance):
         return left is right if left.is_member and right.is_member else None
+    if isinstance(left, Function | Class) and isinstance(right, Function | Class):
+        return None if left.definition is right.definition else False
     for one, other in ((left, right), (right, left)):
         if isinstance(one, Constant) and one.value is None:
             certain = (Message, MessageClass, NodeValue, Mapping, Sequence)

@@ -23,6 +23,7 @@ from composer.inference.values import (
     Primitive,
     Value,
     is_none,
+    truth_of,
 )
 
 if TYPE_CHECKING:
@@ -57,11 +58,23 @@ FILLING: dict[str, frozenset[str]] = {
     'concurrent.futures.Future': frozenset({'cancel', 'set_exception', 'set_result'}),
 }
 _LOCK = 'threading.Lock'
-_LOCK, _THREAD = 'threading.Lock', 'threading.Thread'
-MADE = frozenset({*FILLING, _LOCK, _THREAD})
+_LOCK, THREAD = 'threading.Lock', 'threading.Thread'
+MADE = frozenset({*FILLING, _LOCK, THREAD})
 # Methods after which a wait is as before.
 _HARMLESS = frozenset({'clear', 'reset', 'task_done', 'acquire', 'release'})
 _ASKING = frozenset({'done', 'empty', 'full', 'is_set', 'qsize'})
+# What raises RuntimeError where no loop of asyncio runs.
+_OF_LOOP = frozenset(
+    f'asyncio.{name}'
+    for name in (
+        *('gather', 'open_connection', 'sleep', 'start_server', 'timeout', 'to_thread', 'wait'),
+        *('wait_for', 'create_subprocess_exec', 'create_subprocess_shell', 'TaskGroup'),
+    )
+)
+_INSTEAD = {
+    'asyncio.gather': 'await one after the other',
+    'asyncio.sleep': 'let a timer go on: write a generator with yield',
+}
 _CLOCKS = frozenset({'time.monotonic', 'time.perf_counter', 'time.time'})
 _EMPTY = Constant(int, 0)
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
@@ -79,12 +92,40 @@ class Waiting(Part):
         if kind == 'threading.Semaphore' and (first is None or first.value != _EMPTY):
             return UNKNOWN
         target = dict(arguments.named).get('target')
+        if kind == THREAD and target is not None:
+            self.check_target(target)
         return Primitive(kind, place, target.value if target else None)
+
+    def check_target(self, target: Argument) -> None:
+        """Report a target that is called right here."""
+        node = target.place.node
+        called = node.value if isinstance(node, ast.keyword) else node
+        if is_none(target.value) and isinstance(called, ast.Call):
+            text = 'this is called here, and the thread runs nothing'
+            help_text = f'give it {ast.unparse(called.func)}, and args=(…)'
+            self._evaluator.run.report('no-effect', target.place, text, help_text)
+
+    # What needs an event loop
+
+    def await_asyncio(self, name: str, arguments: Arguments, place: Place) -> None:
+        """Report what raises without a loop of asyncio; those of ROS have none."""
+        first = arguments.get(0, 'delay')
+        if name == 'asyncio.sleep' and (first is None or truth_of(first.value) is False):
+            return
+        if name in _OF_LOOP and self._evaluator.run.waits:
+            self._evaluator.run.report(
+                'no-event-loop',
+                place,
+                f'{name} needs the event loop of asyncio, and behaviours run in that of ROS',
+                _INSTEAD.get(name),
+            )
+
+    # Calls of primitives
 
     def call(self, owner: Primitive, name: str, arguments: Arguments, place: Place) -> Value:
         """Return what a method of a primitive may return, and note what it does."""
         self._evaluator.run.moves += 1
-        if owner.kind == _THREAD:
+        if owner.kind == THREAD:
             self._join(owner, name, arguments, place)
         elif owner.kind == _LOCK:
             self._call_lock(owner, name, arguments, place)

@@ -43,6 +43,8 @@ def use(node):
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
+import asyncio
+import threading
 from collections import namedtuple
 from types import SimpleNamespace
 import copy
@@ -61,6 +63,12 @@ class Keeper:
 
     def go(self, payload):
         self.publish('command', payload)
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *reason):
+        return None
 
     async def wait(self):
         return await self.node.call_async('enable', True)
@@ -87,6 +95,11 @@ def poses(node):
 
 def pass_on(node, name, payload):
     node.publish(name, payload)
+
+
+async def run_beside(node):
+    await asyncio.sleep(1)
+    await asyncio.gather(asyncio.sleep(1), asyncio.sleep(2))
 
 
 def odometry(node):
@@ -193,6 +206,25 @@ WRONG = {
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
+    "kept = node.call_async('enable', True)": 'missing-await',
+    "await node.publish('command', {})": 'missing-await',
+    "await node.call('enable', True)": 'missing-await',
+    "await node.send_goal('count', 1)": 'missing-await',
+    "await node.send_goal('count', 1).result()": 'missing-await',
+    "async for f in node.send_goal('count', 1).feedback: print(f)": 'missing-await',
+    'await asyncio.sleep(m.pose.pose.position.x)': 'no-event-loop',
+    "await asyncio.gather(node.call_async('enable', True))": 'no-event-loop',
+    "await asyncio.wait_for(node.call_async('enable', True), 1)": 'no-event-loop',
+    "async with asyncio.timeout(1): await node.call_async('enable', True)": 'no-event-loop',
+    'node.shutdown': 'no-effect',
+    "node.send_goal('count', 1).cancel": 'no-effect',
+    "threading.Thread(target=pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Timer(1, pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1))": 'no-effect',
+    "node.get_parameters('camera', 'gain')": 'bad-call',
+    "node.set_parameters('camera', {'gain'})": 'bad-call',
+    "print(node.get_parameters('camera', ['gain']).gain)": 'unknown-attribute',
+    'if node.parameters.speed > 1: node.parameters.speed = 1.0': 'unset-parameter',
     'm': 'no-effect',
     'print(mesage)': 'undefined-name',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
@@ -217,6 +249,16 @@ RIGHT = [
     'setattr(node.state, m.child_frame_id, 1); print(node.state.anything)',
     "node.logger.info('late', throttle_duration_sec=1.0)",
     "node.publish('scan', {'ranges': map(float, range(3))})",
+    "kept = node.call_async('enable', True); await kept",
+    'await asyncio.sleep(0)',
+    'asyncio.run(run_beside(node))',
+    'threading.Thread(target=lambda: asyncio.run(run_beside(node))).start()',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1)).start()",
+    "thread = threading.Thread(target=functools.partial(pass_on, node, 'level', 1)); thread.start()",
+    "print(node.get_parameters('camera', ['gain'])['gain'], node.get_parameters('camera', ('gain',)))",
+    "values = {'gain': 1.0}; node.set_parameters('camera', values)",
+    'async with Keeper(node): pass',
+    'stop = node.shutdown; print(stop)',
     "node.publish('level', round(m.pose.pose.position.x))",
     "node.publish('level', round(m.pose.pose.position.x, None))",
     "names = ['comand', 'command']; del names[0]; node.publish(names[0], {})",
@@ -233,7 +275,8 @@ RIGHT = [
 
 def check_line(check, line):
     body = indent(line, '    ')
-    code = f'{HEAD}\n\ndef hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
+    kind = 'async def' if 'await ' in line or 'async ' in line else 'def'
+    code = f'{HEAD}\n\n{kind} hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
     found = check(SYSTEM, code)
     return code.splitlines().index(body.splitlines()[0]) + 1, found
 

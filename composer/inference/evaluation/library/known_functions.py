@@ -7,7 +7,6 @@ import itertools
 import math
 import operator
 import re
-import statistics
 import struct
 from collections import Counter, OrderedDict, deque
 from typing import TYPE_CHECKING, Any
@@ -72,6 +71,16 @@ def _shown(value: Any, spec: str = '') -> str:
     return format(value, spec)
 
 
+def _of_statistics(name: str) -> Callable[..., Any]:
+    def call(*values: Any, **options: Any) -> Any:
+        # Few behaviours use it, and it imports much.
+        import statistics
+
+        return getattr(statistics, name)(*values, **options)
+
+    return call
+
+
 _GREATEST_POWER = 64
 # `'{:100000}'` makes a long text.
 _LARGE_WIDTH = re.compile(r'\d{4}')
@@ -89,7 +98,7 @@ COMPUTED: dict[str, Callable[..., Any]] = {
     **{f'builtins.{name}': getattr(builtins, name) for name in _OF_BUILTINS.split()},
     **{f'math.{name}': getattr(math, name) for name in _OF_MATH.split()},
     **{f'operator.{name}': getattr(operator, name) for name in _OF_OPERATOR.split()},
-    **{f'statistics.{name}': getattr(statistics, name) for name in ('mean', 'fmean', 'median')},
+    **{f'statistics.{name}': _of_statistics(name) for name in ('mean', 'fmean', 'median')},
     'builtins.bytes': _bytes,
     'builtins.format': _shown,
     'builtins.pow': _power,

@@ -92,6 +92,8 @@ class LibraryCalls(Part):
         """Return what a call of a function may return, by its full name: `builtins.len`."""
         if name in MADE:
             return self._evaluator.waiting.make(name, arguments, place)
+        if name == 'threading.Timer' and (function := arguments.get(1, 'function')):
+            self._evaluator.waiting.check_target(function)
         if name == 'time.sleep':
             length = arguments.get(0, 'secs') or Argument(UNKNOWN, place)
             self._evaluator.waiting.sleep(length, place)
