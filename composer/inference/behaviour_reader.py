@@ -17,6 +17,7 @@ from composer.inference.reading import Reading, missing_reading, unknown_reading
 from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
     BY_FILE,
+    BY_RUN,
     CHOSEN,
     NODE,
     NONE,
@@ -31,6 +32,7 @@ from composer.inference.values import (
     PartOfNode,
     Place,
     Sequence,
+    Unknown,
     Value,
     constant,
     is_chosen,
@@ -84,7 +86,7 @@ class BehaviourReader:
         place = binding.behaviour.path
         if place not in self._by_place:
             reading = self._read_first(node, binding)
-            kept = self._kept_for(node, binding, reading.kept_read) if reading.kept_read else {}
+            kept = self._kept_for(node, binding, reading) if reading.kept_read else {}
             if kept:
                 needs_values = reading.needs_values
                 reading = self._read_with(node, binding, tells_values=needs_values, kept=kept)
@@ -101,17 +103,16 @@ class BehaviourReader:
             self._read_once[place] = reading
         return self._read_once[place]
 
-    def _kept_for(
-        self, node: NodeSpec, binding: Binding, names: abc.Iterable[str]
-    ) -> dict[str, Value]:
-        """Return what behaviours keep under names in the state that one of them reads."""
+    def _kept_for(self, node: NodeSpec, binding: Binding, reader: Reading) -> dict[str, Value]:
+        """Return what behaviours keep under the names in the state that one of them reads."""
         every = [(each, self._read_first(node, each)) for each in node_bindings(node)]
         owner = binding.own_state_of
-        of_owner = [reading for each, reading in every if each.own_state_of == owner]
+        of_owner = [(each, reading) for each, reading in every if each.own_state_of == owner]
         found: dict[str, Value] = {}
-        for name in sorted(names):
+        for name in sorted(reader.kept_read):
             is_own = name.startswith('[')
-            readings = of_owner if is_own else [reading for _, reading in every]
+            keepers = of_owner if is_own else every
+            readings = [reading for _, reading in keepers]
             is_open = any(
                 each.is_own_state_open if is_own else each.is_state_open for each in readings
             )
@@ -121,6 +122,8 @@ class BehaviourReader:
             value = UNKNOWN if is_open else join([*values, NONE])
             if value not in (UNKNOWN, NONE) and not is_chosen(value):
                 found[name] = value
+            elif reader.needs_state and not is_open and _moves(name, keepers):
+                found[name] = Unknown(BY_RUN)
         return found
 
     def _read_with(
@@ -180,6 +183,17 @@ class BehaviourReader:
         run.reading.settle()
         run.reading.kept_read = {name for topic, name in facts.log if topic == 'kept'}
         return run.reading
+
+
+def _moves(name: str, keepers: abc.Iterable[tuple[Binding, Reading]]) -> bool:
+    """Return whether what is kept under a name changes while the system runs.
+
+    What hooks of the node keep may tell which part the node plays.
+    """
+    kept = [(binding, reading) for binding, reading in keepers if name in reading.kept]
+    return any(binding.entity is not None for binding, _ in kept) and not any(
+        name in reading.kept_by_file for _, reading in kept
+    )
 
 
 def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> None:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Span
 from composer.inference.reading import NodeUse, Problem, Reading, StateUse
-from composer.inference.values import Constant, Place, alternatives, is_chosen
+from composer.inference.values import (
+    BY_RUN,
+    BY_STATE,
+    Constant,
+    Place,
+    alternatives,
+    is_chosen,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,6 +43,9 @@ class Run:
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
         state_doubts: Those of them that hang on the state only.
+        limits: The number of those around it that the file has a part in: what is read there is
+            reached, but a name that the node lacks may be one of its parts that is switched off.
+        decided: The number of conditions around it of the file, whatever it says.
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
         conditions: The number of conditions around it.
@@ -59,6 +69,8 @@ class Run:
         self.reading = Reading()
         self.doubts = 0
         self.state_doubts = 0
+        self.limits = 0
+        self.decided = 0
         self.guards = 0
         self.broad_guards = 0
         self.conditions = 0
@@ -75,10 +87,10 @@ class Run:
 
     def decide(self, value: Value) -> None:
         """Note that a value decides on what is done, or with what."""
-        if is_chosen(value) and any(
-            not isinstance(each, Constant) for each in alternatives(value)
-        ):
-            self.reading.needs_values = True
+        if any(not isinstance(each, Constant) for each in alternatives(value)):
+            chosen = is_chosen(value)
+            self.reading.needs_values |= chosen > BY_RUN
+            self.reading.needs_state |= chosen == BY_STATE
 
     def step(self) -> None:
         """Count a step.
@@ -95,25 +107,47 @@ class Run:
         """Whether the place is reached, if not always, whatever the file says."""
         return self.doubts == self.state_doubts
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether what is used at the place has to be there."""
+        return not (self.doubts or self.limits or self.broad_guards)
+
+    @property
+    def standing(self) -> tuple[int, int, int, int]:
+        """The counts that a statement may raise for those that follow it."""
+        return self.doubts, self.state_doubts, self.limits, self.decided
+
+    @standing.setter
+    def standing(self, counts: tuple[int, int, int, int]) -> None:
+        self.doubts, self.state_doubts, self.limits, self.decided = counts
+
     @contextmanager
-    def condition(self, *, is_doubt: bool = False, by_state: bool = False) -> Iterator[None]:
+    def condition(
+        self, *, is_doubt: bool = False, chosen: int = 0, decided: bool = False
+    ) -> Iterator[None]:
         """Note what is read meanwhile as read on a condition.
 
         Args:
-            is_doubt: Whether the file decides on it; `by_state` says that only the state does.
+            is_doubt: Whether the file decides on it; `chosen` says how.
+            decided: Whether it is the file's.
         """
         self.conditions += 1
-        self.doubt(is_doubt, by_state and is_doubt)
+        self.doubt(chosen, int(is_doubt))
+        self.decided += decided
         try:
             yield
         finally:
             self.conditions -= 1
-            self.doubt(-is_doubt, -(by_state and is_doubt))
+            self.doubt(chosen, -int(is_doubt))
+            self.decided -= decided
 
-    def doubt(self, count: int, of_state: int) -> None:
-        """Add doubts."""
-        self.doubts += count
-        self.state_doubts += of_state
+    def doubt(self, chosen: int, count: int = 1) -> None:
+        """Note conditions, by how the file decides on them."""
+        if chosen == BY_RUN:
+            self.limits += count
+        else:
+            self.doubts += count
+            self.state_doubts += count if chosen == BY_STATE else 0
 
     @contextmanager
     def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
@@ -129,14 +163,14 @@ class Run:
     @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.state_doubts, self.guards, self.conditions
+        before = self.standing, self.guards, self.conditions
         flags = self.is_silent, self.is_at_top
-        self.doubts, self.state_doubts, self.guards = 0, 0, int(is_guard)
+        self.standing, self.guards = (0, 0, 0, 0), int(is_guard)
         self.conditions, self.is_silent, self.is_at_top = 0, False, True
         try:
             yield
         finally:
-            self.doubts, self.state_doubts, self.guards, self.conditions = before
+            self.standing, self.guards, self.conditions = before
             self.is_silent, self.is_at_top = flags
 
     @contextmanager
@@ -191,7 +225,7 @@ class Run:
                 kind,
                 name,
                 span_of(place, name),
-                is_certain=not (self.doubts or self.broad_guards),
+                is_certain=self.is_certain,
                 is_guarded=bool(self.guards or self.dead_branches),
                 **details,
             )

@@ -140,6 +140,9 @@ class Reading:
         state_tested: The names that it asks for with `hasattr`.
         unpublished: Where it gives away payloads that nothing publishes.
         kept: What it keeps in `node.state`, and as `[name]` in `node.own_state`.
+        kept_by_file: The names of those of these that it has from the file, or keeps where the
+            file says so.
+        needs_state: Whether it hangs on what is kept in the state.
         kept_read: The names of what it reads of these.
         remote_parameters: Parameters of nodes that it sets or reads by their names.
         blocks: What it waits for without an end.
@@ -166,6 +169,8 @@ class Reading:
     state_tested: set[str] = field(default_factory=set)
     unpublished: list[Span] = field(default_factory=list)
     kept: dict[str, Value] = field(default_factory=dict)
+    kept_by_file: set[str] = field(default_factory=set)
+    needs_state: bool = False
     kept_read: set[str] = field(default_factory=set)
     remote_parameters: list[RemoteParameter] = field(default_factory=list)
     blocks: list[Block] = field(default_factory=list)

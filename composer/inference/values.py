@@ -37,8 +37,10 @@ class Unknown:
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs, and
-            `BY_STATE` for what behaviours keep, which they may have from the file.
+            name of the node, `BY_PARAMETER` for what may change while the system runs,
+            `BY_STATE` for what behaviours keep, which they may have from the file, and `BY_RUN`
+            for what goes either way while the system runs, whatever the file says: a message's
+            number that is compared with a parameter.
     """
 
     is_chosen: int = 0
@@ -431,9 +433,10 @@ Value: TypeAlias = (
     | Alternatives
 )
 
-BY_STATE = 1
-BY_FILE = 2
-BY_PARAMETER = 3
+BY_RUN = 1
+BY_STATE = 2
+BY_FILE = 3
+BY_PARAMETER = 4
 
 UNKNOWN = Unknown()
 NEVER = Never()
@@ -494,6 +497,24 @@ def is_chosen(value: Value) -> int:
     return max(getattr(each, 'is_chosen', 0) for each in alternatives(value))
 
 
+def chosen_with(*values: Value) -> int:
+    """Return how the file decides on what comes of several values together.
+
+    It has the last word only if all of them are its own, or written in the code: who compares
+    what a message says with a parameter does not ask which part the node plays.
+    """
+    chosen = max(map(is_chosen, values), default=0)
+    return BY_RUN if chosen and any(map(_moves, values)) else chosen
+
+
+def _moves(value: Value) -> bool:
+    """Return whether a value comes from outside while the system runs."""
+    return all(
+        isinstance(each, Unknown | Scalar | ArrayField | PartOfNode) and is_chosen(each) <= BY_RUN
+        for each in alternatives(value)
+    )
+
+
 def truth_of(value: Value) -> bool | None:
     """Return whether a value counts as true, `None` if that is not known."""
     found = {_truth_of(each) for each in alternatives(value)}
@@ -513,7 +534,8 @@ def _truth_of(value: Value) -> bool | None:
     return None
 
 
-def are_chosen(arguments: Arguments) -> bool:
-    """Return whether the file decides on one of the arguments."""
+def chosen_by(arguments: Arguments) -> int:
+    """Return whether the file decides on one of the arguments, and how."""
     values = [argument.value for argument in arguments.all()]
-    return any(is_chosen(each.yielded if isinstance(each, Generated) else each) for each in values)
+    given = (each.yielded if isinstance(each, Generated) else each for each in values)
+    return max(map(is_chosen, given), default=0)

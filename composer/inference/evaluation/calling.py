@@ -11,7 +11,6 @@ from composer.inference.evaluation.signatures import explain_misfit, signature_o
 from composer.inference.message_types import in_python
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.values import (
-    CHOSEN,
     NODE,
     UNKNOWN,
     Argument,
@@ -36,7 +35,7 @@ from composer.inference.values import (
     Unknown,
     Value,
     alternatives,
-    are_chosen,
+    chosen_by,
     is_chosen,
     is_none,
     join,
@@ -224,7 +223,7 @@ class Calls(Part):
                 self._refuse(function, place)
         self._evaluator.run.moves += 1
         self.escape_all(arguments)
-        return CHOSEN if is_chosen(function) or are_chosen(arguments) else UNKNOWN
+        return Unknown(max(is_chosen(function), chosen_by(arguments)))
 
     def _refuse(self, function: Value, place: Place) -> None:
         """Report a call of what cannot be called; `None` may be something else later."""

@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
 from composer.inference.values import (
-    CHOSEN,
     UNKNOWN,
     Arguments,
     ArrayField,
@@ -21,9 +20,10 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
-    are_chosen,
+    chosen_by,
     is_chosen,
 )
 
@@ -52,7 +52,7 @@ class Containers(Part):
             return self._fields_of(owner, place)
         if first is not None:
             self._evaluator.calls.escape_all(arguments)
-        return CHOSEN if is_chosen(owner) or are_chosen(arguments) else UNKNOWN
+        return Unknown(max(is_chosen(owner), chosen_by(arguments)))
 
     def _fields_of(self, owner: Message | MessageClass, place: Place) -> Value:
         description = self._evaluator.run.types.describe(owner.type)

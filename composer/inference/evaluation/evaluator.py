@@ -209,9 +209,11 @@ class Evaluator:
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
-            by_state = is_chosen(test) == BY_STATE
-            around.enter_context(self.run.condition(is_doubt=is_doubt, by_state=by_state))
-            if is_dead and is_chosen(test) != BY_PARAMETER:
+            chosen = is_chosen(test)
+            around.enter_context(
+                self.run.condition(is_doubt=is_doubt, chosen=chosen, decided=chosen > BY_STATE)
+            )
+            if is_dead and chosen != BY_PARAMETER:
                 around.enter_context(self.run.dead_branch())
             yield
 
@@ -288,6 +290,8 @@ class Evaluator:
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
         kept = self.run.reading.kept
+        if is_chosen(value) > BY_STATE or self.run.decided or not self.run.is_sure:
+            self.run.reading.kept_by_file.add(name)
         found = join(map(_lasting, alternatives(value)))
         kept[name] = join([kept[name], found]) if name in kept else found
         if isinstance(value, Instance) and not value.is_member:

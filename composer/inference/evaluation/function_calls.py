@@ -185,6 +185,8 @@ class Functions(Part):
         at = (
             bool(run.doubts),
             run.is_sure,
+            bool(run.limits),
+            bool(run.decided),
             bool(run.guards),
             run.is_silent,
             waits,
@@ -209,7 +211,7 @@ class Functions(Part):
         self.active.append(definition)
         self._evaluator.run.modules.followed.add(id(definition))
         run = self._evaluator.run
-        doubts = run.doubts, run.state_doubts
+        standing = run.standing
         before, run.waits = run.waits, waits
         try:
             if isinstance(definition, ast.Lambda):
@@ -228,7 +230,7 @@ class Functions(Part):
                     self._evaluator.run.doubts -= 1
         finally:
             run.waits = before
-            run.doubts, run.state_doubts = doubts
+            run.standing = standing
             self.active.pop()
         return scope
 

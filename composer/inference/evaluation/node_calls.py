@@ -185,7 +185,7 @@ class NodeCalls(Part):
                             span_of(place, key.value),
                             value if isinstance(value, Constant) else None,
                             span_of(where),
-                            is_certain=not self._evaluator.run.doubts,
+                            is_certain=self._evaluator.run.is_certain,
                         )
                     )
 

@@ -23,6 +23,7 @@ from composer.inference.values import (
     Unknown,
     Value,
     alternatives,
+    chosen_with,
     constant,
     is_chosen,
     is_none,
@@ -84,7 +85,7 @@ def combine(sign: ast.operator, left: Value, right: Value) -> Value:
 
 
 def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
-    chosen = max(is_chosen(left), is_chosen(right))
+    chosen = chosen_with(left, right)
     if isinstance(left, Constant) and isinstance(right, Constant):
         compute = _ARITHMETIC.get(type(sign))
         is_power = isinstance(sign, _POWERS) and abs(hash(right.value)) > _GREATEST_POWER
@@ -194,7 +195,7 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
 def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     """Return what a comparison says, as far as it is known."""
     known = _compare(sign, left, right)
-    chosen = max(is_chosen(left), is_chosen(right))
+    chosen = chosen_with(left, right)
     if known is not None:
         return constant(known, is_chosen=chosen)
     plain = all(isinstance(each, Constant | Scalar) for each in (left, right))

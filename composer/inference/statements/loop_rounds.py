@@ -96,12 +96,12 @@ class Loops(Part):
         """Keep the jumps of a loop apart, and forget at its end what they leave in doubt."""
         run = self._evaluator.run
         before = scope.broken, scope.continued
-        doubts = run.doubts, run.state_doubts
+        standing = run.standing
         scope.broken, scope.continued = [], []
         yield
         scope.broken, scope.continued = before
         if not any(isinstance(each, _ENDS) for each in own_nodes(node)):
-            run.doubts, run.state_doubts = doubts
+            run.standing = standing
 
     def _follow_each(self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value]) -> None:
         """Follow a loop round by round."""

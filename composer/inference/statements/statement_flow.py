@@ -266,12 +266,13 @@ class Statements(Part):
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        doubt = 0
+        doubt = decided = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
                 doubt = max(doubt, is_chosen(test) if truth is None else 0)
+                decided = max(decided, is_chosen(test))
                 before = scope.copy_names()
                 self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
@@ -292,9 +293,11 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if doubt and has_jumped:
+        if has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
+            self._evaluator.run.decided += decided > BY_STATE
+            if doubt:
+                self._evaluator.run.doubt(doubt)
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
         self._evaluator.match_cases.follow(node, scope)

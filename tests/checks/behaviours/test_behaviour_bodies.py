@@ -203,6 +203,12 @@ WRONG = {
     'print(list(filter(lambda each: each.pos, poses(node))))': 'unknown-field',
     'print(list(map(lambda each: each.pos, poses(node))))': 'unknown-field',
     'first, *rest = poses(node); print(first.pos)': 'unknown-field',
+    # where a message or the state decides, and not the file alone
+    'if m.pose.pose.position.x < node.parameters.speed: print(m.velocity)': 'unknown-field',
+    'print(m.velocity if abs(m.pose.pose.position.x - node.parameters.speed) > 1 else 0)': 'unknown-field',
+    'print(node.parameters.speed < m.pose.pose.position.x < 3 and m.velocity)': 'unknown-field',
+    'if m.child_frame_id == node.name: node.logger.warn_throttle("near")': 'unknown-attribute',
+    'if node.now().nanoseconds > node.parameters.speed: print(m.velocity)': 'unknown-field',
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
@@ -230,6 +236,13 @@ WRONG = {
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    "if node.parameters.mode == 'fast': print(m.velocity)",
+    'if node.parameters.speed > 2: print(m.velocity)',
+    'node.state.distance = node.parameters.speed\nif node.state.distance > 2: print(m.velocity)',
+    "if node.parameters.mode == 'fast': node.state.distance = 3\nif node.state.distance == 3: print(m.velocity)",
+    "node.parameters.mode == 'fast' and m.pose.pose.position.x > 2 and print(m.velocity)",
+    'if node.parameters.speed * 2 > 3: print(m.velocity)',
+    "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})",
     "for n, on in (('command', True), ('other', False)): node.publish(n, {}) if on else None",
     "for n in ('command', 'other'):\n    if m.child_frame_id == n: node.publish(n, {})",
     "for n in ('command', 'other'):\n    if n == 'other': continue\n    node.publish(n, {})",
@@ -292,6 +305,20 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
 @pytest.mark.parametrize(
     ('lines', 'mark'),
     [
+        (
+            'if m.child_frame_id != node.parameters.mode: return\nprint(m.velocity)  # here',
+            '# here',
+        ),
+        (
+            'limit = node.parameters.speed\nif m.pose.pose.position.x > limit: return\n'
+            'print(m.velocity)  # here',
+            '# here',
+        ),
+        (
+            'if node.state.distance > 3: return\nnode.state.distance += 1.0\n'
+            'print(m.velocity)  # here',
+            '# here',
+        ),
         (
             "t = SimpleNamespace(linear={}, angul={})  # here\nnode.publish('command', vars(t))",
             '# here',

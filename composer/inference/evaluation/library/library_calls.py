@@ -28,7 +28,6 @@ from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.waiting import MADE
 from composer.inference.values import (
     BY_PARAMETER,
-    CHOSEN,
     NONE,
     UNKNOWN,
     Argument,
@@ -46,9 +45,11 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
-    are_chosen,
+    chosen_by,
+    chosen_with,
     constant,
     is_none,
     join,
@@ -112,11 +113,14 @@ class LibraryCalls(Part):
             if not name.startswith('builtins.is'):
                 self._escape_functions(arguments)
             result = KNOWN_RESULTS[name]
-            if isinstance(result, Scalar) and are_chosen(arguments):
-                return Scalar(result.kind, is_chosen=BY_PARAMETER)
+            chosen = chosen_by(arguments)
+            if isinstance(result, Scalar) and chosen:
+                if result.kind in (int, float):
+                    chosen = chosen_with(*(argument.value for argument in arguments.all()))
+                return Scalar(result.kind, chosen)
             return result
         self._evaluator.calls.escape_all(arguments)
-        return CHOSEN if are_chosen(arguments) else UNKNOWN
+        return Unknown(chosen_by(arguments))
 
     def _compute(self, name: str, arguments: Arguments, place: Place) -> Value | None:
         """Return what a function returns if all that it is given is known."""

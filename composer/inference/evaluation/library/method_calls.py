@@ -19,7 +19,7 @@ from composer.inference.values import (
     Scalar,
     Sequence,
     Value,
-    are_chosen,
+    chosen_by,
     constant,
     is_chosen,
     join,
@@ -118,7 +118,7 @@ class MethodCalls(Part):
         if result is set:
             return Sequence([], set, is_open=True)
         if result is not None:
-            return Scalar(result, max(is_chosen(owner), int(are_chosen(arguments))))
+            return Scalar(result, max(is_chosen(owner), chosen_by(arguments)))
         if not isinstance(owner, Constant | Scalar):
             self._evaluator.escape(owner)
         return UNKNOWN
