@@ -1030,7 +1030,7 @@ PLANTED = {
             def __init__(self, node):
                 self.node = node
             def done(self, reply):
-                self.node.publish('level', reply.<sucess|success>)
+                self.node.logger.info(str(reply.<sucess|success>))
             def ask(self, then):
                 then(self.node.call('enable', True))
         def hear(node, m):
