@@ -18,6 +18,7 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.sleeping import Sleeping
 from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
@@ -100,6 +101,7 @@ class Evaluator:
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
         self.waiting = Waiting(self)
+        self.sleeping = Sleeping(self)
         self.call_places: list[Place] = []
         self.kept: dict[str, Value] = {}
 

@@ -78,7 +78,7 @@ class Loops(Part):
     def follow_while(self, node: ast.While, scope: Scope) -> None:
         """Follow a loop as long as a condition holds."""
         self._evaluator.waiting.poll(node, scope)
-        self._evaluator.waiting.spin(node, scope)
+        self._evaluator.sleeping.spin(node, scope)
 
         def begin() -> None:
             test = self._evaluator.tested(node.test, scope)

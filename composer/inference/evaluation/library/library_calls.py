@@ -97,7 +97,7 @@ class LibraryCalls(Part):
             self._evaluator.waiting.check_target(function)
         if name == 'time.sleep':
             length = arguments.get(0, 'secs') or Argument(UNKNOWN, place)
-            self._evaluator.waiting.sleep(length, place)
+            self._evaluator.sleeping.sleep(length, place)
         elif not name.startswith(_PURE):
             self._evaluator.run.moves += 1
         known = self._compute(name, arguments, place)
