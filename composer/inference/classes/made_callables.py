@@ -47,6 +47,7 @@ class MadeCallables(Part):
         if name in _MAKERS and arguments.positional and not arguments.is_open:
             return Partial(External(f'{name}()'), arguments)
         calls: dict[str, Callable[[Arguments, Place], Value]] = {
+            'builtins.property': self._make_property,
             'collections.namedtuple': self._make_tuple,
             'types.SimpleNamespace': self._make_namespace,
             'functools.partialmethod': self._make_method,
@@ -62,6 +63,11 @@ class MadeCallables(Part):
             return UNKNOWN
         rest = Arguments(arguments.positional[1:], arguments.named, arguments.is_open)
         return Descriptor('partialmethod', Partial(arguments.positional[0].value, rest))
+
+    def _make_property(self, arguments: Arguments, _: Place) -> Value:
+        getter, setter = arguments.get(0, 'fget'), arguments.get(1, 'fset')
+        stored = setter.value if setter else None
+        return Descriptor('property', getter.value, stored) if getter else UNKNOWN
 
     def _make_tuple(self, arguments: Arguments, place: Place) -> Value:
         """Return the class that `namedtuple('Step', 'topic payload')` makes."""

@@ -327,7 +327,10 @@ class Attributes(Part):
         classes = self._evaluator.classes
         if isinstance(owner, Class):
             is_one = classes.enumerations.is_one(owner)
-            return classes.enumerations.member_of_name(owner, index) if is_one else UNKNOWN
+            # `Box[str]` is the class itself, unless it says otherwise.
+            is_own = classes.bodies.find(owner, '__class_getitem__') is not None
+            other = UNKNOWN if is_own else owner
+            return classes.enumerations.member_of_name(owner, index) if is_one else other
         items = classes.fields.items_of(owner)
         if items is not None and isinstance(index, Constant) and isinstance(index.value, int):
             return items[index.value] if -len(items) <= index.value < len(items) else UNKNOWN

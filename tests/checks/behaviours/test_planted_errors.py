@@ -999,6 +999,150 @@ PLANTED = {
         def hear(node, m):
             return m.twist.twist.linear.<X|x>
         """,
+    'set of subclasses': """
+        class Base:
+            topics = ()
+            def go(self, node):
+                for name in self.topics:
+                    node.publish(name, 1)
+        class Sub(Base):
+            topics = ('level', '<levle|level>')
+        def hear(node, m):
+            Sub().go(node)
+        """,
+    'cooperative init': """
+        class A:
+            def __init__(self, node, **rest):
+                super().__init__(**rest)
+                self.node = node
+        class B:
+            def __init__(self, topic, **rest):
+                super().__init__(**rest)
+                self.topic = topic
+        class C(A, B):
+            def go(self):
+                self.node.publish(self.topic, 1)
+        def hear(node, m):
+            C(node, topic='<levle|level>').go()
+        """,
+    'method passed as callback': """
+        class Robot:
+            def __init__(self, node):
+                self.node = node
+            def done(self, reply):
+                self.node.logger.info(str(reply.<sucess|success>))
+            def ask(self, then):
+                then(self.node.call('enable', True))
+        def hear(node, m):
+            robot = Robot(node)
+            robot.ask(robot.done)
+        """,
+    'generic class': """
+        from typing import Generic, TypeVar
+        T = TypeVar('T')
+        class Box(Generic[T]):
+            def __init__(self, value: T):
+                self.value = value
+        def hear(node, m):
+            box = Box[str]('<comand|command>')
+            node.publish(box.value, {})
+        """,
+    'protocol': """
+        from typing import Protocol
+        class Sender(Protocol):
+            def send(self, node): ...
+        class Fast:
+            def send(self, node):
+                node.publish('<comand|command>', {})
+        def act(sender: Sender, node):
+            sender.send(node)
+        def hear(node, m):
+            act(Fast(), node)
+        """,
+    'nested class': """
+        class Robot:
+            class Arm:
+                def lift(self, node):
+                    node.publish('<levle|level>', 1)
+            def __init__(self):
+                self.arm = self.Arm()
+        def hear(node, m):
+            Robot().arm.lift(node)
+        """,
+    'class in function': """
+        def hear(node, m):
+            class Local:
+                topic = '<comand|command>'
+                def go(self):
+                    node.publish(self.topic, {})
+            Local().go()
+        """,
+    'partial of class': """
+        from functools import partial
+        class Out:
+            def __init__(self, topic, node):
+                self.topic, self.node = topic, node
+            def go(self):
+                self.node.publish(self.topic, {})
+        Drive = partial(Out, '<comand|command>')
+        def hear(node, m):
+            Drive(node).go()
+        """,
+    'iterator protocol': """
+        class Names:
+            def __init__(self, names):
+                self.names, self.at = names, 0
+            def __iter__(self):
+                return self
+            def __next__(self):
+                if self.at >= len(self.names):
+                    raise StopIteration
+                self.at += 1
+                return self.names[self.at - 1]
+        def hear(node, m):
+            for name in Names(['<levle|level>']):
+                node.publish(name, 1)
+        """,
+    'zip and enumerate': """
+        def hear(node, m):
+            for i, (name, value) in enumerate(zip(('level', '<levle|level>'), (1, 2))):
+                node.publish(name, value + i)
+        """,
+    'try else': """
+        def hear(node, m):
+            try:
+                value = float(m.child_frame_id)
+            except ValueError:
+                node.publish('<levle|level>', 0)
+            else:
+                node.publish('command', {'linear': {'x': value}})
+        """,
+    'while walrus': """
+        def hear(node, m):
+            names = ['level', '<levle|level>']
+            for name in reversed(names):
+                node.publish(name, 1)
+        """,
+    'lambda table': """
+        TABLE = {
+            'go': lambda node: node.publish('<comand|command>', {}),
+            'stop': lambda node: node.publish('level', 0),
+        }
+        def hear(node, m):
+            for key in TABLE:
+                TABLE[key](node)
+        """,
+    'node in self of base alias': """
+        class Base:
+            def __init__(self, node):
+                self._node = node
+            node = property(lambda self: self._node)
+        class Sub(Base):
+            def go(self):
+                self.node.publish('<comand|command>', {})
+        def hear(node, m):
+            Sub(node).go()
+        """,
 }
 # What looks wrong, and is not.
 RIGHT = {
@@ -1500,6 +1644,149 @@ RIGHT = {
             node.publish(name(B()), 1)
             node.publish(name(True), 1)
             node.publish(name(2.0), 1)
+        """,
+    'a base that a subclass sets up': """
+        class Base:
+            def __init__(self, node):
+                self.node = node
+                self.setup()
+            def setup(self):
+                pass
+            def send(self):
+                if getattr(self, 'topic', None):
+                    self.node.publish(self.topic, 1)
+        class Sub(Base):
+            def setup(self):
+                self.topic = 'level'
+        def hear(node, m):
+            Base(node).send()
+            Sub(node).send()
+        """,
+    'an object that a class method changes': """
+        class Cfg:
+            topic: str = 'never'
+            @classmethod
+            def load(cls):
+                made = cls()
+                made.topic = 'level'
+                return made
+        def hear(node, m):
+            node.publish(Cfg.load().topic, 1)
+        """,
+    'a lazy property': """
+        class Lazy:
+            def __init__(self):
+                self._name = None
+            @property
+            def name(self):
+                if self._name is None:
+                    self._name = 'level'
+                return self._name
+        def hear(node, m):
+            node.publish(Lazy().name, 1)
+        """,
+    'a stack': """
+        class Stack:
+            def __init__(self):
+                self.items = []
+            def push(self, item):
+                self.items.append(item)
+                return self
+            def pop(self):
+                return self.items.pop() if self.items else None
+        def hear(node, m):
+            stack = Stack()
+            if stack.pop() is None:
+                stack.push('level')
+            name = stack.pop()
+            if name:
+                node.publish(name, 1)
+        """,
+    'numbers and flags': """
+        from enum import IntEnum, Flag, auto
+        class Level(IntEnum):
+            LOW = 1
+            HIGH = auto()
+        class Part(Flag):
+            A = auto()
+            B = auto()
+            AB = A | B
+        def hear(node, m):
+            node.publish('level', Level.HIGH)
+            node.publish('level', Level(1).value + Level['LOW'])
+            if Part.A in Part.AB and (Part.A | Part.B) == Part.AB:
+                node.publish('level', Part.A.value)
+        """,
+    'depth of a context manager': """
+        from contextlib import contextmanager
+        class Busy:
+            depth = 0
+            def __enter__(self):
+                self.depth += 1
+            def __exit__(self, *_):
+                self.depth -= 1
+        BUSY = Busy()
+        def hear(node, m):
+            with BUSY:
+                if BUSY.depth > 1:
+                    return
+                node.publish('level', BUSY.depth)
+        """,
+    'attributes made on demand': """
+        class Meta:
+            def __getattr__(self, name):
+                if name == 'topic':
+                    return 'level'
+                raise AttributeError(name)
+        def hear(node, m):
+            node.publish(Meta().topic, 1)
+            print(hasattr(Meta(), 'x'), getattr(Meta(), 'y', None))
+        """,
+    'filters of constants': """
+        def hear(node, m):
+            for name, kind in (('level', int), ('never', str)):
+                if isinstance(m.twist.twist.linear.x, kind):
+                    node.publish(name, 1)
+            for name in ('never', 'level'):
+                if not name.startswith('n'):
+                    node.publish(name, 1)
+            names = [n for n in ('never', 'level') if len(n) == 5 and n[0] == 'l']
+            for n in names:
+                node.publish(n, 1)
+        """,
+    'a proxy that keeps what it is given': """
+        class Node2:
+            def __init__(self, node):
+                self.__dict__['_n'] = node
+            def __getattr__(self, name):
+                return getattr(self.__dict__['_n'], name)
+            def __setattr__(self, name, value):
+                self.__dict__[name] = value
+        def hear(node, m):
+            wrapped = Node2(node)
+            wrapped.extra = 3
+            wrapped.publish('level', wrapped.extra)
+        """,
+    'a class that renames its subclasses': """
+        class A:
+            name = 'level'
+            def __init_subclass__(cls):
+                cls.name = cls.__name__.lower()
+        class Level(A):
+            name = 'never'
+        def hear(node, m):
+            node.publish(Level.name, 1)
+            node.publish(Level().name, 1)
+        """,
+    'a default of a base, changed': """
+        import abc
+        class A(metaclass=abc.ABCMeta):
+            @abc.abstractmethod
+            def name(self): return 'never'
+            def go(self, node): node.publish(self.name(), 1)
+        class B(A):
+            def name(self): return super().name().replace('never', 'level')
+        def hear(node, m): B().go(node)
         """,
 }
 PLACE = re.compile(r'<(\w+)\|(\w+)>')
