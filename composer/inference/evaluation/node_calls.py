@@ -135,7 +135,7 @@ class NodeCalls(Part):
                     if isinstance(name, Constant)
                 }
                 return Mapping(
-                    dict(entries), is_open=len(entries) < len(keys) or names.value.is_open
+                    dict(entries), has_unknown=len(entries) < len(keys) or names.value.is_open
                 )
             if names is not None and _kind_of(names.value) is str:
                 run.report(
