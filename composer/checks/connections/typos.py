@@ -149,19 +149,17 @@ def _as_written(name: str, full: str, namespace: str) -> str:
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check remapping rules: one of an include applies to all that is in it."""
     positions = context.system.positions
-    # Nobody knows what processes have.
-    matching = {
-        positions.key((*process.path, 'remap', source))
-        for process in context.spec.processes.values()
-        for source, _ in process.remap
-    }
-    found: dict[Span, Diagnostic] = {}
+    matching = _rules_of_processes(context)
+    # As `composer show` writes a rule of an include: into each of its nodes.
+    matching_rules: set[tuple[str, str]] = set()
+    found: dict[Span, tuple[tuple[str, str], Diagnostic]] = {}
     for node in _all_nodes(context):
         if not node.remap:
             continue
         names, actions = _names_of(node), _actions_of(node)
         is_known = not _may_have_more(context, node)
-        for source, _ in node.remap:
+        for rule in node.remap:
+            source = rule[0]
             path = (*node.path, 'remap', source)
             span = positions.key(path)
             scheme, _, bare = source.rpartition('://')
@@ -171,18 +169,31 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             name = expand_name(bare, node.name, node.namespace)
             if name in names or (name in actions and remaps_actions() is not False):
                 matching.add(span)
+                matching_rules.add(rule)
             elif name in actions:
-                found[span] = _explain_action(context, path, actions[name], name)
+                found[span] = rule, _explain_action(context, path, actions[name], name)
             elif near := find_typo(name, names):
                 meant = _as_written(bare, near, node.namespace)
-                found[span] = _explain_rule(context, path, node, name, did_you_mean(meant))
+                found[span] = rule, _explain_rule(context, path, node, name, did_you_mean(meant))
             elif not is_known or _is_of_ros(context, name):
                 matching.add(span)
             else:
                 written = [_as_written(bare, each, node.namespace) for each in names]
                 nearest = _at_the_top(bare, names) or find_nearest(bare, written)
-                found[span] = _explain_rule(context, path, node, name, did_you_mean(nearest))
-    yield from (finding for span, finding in found.items() if span not in matching)
+                help_text = did_you_mean(nearest)
+                found[span] = rule, _explain_rule(context, path, node, name, help_text)
+    for span, (rule, finding) in found.items():
+        if span not in matching and rule not in matching_rules:
+            yield finding
+
+
+def _rules_of_processes(context: CheckContext) -> set[Span]:
+    """Return the places of the rules of processes: nobody knows what these have."""
+    return {
+        context.system.positions.key((*process.path, 'remap', source))
+        for process in context.spec.processes.values()
+        for source, _ in process.remap
+    }
 
 
 def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
