@@ -6,10 +6,12 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.inference.current_run import span_of
+from composer.inference.message_types import in_python
 from composer.inference.scopes import own_nodes
 from composer.inference.values import (
     NONE,
     Constant,
+    External,
     Function,
     Mapping,
     Message,
@@ -117,15 +119,31 @@ def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None
     wanted = kinds.get(binding.key.key)
     for value, place in scope.returned if wanted else ():
         several = alternatives(value)
-        found = [each.kind for each in several if isinstance(each, Constant | Scalar | Sequence)]
-        if wanted and len(found) == len(several) and not set(found) & set(wanted):
+        found = list(filter(None, map(_kind_name, several)))
+        names = {each.__name__ for each in wanted or ()}
+        if wanted and len(found) == len(several) and not names & set(found):
             what = 'whether to accept, or why not' if bool in wanted else 'None, or why not'
             evaluator.run.report(
                 'bad-answer',
                 place,
-                f'{binding.owner} returns a {found[0].__name__}',
+                f'{binding.owner} returns a {found[0]}',
                 f'return {what}',
             )
+
+
+def _kind_name(value: Value) -> str:
+    """Return the name of the type of what is no object of the project; empty if not known."""
+    match value:
+        case Constant() | Scalar() | Sequence():
+            return value.kind.__name__
+        case Message():
+            return in_python(value.type)
+        case Mapping():
+            return 'dict'
+        case External(name=name) if name.startswith('rclpy.'):
+            # A member of an enumeration, such as `GoalResponse.REJECT`.
+            return name.rpartition('.')[0].rpartition('.')[2]
+    return ''
 
 
 def _check(evaluator: Evaluator, type_name: str | None, value: Value, place: Place) -> None:

@@ -83,6 +83,7 @@ class Run:
         self.is_silent = False
         self.is_at_top = False
         self.steps = 0
+        self._other_types = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
     def decide(self, value: Value) -> None:
@@ -161,6 +162,15 @@ class Run:
             self.broad_guards -= is_broad
 
     @contextmanager
+    def of_other_types(self, *, is_other: bool) -> Iterator[None]:
+        """Leave alone which fields are read meanwhile, if they may be those of other types."""
+        self._other_types += is_other
+        try:
+            yield
+        finally:
+            self._other_types -= is_other
+
+    @contextmanager
     def afresh(self, *, is_guard: bool) -> Iterator[None]:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
         before = self.standing, self.guards, self.conditions
@@ -209,6 +219,8 @@ class Run:
         """
         if self.guards or self.broad_guards or self.is_silent:
             self.tried += 1
+            return
+        if self._other_types and rule == 'unknown-field':
             return
         if self.doubts and not (help_text or '').startswith('did you mean'):
             return

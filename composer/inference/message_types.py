@@ -60,7 +60,8 @@ class MessageTypes:
         if description is None or any(each.name == name for each in description.constants):
             return True
         names = self.catalogue.constant_names(split_part(type_name)[0])
-        return names is None or name in names
+        # A description without any may come without those that there are.
+        return name in names if names is not None else not description.constants
 
     def constants(self, type_name: str) -> list[str]:
         """Return the names of the constants that are known."""

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
-from composer.inference.values import UNKNOWN, External, Value
+from composer.inference.values import UNKNOWN, External, Primitive, Value
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.syntax import BLOCKS
 
@@ -76,6 +76,17 @@ class TopNames:
     @cached_property
     def changed(self) -> frozenset[str]:
         """Names that functions store, and those whose values are changed somewhere."""
+        found = set(self.stored_again)
+        for node in (each for statement in self._body for each in ast.walk(statement)):
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
+                    if method in CHANGING:
+                        found.add(name)
+        return frozenset(found)
+
+    @cached_property
+    def stored_again(self) -> frozenset[str]:
+        """Names that functions store, and those of which items are stored."""
         found: set[str] = set()
         for node in (each for statement in self._body for each in ast.walk(statement)):
             match node:
@@ -83,9 +94,6 @@ class TopNames:
                     found |= set(names)
                 case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
                     found.add(name)
-                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
-                    if method in CHANGING:
-                        found.add(name)
                 case ast.AugAssign(target=ast.Name(id=name)):
                     found.add(name)
         return frozenset(found)
@@ -199,11 +207,14 @@ class ProjectModules:
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
         # Of `try: import x`, and imports for type checkers, the first one counts.
         is_known = len(statements) == 1 and (not is_conditional or is_import)
-        if not is_known or name in top.changed:
+        if not is_known or name in top.stored_again:
             return UNKNOWN
         self._under_way.add(key)
         try:
-            self._values[key] = evaluate(statement, is_conditional)
+            value = evaluate(statement, is_conditional)
+            # What methods change is known only of what is no container: `event.clear()`.
+            is_kept = name not in top.changed or isinstance(value, Primitive)
+            self._values[key] = value if is_kept else UNKNOWN
         finally:
             self._under_way.discard(key)
         return self._values[key]

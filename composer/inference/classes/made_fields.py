@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.part import Part
 from composer.inference.values import (
@@ -15,6 +16,9 @@ from composer.inference.values import (
     Value,
 )
 from composer.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Container
 
 
 @record
@@ -83,6 +87,8 @@ class MadeFields(Part):
             by_position = [name for name in by_position if name in before]
         given = dict(zip(by_position, arguments.positional, strict=False))
         given |= dict(arguments.named)
+        if not arguments.is_open:
+            self._check_missing(instance.of, fields, given)
         for name, field in fields.items():
             if name in given:
                 instance.set(name, given[name].value)
@@ -93,6 +99,23 @@ class MadeFields(Part):
         extra = [name for name, field in fields.items() if field.kind == 'InitVar']
         values = [instance.attributes.get(name, UNKNOWN) for name in extra]
         self._evaluator.classes.call_method(instance, '__post_init__', *values)
+
+    def _check_missing(self, of: Class, fields: dict[str, _Field], given: Container[str]) -> None:
+        """Report fields without a default that a call leaves out."""
+        calls = self._evaluator.call_places
+        bases = self._evaluator.classes.bodies.line_of(of)
+        is_made = any(isinstance(each, ast.Call) for each in of.definition.decorator_list)
+        if not calls or is_made or not all(isinstance(each, Class | External) for each in bases):
+            return
+        missing = [
+            name
+            for name, field in fields.items()
+            if field.kind in ('', 'InitVar') and field.default is None and name not in given
+        ]
+        if missing:
+            text = f"'{of.definition.name}' is called with other arguments than it takes: "
+            text += f"missing a required argument: '{missing[0]}'"
+            self._evaluator.run.report('bad-call', calls[-1], text)
 
     def _default(self, field: _Field) -> Value:
         bodies = self._evaluator.classes.bodies

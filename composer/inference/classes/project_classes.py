@@ -32,6 +32,7 @@ from composer.inference.values import (
     Value,
     alternatives,
     constant,
+    is_none,
     join,
 )
 
@@ -221,7 +222,8 @@ class Classes(Part):
             return kept if kept is not None else self._read_of_proxy(owner, name)
         if name in owner.doubtful and found is not None:
             stored = join([stored, found])
-        if all(map(_is_lasting, alternatives(stored))):
+        held_now = alternatives(stored)
+        if any(map(_is_lasting, held_now)) and all(_is_lasting(e) or is_none(e) for e in held_now):
             return stored
         if owner.is_open:
             return join(map(_widen, alternatives(stored)))

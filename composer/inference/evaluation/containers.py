@@ -48,6 +48,11 @@ class Containers(Part):
                 return self._evaluator.methods.call(owner, name, arguments, place)
             case ArrayField() if name in ('tolist', 'copy'):
                 return owner
+            case ArrayField() if name in ('append', 'insert'):
+                item = arguments.get(int(name == 'insert'), '')
+                if item is not None and isinstance(item.value, Message):
+                    payloads = self._evaluator.payloads
+                    payloads.check_item(owner.type.item, item.value, item.place)
         if name == 'get_fields_and_field_types' and isinstance(owner, Message | MessageClass):
             return self._fields_of(owner, place)
         if first is not None:

@@ -85,7 +85,8 @@ class Imports(Part):
             return CHOSEN
         if full_name in CONSTANTS:
             return constant(CONSTANTS[full_name])
-        interface = find_interface(full_name)
+        # 'rclpy.action' holds no actions.
+        interface = None if full_name.startswith('rclpy.') else find_interface(full_name)
         if interface is None:
             package, _, name = full_name.partition('.')
             if package == 'composer':

@@ -151,6 +151,13 @@ class NodeCalls(Part):
         if isinstance(values.value, Sequence) or _kind_of(values.value):
             text = "'values' has to be a mapping of names to values"
             run.report('bad-call', values.place, text, 'write {name: value}')
+        if isinstance(values.value, Constant | Scalar | Message | Sequence):
+            run.report(
+                'bad-call',
+                values.place,
+                'set_parameters takes the values as a dictionary',
+                'write node.set_parameters(node_name, {name: value})',
+            )
         if isinstance(values.value, Mapping):
             self._note_remote(
                 arguments,
@@ -226,6 +233,9 @@ class NodeCalls(Part):
             if not isinstance(held, Unknown):
                 return join([held, given]) if name != 'setdefault' else held
         self._evaluator.calls.escape_all(arguments)
+        if name == 'setdefault' and isinstance(given, Sequence):
+            # Of what is in it, other calls have a say.
+            return Sequence([], given.kind, is_open=True)
         return UNKNOWN
 
     def read_parameters(self, owner: PartOfNode, name: str, arguments: Arguments) -> Value:

@@ -203,7 +203,9 @@ def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     chosen = chosen_with(left, right)
     if known is not None:
         return constant(known, is_chosen=chosen)
-    plain = all(isinstance(each, Constant | Scalar) for each in (left, right))
+    plain = all(isinstance(each, Constant | Scalar) for each in (left, right)) or all(
+        isinstance(each, Sequence | Mapping) for each in (left, right)
+    )
     if plain or isinstance(sign, ast.Is | ast.IsNot | ast.In | ast.NotIn):
         return Scalar(bool, chosen)
     # NumPy compares item by item.

@@ -100,6 +100,12 @@ class Payloads(Part):
         found = fit.any_of(value, lambda each: fit.field(field.type, each, place, path))
         self._settle(found, fit, place)
 
+    def check_item(self, item_type: FieldType, value: Value, place: Place) -> None:
+        """Check what an array of a message is to hold."""
+        fit = _Fit('', self._evaluator.run.types)
+        found = fit.any_of(value, lambda each: fit.field(item_type, each, place, ()))
+        self._settle(found, fit, place)
+
     def _settle(self, found: list[Misfit], fit: _Fit, place: Place) -> None:
         if self._evaluator.run.is_silent:
             return

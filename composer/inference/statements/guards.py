@@ -65,7 +65,9 @@ class Guards(Part):
                 error = Instance(cast('Class', kind), is_unmade=True) if is_own else UNKNOWN
                 scope.set(handler.name, error)
             is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
-            with run.condition(is_doubt=is_doubt):
+            # What other types have is read where the type at hand never comes to.
+            is_other = handler.type is not None and 'AttributeError' in _names_in(handler.type)
+            with run.condition(is_doubt=is_doubt), run.of_other_types(is_other=is_other):
                 self._evaluator.statements.follow_all(handler.body, scope)
             ends.append(scope.names)
         scope.names = join_names(ends)

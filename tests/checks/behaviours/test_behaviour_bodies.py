@@ -231,8 +231,16 @@ WRONG = {
     'print(node.parameters.speed < m.pose.pose.position.x < 3 and m.velocity)': 'unknown-field',
     'if m.child_frame_id == node.name: node.logger.warn_throttle("near")': 'unknown-attribute',
     'if node.now().nanoseconds > node.parameters.speed: print(m.velocity)': 'unknown-field',
+    # payloads that are kept, or made elsewhere
+    "kept = node.own_state.setdefault('kept', [0, 0]); node.publish('command', kept)": 'field-type',
+    "node.publish('command', [c for c in 'ab' if c in m.child_frame_id] == [])": 'field-type',
+    'path = Path(); path.poses.append(m)': 'field-type',
+    'Turn(linear={})': 'bad-call',
+    "node.set_parameters('camera', 'gain', 2.0)": 'bad-call',
+    "node.set_parameters('camera', 'gain')": 'bad-call',
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
+    'found = [Keeper(node).wait() for _ in range(2)]; print(all(found))': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
     "kept = node.call_async('enable', True)": 'missing-await',
     "await node.publish('command', {})": 'missing-await',
@@ -258,6 +266,13 @@ WRONG = {
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    'try: print(m.pose.pose.position)\nexcept AttributeError: print(m.pose.position, m.position)',
+    "kept = node.own_state.setdefault('kept', [0]); node.publish('scan', {'ranges': kept})",
+    "node.call('enable', [c for c in 'ab' if c in m.child_frame_id] == [])",
+    'path = Path(); path.poses.append(poses(node)[0])',
+    'print(Turn({}, angul={}), Turn(*m.child_frame_id))',
+    "node.set_parameters('camera', dict(gain=2.0))",
+    "found = [bool(c) for c in 'ab']; print(all(found))",
     "if node.parameters.mode == 'fast': print(m.velocity)",
     'if node.parameters.speed > 2: print(m.velocity)',
     'node.state.distance = node.parameters.speed\nif node.state.distance > 2: print(m.velocity)',
@@ -387,6 +402,43 @@ def test_an_idiom_has_no_finding(folder, monkeypatch):
     monkeypatch.chdir(folder.parent)
     found = check_system(load_system(Path('system.yaml')), InterfaceCatalogue())
     assert [render_finding(each) for each in found] == []
+
+
+ANSWERS = """
+  rover:
+    parameters: {speed: 1.0}
+    actions:
+      drive: {type: test_msgs/action/Fibonacci, behaviour: parts:drive, accept: parts:accept}
+    on_parameters: parts:on_parameters
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('answer', 'are_wrong'),
+    [
+        ('GoalResponse.ACCEPT', (True, True)),
+        ('SetParametersResult(successful=True)', (True, True)),
+        ('{"successful": True}', (True, True)),
+        ('True', (False, True)),
+        ('None', (False, False)),
+        ('"too fast" if node.parameters.speed else None', (False, False)),
+    ],
+)
+def test_an_answer_says_whether_or_why_not(check, answer, are_wrong):
+    code = f"""
+        from rcl_interfaces.msg import SetParametersResult
+        from rclpy.action import GoalResponse
+        def accept(node, goal):
+            return {answer}
+        def on_parameters(node, changes):
+            return {answer}
+        def drive(node, goal):
+            return {{}}
+        """
+    found = [(5, 'bad-answer'), (7, 'bad-answer')]
+    wanted = [each for each, is_wrong in zip(found, are_wrong, strict=True) if is_wrong]
+    assert check(ANSWERS, code) == wanted
 
 
 KEPT = """

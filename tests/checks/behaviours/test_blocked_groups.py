@@ -72,6 +72,7 @@ def go(node, message):
 WRONG = {
     'GO.wait()': 'blocked-group',
     'GO.wait(None)': 'blocked-group',
+    'GO.clear(); GO.wait()': 'blocked-group',
     'if not GO.wait(): return': 'blocked-group',
     'if node.state.items: GO.wait()': 'blocked-group',
     'wait = GO.wait; wait()': 'blocked-group',

@@ -441,6 +441,33 @@ PLANTED = {
             act = node.own_state.get('act') or drive
             act(node)
         """,
+    'a goal that an object keeps': """
+        class Counter:
+            def __init__(self, node):
+                self.node, self.goal = node, None
+            def start(self):
+                self.goal = self.node.send_goal('count', 3)
+            def stop(self):
+                if self.goal is not None:
+                    self.goal.<cancel_goal|cancel>()
+                    self.goal = None
+        def hear(node, m):
+            counter = Counter(node)
+            counter.start()
+            counter.stop()
+        """,
+    'a table of what is next': """
+        TABLE = {
+            'idle': {'go': ('busy', 'command')},
+            'busy': {'stop': ('idle', '<Command|command>')},
+        }
+        def hear(node, m):
+            state = node.own_state.get('state', 'idle')
+            following, output = TABLE[state].get(m.child_frame_id, (state, None))
+            if output is not None:
+                node.publish(output, {})
+            node.own_state['state'] = following
+        """,
     'a function for a class': """
         from functools import singledispatch
         from nav_msgs.msg import Odometry

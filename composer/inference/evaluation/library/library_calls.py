@@ -32,6 +32,7 @@ from composer.inference.values import (
     UNKNOWN,
     Argument,
     Arguments,
+    Awaitable,
     BoundMethod,
     Constant,
     External,
@@ -63,6 +64,8 @@ _MOST_COMBINATIONS = 16
 # Functions in these return the same for the same arguments.
 _PURE = ('builtins.', 'math.', 'copy.', 'functools.', 'operator.')
 # `str.upper(text)` is `text.upper()`.
+# Functions for which only the truth of the items counts, or their number.
+_TESTING_ITEMS = frozenset({'builtins.all', 'builtins.any', 'builtins.sum'})
 _OF_TEXTS = 'builtins.str.'
 
 
@@ -100,6 +103,8 @@ class LibraryCalls(Part):
             self._evaluator.sleeping.sleep(length, place)
         elif not name.startswith(_PURE):
             self._evaluator.run.moves += 1
+        if name in _TESTING_ITEMS:
+            self._check_awaited(arguments)
         known = self._compute(name, arguments, place)
         if known is not None:
             return known
@@ -121,6 +126,15 @@ class LibraryCalls(Part):
             return result
         self._evaluator.calls.escape_all(arguments)
         return Unknown(chosen_by(arguments))
+
+    def _check_awaited(self, arguments: Arguments) -> None:
+        """Report coroutines in what is tested or counted: each of them counts as true."""
+        first = arguments.get(0, '')
+        for each in alternatives(first.value) if first else ():
+            match each:
+                case Sequence(items=[(Awaitable(), where), *_]):
+                    text = 'this is a coroutine, which has not been awaited'
+                    self._evaluator.run.report('missing-await', where, text, 'put await before it')
 
     def _compute(self, name: str, arguments: Arguments, place: Place) -> Value | None:
         """Return what a function returns if all that it is given is known."""
