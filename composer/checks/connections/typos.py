@@ -162,9 +162,8 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             source = rule[0]
             path = (*node.path, 'remap', source)
             span = positions.key(path)
-            scheme, _, bare = source.rpartition('://')
-            is_scheme = scheme in ('', 'rostopic', 'rosservice')
-            if source.startswith('__') or not is_scheme or find_topic_name_problem(bare):
+            bare = source.rpartition('://')[2]
+            if not _is_rule(source):
                 continue  # which is a finding of its own
             name = expand_name(bare, node.name, node.namespace)
             if name in names or (name in actions and remaps_actions() is not False):
@@ -185,6 +184,13 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
     for span, (rule, finding) in found.items():
         if span not in matching and rule not in matching_rules:
             yield finding
+
+
+def _is_rule(source: str) -> bool:
+    """Return whether a rule is one of a topic or service, and says which."""
+    scheme, _, bare = source.rpartition('://')
+    is_scheme = scheme in ('', 'rostopic', 'rosservice')
+    return is_scheme and not (source.startswith('__') or find_topic_name_problem(bare))
 
 
 def _rules_of_processes(context: CheckContext) -> set[Span]:
