@@ -18,7 +18,7 @@ from composer.names import expand_name, find_topic_name_problem, with_article
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
@@ -171,19 +171,22 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
                 matching_rules.add(rule)
             elif name in actions:
                 found[span] = rule, _explain_action(context, path, actions[name], name)
-            elif near := find_typo(name, names):
-                meant = _as_written(bare, near, node.namespace)
-                found[span] = rule, _explain_rule(context, path, node, name, did_you_mean(meant))
-            elif not is_known or _is_of_ros(context, name):
-                matching.add(span)
-            else:
-                written = [_as_written(bare, each, node.namespace) for each in names]
-                nearest = _at_the_top(bare, names) or find_nearest(bare, written)
-                help_text = did_you_mean(nearest)
+            elif find_typo(name, names) or (is_known and not _is_of_ros(context, name)):
+                help_text = did_you_mean(_find_meant(bare, name, names, node.namespace))
                 found[span] = rule, _explain_rule(context, path, node, name, help_text)
+            else:
+                matching.add(span)
     for span, (rule, finding) in found.items():
         if span not in matching and rule not in matching_rules:
             yield finding
+
+
+def _find_meant(bare: str, name: str, names: Collection[str], namespace: str) -> str | None:
+    """Return the name that a rule may mean, as the rule would write it."""
+    if near := find_typo(name, names):
+        return _as_written(bare, near, namespace)
+    written = [_as_written(bare, each, namespace) for each in names]
+    return _at_the_top(bare, names) or find_nearest(bare, written)
 
 
 def _is_rule(source: str) -> bool:
