@@ -18,7 +18,7 @@ from composer.names import expand_name, find_topic_name_problem, with_article
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
@@ -181,7 +181,7 @@ def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
             yield finding
 
 
-def _find_meant(bare: str, name: str, names: Collection[str], namespace: str) -> str | None:
+def _find_meant(bare: str, name: str, names: set[str], namespace: str) -> str | None:
     """Return the name that a rule may mean, as the rule would write it."""
     if near := find_typo(name, names):
         return _as_written(bare, near, namespace)
