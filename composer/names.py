@@ -20,6 +20,8 @@ MAX_TOPIC_NAME = 247
 _NODE_CHARACTERS = re.compile(r'[A-Za-z0-9_]*')
 _TOPIC_CHARACTERS = re.compile(r'[A-Za-z0-9_/~{}]*')
 _FULL_CHARACTERS = re.compile(r'[A-Za-z0-9_/]*')
+# Most names: what is left has all other rules to pass.
+_ORDINARY = re.compile(r'(?:~?/)?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*')
 _SUBSTITUTION = re.compile(r'\{([^{}]*)\}')
 _SUBSTITUTIONS = ('node', 'ns', 'namespace')
 
@@ -59,6 +61,8 @@ def find_topic_name_problem(name: str, kind: str = 'topic') -> str | None:
 
     Relative, absolute (`/x`) and private (`~/x`) names, and rcl's substitutions, as in `{node}`.
     """
+    if len(name) <= MAX_TOPIC_NAME and _ORDINARY.fullmatch(name):
+        return None
     what = with_article(f'{kind} name')
     if not name:
         return f'{what} is not empty'
@@ -104,8 +108,9 @@ def join_names(namespace: str, name: str) -> str:
 
 def expand_name(name: str, node_name: str, namespace: str) -> str:
     """Return a topic, service or action name in full, as `rcl_expand_topic_name` does."""
-    for key, value in (('node', node_name), ('ns', namespace), ('namespace', namespace)):
-        name = name.replace(f'{{{key}}}', value)
+    if '{' in name:
+        for key, value in (('node', node_name), ('ns', namespace), ('namespace', namespace)):
+            name = name.replace(f'{{{key}}}', value)
     if name.startswith('~'):
         return join_names(namespace, node_name) + name[1:]
     if name.startswith('/'):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import heapq
 from collections import Counter
 from functools import lru_cache
+from itertools import zip_longest
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,8 @@ _LONGEST_WORD = 255
 _FEW = 100
 # Of more options these share most pairs of letters with the word, and are compared.
 _PRESELECTED = 25
+# How long the abbreviation of a word is at least.
+_SHORTEST = 3
 _LONGEST_COMPARED = 64
 # Of more options the help lists the first.
 _MOST_LISTED = 12
@@ -80,6 +82,9 @@ def _find_nearest(word: str, choices: frozenset[str]) -> str | None:
     lowered = _lower(choices)
     if word in lowered:
         return lowered[word]
+    # Most files have nothing misspelt.
+    import difflib
+
     close = difflib.get_close_matches(word, _preselect(word, choices), n=5, cutoff=0.6)
     if not close:
         return None
@@ -110,14 +115,26 @@ def is_typo(word: str, meant: str) -> bool:
     """Return whether a word looks like another one that is misspelt, not like its sibling.
 
     `offset_y` beside `offset_x`, `out2` beside `out` and `min` beside `max` are siblings: what
-    differs is a digit, a last letter that is another one, or more than one letter in six.
+    differs is a digit, a last letter that is another one, or more than one letter in six. One
+    that differs in capitals only is misspelt.
     """
-    word, meant = word.lower(), meant.lower()
+    is_same, word, meant = word == meant, word.lower(), meant.lower()
+    if word == meant:
+        return not is_same
     if any(letter.isdigit() for letter in set(word) ^ set(meant)):
         return False
     edits = count_edits(word, meant)
     is_sibling = len(word) == len(meant) and word[:-1] == meant[:-1]
     return 0 < edits <= max(1, len(meant) // 6) and not is_sibling
+
+
+def is_short(word: str, other: str) -> bool:
+    """Return whether one of two names abbreviates the other: `min_voltage`, `minimum_voltage`."""
+    pairs = zip_longest(word.lower().split('_'), other.lower().split('_'), fillvalue='')
+    return word != other and all(
+        one == two or (len(one) >= _SHORTEST and two.startswith(one))
+        for one, two in (sorted(pair, key=len) for pair in pairs)
+    )
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.behaviours.behaviour_bodies import check_bodies
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.blocked_groups import check_blocked_groups
 from composer.checks.behaviours.compared_arguments import check_compared_arguments
 from composer.checks.behaviours.missing_modules import check_missing_modules
 from composer.checks.behaviours.monitors import check_monitors
@@ -85,6 +86,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_other_ends,
     check_loops,
     check_deadlocks,
+    check_blocked_groups,
     check_typos,
 )
 # One more than is shown, as a sign that there are more.

@@ -9,16 +9,18 @@ from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
+from composer.language.bindings import Binding, node_bindings
 from composer.records import record
 
 if TYPE_CHECKING:
     from typing import Unpack
 
     from composer.diagnostics import Diagnostic, Remarks, Span
+    from composer.inference.reading import Reading
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.interfaces.declared_packages import DeclaredPackages
     from composer.language.loaded_system import LoadedSystem
-    from composer.language.specs import EndSpec, SystemSpec
+    from composer.language.specs import EndSpec, NodeSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
     from composer.yaml_text.positions import DataPath
 
@@ -47,6 +49,11 @@ class CheckContext:
         return BehaviourReader(self.modules, self.catalogue, self.has_real_type)
 
     @cached_property
+    def incomplete(self) -> set[DataPath]:
+        """The nodes and other entries that lack something, because it has an error."""
+        return {path[:2] for path in self.system.dropped}
+
+    @cached_property
     def types(self) -> MessageTypes:
         """What the messages of the system have."""
         return MessageTypes(self.catalogue)
@@ -55,6 +62,20 @@ class CheckContext:
     def catalogue(self) -> InterfaceCatalogue:
         """What describes the types of the system."""
         return self.interfaces.catalogue
+
+    def bindings(self, node: NodeSpec) -> list[Binding]:
+        """Return the behaviours of a node; they are listed once for all checks."""
+        if node.path not in self._bindings:
+            self._bindings[node.path] = [*node_bindings(node)]
+        return self._bindings[node.path]
+
+    @cached_property
+    def _bindings(self) -> dict[DataPath, list[Binding]]:
+        return {}
+
+    def readings(self, node: NodeSpec) -> list[Reading]:
+        """Return what each behaviour of a node does."""
+        return [self.behaviours.read(node, each) for each in self.bindings(node)]
 
     def was_dropped(self, path: DataPath) -> bool:
         """Return whether an entry is missing because of an error that was reported already."""
@@ -65,9 +86,10 @@ class CheckContext:
 
         It is none that stands in for a missing one, hangs on a sample, or does not exist.
         """
-        span = self.system.positions.value(self.inner(entity.path, 'type'))
-        stands_in = self.was_dropped((*entity.path, 'type')) or self.was_dropped(entity.path)
-        if stands_in or span in self.system.sampled:
+        path, sampled = entity.path, self.system.sampled
+        if self.was_dropped(path) or self.was_dropped((*path, 'type')):
+            return False
+        if sampled and self.system.positions.value(self.inner(path, 'type')) in sampled:
             return False
         return not self.catalogue.available or self.catalogue.has(entity.type)
 

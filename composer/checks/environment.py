@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from composer.ament import ament_prefixes
-from composer.spelling import suggest
+from composer.spelling import did_you_mean, is_typo, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.yaml_text.positions import DataPath
 
 _RMW_INDEX = 'share/ament_index/resource_index/rmw_typesupport'
 # What of that index are no middlewares themselves.
@@ -47,6 +49,16 @@ _CHOICES = {
     'ROS_SECURITY_ENABLE': ('true', 'false'),
     'ROS_SECURITY_STRATEGY': ('Enforce', 'Permissive'),
 }
+# What else ROS and its middlewares read, or tools set.
+_OTHERS = (
+    'FASTDDS_DEFAULT_PROFILES_FILE FASTDDS_ENVIRONMENT_FILE FASTDDS_STATISTICS '
+    'FASTRTPS_DEFAULT_PROFILES_FILE RCUTILS_CONSOLE_OUTPUT_FORMAT '
+    'RCUTILS_CONSOLE_STDOUT_LINE_BUFFERED ROS_DISCOVERY_SERVER ROS_DISTRO ROS_DOMAIN_ID '
+    'ROS_ETC_DIR ROS_HOME ROS_LOG_DIR ROS_PYTHON_VERSION ROS_SECURITY_ENCLAVE_OVERRIDE '
+    'ROS_SECURITY_KEYSTORE ROS_STATIC_PEERS ROS_SUPER_CLIENT ROS_VERSION'
+)
+_VARIABLES = frozenset((*_CHOICES, *_MIDDLEWARES, *_OTHERS.split(' ')))
+_PREFIXES = ('FASTDDS_', 'FASTRTPS_', 'RCL_', 'RCUTILS_', 'RMW_', 'ROS_')
 _LONGEST_PEER = 255
 # What C reads as a number: no digits of other scripts, and not thousands of them.
 _NUMBER = re.compile('[0-9]{1,9}')
@@ -56,11 +68,28 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the values that a file gives to the variables that ROS reads."""
     for name, message, advice in find_environment_problems(context.spec.environment):
         yield context.at_value(('environment', name), 'bad-environment', message, help=advice)
+    for name in context.spec.environment:
+        yield from _check_variable(context, ('environment', name))
     for process in context.spec.processes.values():
+        for name in process.env:
+            yield from _check_variable(context, (*process.path, 'env', name))
         # Which middlewares there are where it runs, as in a container, nobody knows.
         for name, message, advice in _find_bad_values(process.env):
             path = (*process.path, 'env', name)
             yield context.at_value(path, 'bad-environment', message, help=advice)
+
+
+def _check_variable(context: CheckContext, path: DataPath) -> Iterator[Diagnostic]:
+    """Check that the name of a variable is not nearly one that ROS reads."""
+    name = str(path[-1])
+    if name not in _VARIABLES and name.upper().startswith(_PREFIXES):
+        begins = (each for each in sorted(_VARIABLES) if each.startswith(f'{name.upper()}_'))
+        typos = (each for each in sorted(_VARIABLES) if is_typo(name, each))
+        same = (each for each in (name.upper(),) if each in _VARIABLES)
+        meant = next(chain(same, typos, begins), None)
+        if meant:
+            message = f"ROS reads no variable '{name}'"
+            yield context.at_key(path, 'likely-misspelling', message, help=did_you_mean(meant))
 
 
 def find_environment_problems(

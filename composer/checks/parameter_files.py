@@ -18,9 +18,7 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
-from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.node_patterns import PatternIndex
-from composer.ros_parameters.overrides import MergedFiles
 from composer.spelling import count_edits, find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -30,6 +28,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
+    from composer.ros_parameters.overrides import MergedFiles
     from composer.yaml_text.positions import DataPath
 
 
@@ -92,6 +91,9 @@ class _Library:
                 )
                 continue
             if path not in self.files:
+                # Most systems have no parameter files.
+                from composer.ros_parameters.file_reader import read_parameter_file
+
                 self.files[path] = read_parameter_file(Path(path), self._values_left)
                 self._values_left -= min(self.files[path].values, self._values_left)
                 self.findings += [each for each in self.files[path].findings if each.span]
@@ -116,6 +118,8 @@ class _Library:
     def merge(self, paths: tuple[str, ...]) -> MergedFiles:
         """Return what files say together; they have been read."""
         if paths not in self._merged:
+            from composer.ros_parameters.overrides import MergedFiles
+
             self._merged[paths] = MergedFiles(self.files[path] for path in paths)
         return self._merged[paths]
 

@@ -99,6 +99,12 @@ def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[D
             f"which '{limits[0]}' is for, got {parameter.value!r}",
         )
         return
+    are_doubles = all(type(getattr(parameter, key)) is float for key in limits)
+    if inferred and parameter.type == 'integer' and are_doubles and len(limits) > 1:
+        message = f"parameter '{parameter.name}': expected a double, as its limits are"
+        path, help_text = (*parameter.path, 'default'), f'write {parameter.value}.0'
+        yield context.at_value(path, _RULE, message, help=help_text)
+        return
     for key in limits:
         limit = getattr(parameter, key)
         path = (*parameter.path, key)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.ament import explain_missing_package, list_executables, list_packages
 from composer.checks.names import IS_EMPTY, check_rules
-from composer.language.paths import PathError, explain_absent, resolve_path
+from composer.input_limits import explain_missing
+from composer.language.paths import PathError, explain_absent, is_in_package, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
 from composer.programs import base_environment, find_program_problem, is_on_path
 from composer.spelling import suggest
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ProcessSpec
 
+# What takes a script as its first argument after flags without values.
+_INTERPRETERS = re.compile(r'(?:python|pypy)[\d.]*|(?:ba|da|z)?sh|perl|ruby')
+_FLAGS = re.compile('-[bBdEeiIOPqsSuvx]+')
 # Commands of ROS 2 and its tools, which nobody misses where there is no ROS 2.
 _OF_ROS = ('ros2', 'rviz', 'rqt', 'gz', 'plotjuggler', 'foxglove')
 
@@ -39,6 +45,7 @@ def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
         yield from _check_executable(context, process)
         yield from _check_folder(context, process)
         yield from _check_program(context, process)
+        yield from _check_script(context, process)
 
 
 def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
@@ -95,6 +102,28 @@ def _check_folder(context: CheckContext, process: ProcessSpec) -> Iterator[Diagn
     at = (*process.path, 'cwd')
     help_text = explain_absent(folder, context.system.positions.value(at), is_folder=True)
     yield context.at_value(at, 'missing-folder', message, help=help_text)
+
+
+def _check_script(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
+    """Check that the file exists that an interpreter is given as its script."""
+    program, *arguments = process.command or ('',)
+    index = sum(1 for _ in takewhile(_FLAGS.fullmatch, arguments))
+    if not _INTERPRETERS.fullmatch(Path(program).name) or index == len(arguments):
+        return
+    script = Path(arguments[index])
+    path = (*process.path, 'command', index + 1)
+    place = context.system.positions.value(path)
+    # Without `cwd` it runs where the system is started: here, or beside the file.
+    folders = [Path(process.cwd)] if process.cwd else [Path(), place.source.folder]
+    if script.name.startswith('-') or any((folder / script).exists() for folder in folders):
+        return
+    if not folders[-1].is_dir() or is_in_package(process.cwd or '') or is_on_path(str(script)):
+        return
+    help_text = explain_missing(
+        folders[-1] / script, None if script.is_absolute() else folders[-1]
+    )
+    message = f"there is no script '{script}'"
+    yield context.at_value(path, 'missing-program', message, help=help_text)
 
 
 def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from typing import TYPE_CHECKING
 
 import click
@@ -87,8 +86,6 @@ def check(words: Sequence[str], options: CheckOptions) -> int:
         ComposerError: The report cannot be written, or there is no type checker.
     """
     _refuse_contradictions(options)
-    # What is read lives until the end: to look for garbage as often as usual takes a fifth more.
-    gc.set_threshold(50_000)
     report = _inspect(words, options)
     _show(report, options)
     if options.expected:
@@ -144,11 +141,26 @@ def _select(words: Sequence[str], options: CheckOptions) -> Selection:
         UsageError: Several systems, or arguments beside a matrix.
     """
     is_changed = has_arguments(words) or bool(options.set_values)
-    if not (is_changed or options.matrix):
-        return select_files(words, skip_other_files=options.skip_other_files)
     if is_changed and options.matrix:
         message = '--matrix cannot be used together with arguments or --set'
         raise UsageError(message, help='write them in the combinations of the matrix')
+    is_one = is_changed or options.matrix is not None
+    return select_systems(words, is_one=is_one, skip_other_files=options.skip_other_files)
+
+
+def select_systems(
+    words: Sequence[str], *, is_one: bool, skip_other_files: bool = False
+) -> Selection:
+    """Return the systems that a command line gives: one, as to `composer up`, or several.
+
+    Args:
+        is_one: Whether an option says that it is one; arguments say so, too.
+
+    Raises:
+        UsageError: It is one, and the first word is no file.
+    """
+    if not (is_one or has_arguments(words)):
+        return select_files(words, skip_other_files=skip_other_files)
     (path, *layers), arguments = split_words(words)
     return Selection((SelectedSystem(path, tuple(layers), tuple(arguments)),))
 

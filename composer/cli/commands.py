@@ -5,6 +5,7 @@ Each command is implemented in a file of its own, imported when the command runs
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 
 import click
@@ -28,6 +29,9 @@ from composer.terminal import escape
 
 # What `check --types` can be followed by.
 TYPE_CHECKERS = ('mypy', 'pyright')
+# What a check imports and reads lives until its end: to look for garbage in it as often as usual
+# takes a fifth more.
+_OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
 
@@ -239,6 +243,7 @@ def check_command(  # noqa: PLR0913 - one for each option
     quoted pattern, or - for standard input. Of several files, one without 'version:' is a layer
     of the one before it.
     """
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     from composer.cli.check import CheckOptions, check
 
     # The name of a type checker is a word of its own: the option works without.
@@ -420,8 +425,8 @@ def graph_command(
     return graph(paths, arguments, set_values, format_name=format_name, output=output)
 
 
-@cli.command('stubs')
-@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+@cli.command('stubs', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
 @click.option(
     '--output',
     type=click.Path(path_type=Path, file_okay=False),
@@ -430,15 +435,18 @@ def graph_command(
     metavar='DIR',
     help='The folder to write them to.',
 )
-def stubs_command(files: tuple[Path, ...], output: Path) -> int:
-    """Write typed stubs of the messages and nodes of FILES.
+def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: Path) -> int:
+    """Write typed stubs of the messages and nodes of FILE.
+
+    Layers, arguments and --set are those of 'composer up'; without arguments and --set, several
+    files, folders and patterns may be named.
 
     Annotate a behaviour with the class of its node, as in `node: Governor` after
     `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
     """
     from composer.cli.editors import write_stubs
 
-    return write_stubs(files, output)
+    return write_stubs(words, set_values, output)
 
 
 @cli.command('new')

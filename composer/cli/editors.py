@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks.checker import create_context
+from composer.cli.check import select_systems
+from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system
 from composer.schema import schema_path
 from composer.stubs.system_stubs import module_of, stubs_of
 
@@ -38,17 +39,26 @@ def print_schema(*, path_only: bool, matrix: bool) -> int:
     return ExitCode.DONE
 
 
-def write_stubs(paths: Sequence[Path], folder: Path) -> int:
-    """Write the stubs of files into a folder; return the exit code.
+def write_stubs(words: Sequence[str], set_values: Sequence[str], folder: Path) -> int:
+    """Write the stubs of systems into a folder; return the exit code.
+
+    Args:
+        words: Files, folders and patterns; or one file with its layers and arguments.
 
     Raises:
         ConflictingSystemsError: Two files have the same name.
+        UsageError: The arguments or `set_values` do not fit the file.
         ComposerError: The folder cannot be written.
     """
     files: dict[str, str] = {}
     modules: dict[str, Path] = {}
-    for path in paths:
-        system = load_system(path)
+    selection = select_systems(words, is_one=bool(set_values))
+    show_findings(selection.findings)
+    if selection.findings:
+        return ExitCode.FAILED
+    for each in selection.systems:
+        path = each.path
+        system = load_given([path, *each.layers], each.arguments or None, set_values)
         context = create_context(system, InterfaceCatalogue())
         findings = [*system.diagnostics, *(context.interfaces.findings if context else ())]
         show_findings(findings)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import TemplateRuntimeError
 
-from composer.diagnostics import diagnostic_at
+from composer.diagnostics import Related, diagnostic_at
 from composer.expressions import SECTIONS, is_variable_name
 from composer.expressions.templates import TemplateEvaluator
 from composer.input_limits import MAX_ENTRIES, MAX_VALUES
@@ -217,12 +217,17 @@ class _Expansion:
             )
         )
 
+    def _limit_place(self) -> tuple[Related, ...]:
+        span = self._evaluator.positions.keys.get(('max_nodes',))
+        return (Related('the limit is set here', span),) if span else ()
+
     def _report_limit(self, path: DataPath, what: str) -> None:
         self._document.diagnostics.append(
             diagnostic_at(
                 self._evaluator.positions.key(path),
                 'too-many-entries',
                 f'{self._section} has more than {what}',
+                related=self._limit_place(),
                 help="raise 'max_nodes' at the top of the file if that is intended",
             )
         )

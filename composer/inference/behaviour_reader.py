@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import ast
+import types
 from collections import abc
 from typing import TYPE_CHECKING
 
+from composer.inference.behaviour_results import check_results
 from composer.inference.current_run import Run, TooLongError
 from composer.inference.evaluation.evaluator import Evaluator
 from composer.inference.message_types import MessageTypes
 from composer.inference.module_names import ProjectModules, is_of_project
 from composer.inference.node_facts import NodeFacts, Question
 from composer.inference.reading import Reading, missing_reading, unknown_reading
-from composer.inference.scopes import own_nodes
 from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
     BY_FILE,
+    BY_RUN,
     CHOSEN,
     NODE,
     NONE,
     UNKNOWN,
     Argument,
     Arguments,
-    Constant,
     Function,
     Instance,
     Mapping,
@@ -30,33 +31,29 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
-    Scalar,
     Sequence,
+    Unknown,
     Value,
-    alternatives,
     constant,
-    is_none,
+    is_chosen,
     join,
 )
 from composer.inference.wires import Wire, wire_of
-from composer.python_source.modules import FunctionKind, ModuleSource
+from composer.language.bindings import node_bindings
+from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.inference.scopes import Scope
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
     from composer.python_source.module_finder import ModuleFinder
-    from composer.python_source.syntax import FunctionNode
     from composer.yaml_text.positions import DataPath
 
 
 # What all behaviours of a system may take: a step is a statement or an expression.
 _MOST_STEPS = 200_000
-# What ends a loop; that a call may raise is no way to end one.
-_WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
 
 
 class BehaviourReader:
@@ -79,6 +76,8 @@ class BehaviourReader:
         # By behaviour and what it is given: by questions, and by their answers.
         self._read: dict[object, dict[tuple[Question, ...], dict[object, Reading]]] = {}
         self._by_place: dict[DataPath, Reading] = {}
+        self._wires: dict[DataPath, Wire] = {}
+        self._read_once: dict[DataPath, Reading] = {}
         self._mentions: dict[int, Mentions] = {}
         self._steps_left = _MOST_STEPS
 
@@ -86,17 +85,59 @@ class BehaviourReader:
         """Return what a behaviour does with its node."""
         place = binding.behaviour.path
         if place not in self._by_place:
-            reading = self._read_with(node, binding, tells_values=False)
-            if reading.needs_values:
-                reading = self._read_with(node, binding, tells_values=True)
+            reading = self._read_first(node, binding)
+            kept = self._kept_for(node, binding, reading) if reading.kept_read else {}
+            if kept:
+                needs_values = reading.needs_values
+                reading = self._read_with(node, binding, tells_values=needs_values, kept=kept)
             self._by_place[place] = reading
         return self._by_place[place]
 
-    def _read_with(self, node: NodeSpec, binding: Binding, *, tells_values: bool) -> Reading:
+    def _read_first(self, node: NodeSpec, binding: Binding) -> Reading:
+        """Return a reading that does not know what behaviours keep in the state."""
+        place = binding.behaviour.path
+        if place not in self._read_once:
+            reading = self._read_with(node, binding, tells_values=False)
+            if reading.needs_values:
+                reading = self._read_with(node, binding, tells_values=True)
+            self._read_once[place] = reading
+        return self._read_once[place]
+
+    def _kept_for(self, node: NodeSpec, binding: Binding, reader: Reading) -> dict[str, Value]:
+        """Return what behaviours keep under the names in the state that one of them reads."""
+        every = [(each, self._read_first(node, each)) for each in node_bindings(node)]
+        owner = binding.own_state_of
+        of_owner = [(each, reading) for each, reading in every if each.own_state_of == owner]
+        found: dict[str, Value] = {}
+        for name in sorted(reader.kept_read):
+            is_own = name.startswith('[')
+            keepers = of_owner if is_own else every
+            readings = [reading for _, reading in keepers]
+            is_open = any(
+                each.is_own_state_open if is_own else each.is_state_open for each in readings
+            )
+            values = [each.kept[name] for each in readings if name in each.kept]
+            if not is_own:
+                values += [UNKNOWN] if node.state.get(name) is not None else []
+            value = UNKNOWN if is_open else join([*values, NONE])
+            if value not in (UNKNOWN, NONE) and not is_chosen(value):
+                found[name] = value
+            elif reader.needs_state and not is_open and _moves(name, keepers):
+                found[name] = Unknown(BY_RUN)
+        return found
+
+    def _read_with(
+        self,
+        node: NodeSpec,
+        binding: Binding,
+        *,
+        tells_values: bool,
+        kept: abc.Mapping[str, Value] = types.MappingProxyType({}),
+    ) -> Reading:
         """Return a reading that other nodes share if they answer alike."""
-        facts = NodeFacts(node, self._has_real_type, tells_values)
-        # Part of the key below; nodes call their publishers differently.
-        wire = wire_of(binding, NodeFacts(node, self._has_real_type))
+        facts = NodeFacts(node, self._has_real_type, tells_values, kept)
+        wire = self.wire_of(node, binding)
+        # With the wire, as nodes call their publishers differently.
         key = (binding.behaviour.name, wire, tells_values, _frozen(binding.behaviour.arguments))
         known = self._read.setdefault(key, {})
         for questions, readings in known.items():
@@ -107,6 +148,13 @@ class BehaviourReader:
         known.setdefault(tuple(facts.log), {})[tuple(facts.log.values())] = reading
         return reading
 
+    def wire_of(self, node: NodeSpec, binding: Binding) -> Wire:
+        """Return the types around a behaviour."""
+        place = binding.behaviour.path
+        if place not in self._wires:
+            self._wires[place] = wire_of(binding, NodeFacts(node, self._has_real_type))
+        return self._wires[place]
+
     def mentions(self, reading: Reading) -> Mentions:
         """Return what the modules of a behaviour may use beside what was read of it."""
         found = Mentions(set(reading.mentioned))
@@ -115,6 +163,7 @@ class BehaviourReader:
                 self._mentions[key] = find_mentions(module, self._modules.followed)
             found.names |= self._mentions[key].names
             found.open_kinds |= self._mentions[key].open_kinds
+            found.attributes |= self._mentions[key].attributes
         return found
 
     def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:
@@ -132,7 +181,19 @@ class BehaviourReader:
         finally:
             self._steps_left -= run.steps
         run.reading.settle()
+        run.reading.kept_read = {name for topic, name in facts.log if topic == 'kept'}
         return run.reading
+
+
+def _moves(name: str, keepers: abc.Iterable[tuple[Binding, Reading]]) -> bool:
+    """Return whether what is kept under a name changes while the system runs.
+
+    What hooks of the node keep may tell which part the node plays.
+    """
+    kept = [(binding, reading) for binding, reading in keepers if name in reading.kept]
+    return any(binding.entity is not None for binding, _ in kept) and not any(
+        name in reading.kept_by_file for _, reading in kept
+    )
 
 
 def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> None:
@@ -165,10 +226,9 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
         run.reading.open_all()
         return
     scope = evaluator.functions.enter(callee, arguments, waits=True)
-    _check_payloads(evaluator, callee, scope, wire)
-    _check_answers(evaluator, scope, binding)
-    _check_end(evaluator, callee, binding)
+    check_results(evaluator, callee, scope, wire, binding)
     evaluator.payloads.report_unfit()
+    evaluator.classes.mention_held()
 
 
 def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Arguments] | None:
@@ -196,81 +256,6 @@ def _of_file(value: object, place: Place) -> Value:
     if value is None or isinstance(value, bool | int | float | str):
         return constant(value, is_chosen=BY_FILE)
     return CHOSEN
-
-
-def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire) -> None:
-    kind = evaluator.functions.kind_of(callee)
-    is_generator = kind.is_generator
-    returned = wire.ended if is_generator else wire.returned
-    if kind is FunctionKind.ASYNC_GENERATOR and wire.ended:
-        # The last one that it yields is the result.
-        for value, place in scope.yielded:
-            if not evaluator.payloads.fits(wire.ended, value, place):
-                _check(evaluator, wire.yielded, value, place)
-        return
-    for value, place in scope.yielded if is_generator else ():
-        _check(evaluator, wire.yielded, value, place)
-    for value, place in scope.returned:
-        with evaluator.run.condition(is_doubt=id(place.node) in scope.doubtful):
-            _check(evaluator, returned, value, place)
-    nothing = all(is_none(value) for value, _ in scope.returned)
-    nothing = nothing and not is_generator and not _is_stub(callee.definition)
-    if wire.needs_payload and wire.returned and scope.returned and nothing:
-        _, place = scope.returned[-1]
-        evaluator.payloads.check(wire.returned, NONE, place)
-
-
-def _is_stub(definition: FunctionNode | ast.Lambda) -> bool:
-    """Return whether a function is still to be written: it has a docstring, `...` or `pass`."""
-    body = definition.body if isinstance(definition.body, list) else []
-    plain = (each.value if isinstance(each, ast.Expr) else each for each in body)
-    return all(isinstance(each, ast.Constant | ast.Pass) for each in plain)
-
-
-def _check_end(evaluator: Evaluator, callee: Function, binding: Binding) -> None:
-    """Check that a behaviour ends: until then nothing else of its group runs."""
-    kind, definition = evaluator.functions.kind_of(callee), callee.definition
-    # Goals have threads of their own.
-    is_of_action = binding.kind is not None and binding.kind.channel == 'action'
-    if kind is not FunctionKind.PLAIN or is_of_action or isinstance(definition, ast.Lambda):
-        return
-    for loop in own_nodes(definition):
-        if isinstance(loop, ast.While) and _is_endless(loop):
-            place = Place(callee.module, loop.test)
-            text = 'this loop never ends, and nothing else of its callback group runs again'
-            evaluator.run.report('endless-loop', place, text, 'let a timer call the behaviour')
-
-
-def _is_endless(loop: ast.While) -> bool:
-    is_always_true = isinstance(loop.test, ast.Constant) and bool(loop.test.value)
-    return is_always_true and not any(isinstance(node, _WAYS_OUT) for node in own_nodes(loop))
-
-
-def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None:
-    """Check what `accept` and `on_parameters` return: whether, or why not."""
-    kinds: dict[str, tuple[type, ...]] = {
-        'accept': (bool, str, type(None)),
-        'on_parameters': (str, type(None)),
-    }
-    wanted = kinds.get(binding.key.key)
-    for value, place in scope.returned if wanted else ():
-        several = alternatives(value)
-        found = [each.kind for each in several if isinstance(each, Constant | Scalar | Sequence)]
-        if wanted and len(found) == len(several) and not set(found) & set(wanted):
-            what = 'whether to accept, or why not' if bool in wanted else 'None, or why not'
-            evaluator.run.report(
-                'bad-answer',
-                place,
-                f'{binding.owner} returns a {found[0].__name__}',
-                f'return {what}',
-            )
-
-
-def _check(evaluator: Evaluator, type_name: str | None, value: Value, place: Place) -> None:
-    """Check a payload; none is published for `None`."""
-    several = [each for each in alternatives(value) if not is_none(each)]
-    if several:
-        evaluator.payloads.check(type_name, join(several), place)
 
 
 def _frozen(value: object) -> object:

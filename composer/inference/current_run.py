@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Span
 from composer.inference.reading import NodeUse, Problem, Reading, StateUse
-from composer.inference.values import Constant, Place, alternatives, is_chosen
+from composer.inference.values import (
+    BY_RUN,
+    BY_STATE,
+    Constant,
+    Place,
+    alternatives,
+    is_chosen,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +23,8 @@ if TYPE_CHECKING:
     from composer.inference.message_types import MessageTypes
     from composer.inference.module_names import ProjectModules
     from composer.inference.node_facts import NodeFacts
-    from composer.inference.values import Argument, Value
+    from composer.inference.reading import Awaited
+    from composer.inference.values import Argument, Primitive, Value
 
 # What one behaviour may take: statements and expressions, helpers included.
 _MOST_STEPS = 60_000
@@ -35,12 +43,20 @@ class Run:
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
         state_doubts: Those of them that hang on the state only.
+        limits: The number of those around it that the file has a part in: what is read there is
+            reached, but a name that the node lacks may be one of its parts that is switched off.
+        decided: The number of conditions around it of the file, whatever it says.
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
         conditions: The number of conditions around it.
         dead_branches: The number of branches around it that the file never takes.
         tried: How often something was read that is right or wrong by what the file says.
+        waits: Whether who calls the behaviour waits for the function under way.
+        held_locks: The locks that are held, and where they were taken.
+        probed: The names that a condition hangs on, while one is looked at.
+        moves: How often something was read that changes by itself.
         is_silent: Whether the place is read once more later.
+        is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
     """
 
@@ -53,21 +69,29 @@ class Run:
         self.reading = Reading()
         self.doubts = 0
         self.state_doubts = 0
+        self.limits = 0
+        self.decided = 0
         self.guards = 0
         self.broad_guards = 0
         self.conditions = 0
         self.dead_branches = 0
         self.tried = 0
+        self.waits = True
+        self.held_locks: list[tuple[Primitive, Place]] = []
+        self.probed: set[Awaited] | None = None
+        self.moves = 0
         self.is_silent = False
+        self.is_at_top = False
         self.steps = 0
+        self._other_types = 0
         self._most_steps = min(most_steps, _MOST_STEPS)
 
     def decide(self, value: Value) -> None:
         """Note that a value decides on what is done, or with what."""
-        if is_chosen(value) and any(
-            not isinstance(each, Constant) for each in alternatives(value)
-        ):
-            self.reading.needs_values = True
+        if any(not isinstance(each, Constant) for each in alternatives(value)):
+            chosen = is_chosen(value)
+            self.reading.needs_values |= chosen > BY_RUN
+            self.reading.needs_state |= chosen == BY_STATE
 
     def step(self) -> None:
         """Count a step.
@@ -84,25 +108,47 @@ class Run:
         """Whether the place is reached, if not always, whatever the file says."""
         return self.doubts == self.state_doubts
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether what is used at the place has to be there."""
+        return not (self.doubts or self.limits or self.broad_guards)
+
+    @property
+    def standing(self) -> tuple[int, int, int, int]:
+        """The counts that a statement may raise for those that follow it."""
+        return self.doubts, self.state_doubts, self.limits, self.decided
+
+    @standing.setter
+    def standing(self, counts: tuple[int, int, int, int]) -> None:
+        self.doubts, self.state_doubts, self.limits, self.decided = counts
+
     @contextmanager
-    def condition(self, *, is_doubt: bool = False, by_state: bool = False) -> Iterator[None]:
+    def condition(
+        self, *, is_doubt: bool = False, chosen: int = 0, decided: bool = False
+    ) -> Iterator[None]:
         """Note what is read meanwhile as read on a condition.
 
         Args:
-            is_doubt: Whether the file decides on it; `by_state` says that only the state does.
+            is_doubt: Whether the file decides on it; `chosen` says how.
+            decided: Whether it is the file's.
         """
         self.conditions += 1
-        self.doubt(is_doubt, by_state and is_doubt)
+        self.doubt(chosen, int(is_doubt))
+        self.decided += decided
         try:
             yield
         finally:
             self.conditions -= 1
-            self.doubt(-is_doubt, -(by_state and is_doubt))
+            self.doubt(chosen, -int(is_doubt))
+            self.decided -= decided
 
-    def doubt(self, count: int, of_state: int) -> None:
-        """Add doubts."""
-        self.doubts += count
-        self.state_doubts += of_state
+    def doubt(self, chosen: int, count: int = 1) -> None:
+        """Note conditions, by how the file decides on them."""
+        if chosen == BY_RUN:
+            self.limits += count
+        else:
+            self.doubts += count
+            self.state_doubts += count if chosen == BY_STATE else 0
 
     @contextmanager
     def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
@@ -116,16 +162,26 @@ class Run:
             self.broad_guards -= is_broad
 
     @contextmanager
-    def afresh(self, *, is_guard: bool) -> Iterator[None]:
-        """Read the top of a module meanwhile, on no condition of the place that needs it."""
-        before = self.doubts, self.state_doubts, self.guards, self.conditions, self.is_silent
-        self.doubts, self.state_doubts, self.guards = 0, 0, int(is_guard)
-        self.conditions, self.is_silent = 0, False
+    def of_other_types(self, *, is_other: bool) -> Iterator[None]:
+        """Leave alone which fields are read meanwhile, if they may be those of other types."""
+        self._other_types += is_other
         try:
             yield
         finally:
-            self.doubts, self.state_doubts, self.guards = before[:3]
-            self.conditions, self.is_silent = before[3:]
+            self._other_types -= is_other
+
+    @contextmanager
+    def afresh(self, *, is_guard: bool) -> Iterator[None]:
+        """Read the top of a module meanwhile, on no condition of the place that needs it."""
+        before = self.standing, self.guards, self.conditions
+        flags = self.is_silent, self.is_at_top
+        self.standing, self.guards = (0, 0, 0, 0), int(is_guard)
+        self.conditions, self.is_silent, self.is_at_top = 0, False, True
+        try:
+            yield
+        finally:
+            self.standing, self.guards, self.conditions = before
+            self.is_silent, self.is_at_top = flags
 
     @contextmanager
     def dead_branch(self) -> Iterator[None]:
@@ -164,6 +220,8 @@ class Run:
         if self.guards or self.broad_guards or self.is_silent:
             self.tried += 1
             return
+        if self._other_types and rule == 'unknown-field':
+            return
         if self.doubts and not (help_text or '').startswith('did you mean'):
             return
         span, used = span_of(place), span_of(used_at) if used_at else None
@@ -179,7 +237,7 @@ class Run:
                 kind,
                 name,
                 span_of(place, name),
-                is_certain=not (self.doubts or self.broad_guards),
+                is_certain=self.is_certain,
                 is_guarded=bool(self.guards or self.dead_branches),
                 **details,
             )
@@ -223,7 +281,7 @@ def span_of(place: Place, name: str = '') -> Span:
         last += len(node.arg or '')
         line = node.lineno
         return Span(source, line, first + 1, max(last - first, 1))
-    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
         line, name = first_line, node.name
         text = source.line(line)
         first, last = 0, len(text)

@@ -60,7 +60,8 @@ class MessageTypes:
         if description is None or any(each.name == name for each in description.constants):
             return True
         names = self.catalogue.constant_names(split_part(type_name)[0])
-        return names is None or name in names
+        # A description without any may come without those that there are.
+        return name in names if names is not None else not description.constants
 
     def constants(self, type_name: str) -> list[str]:
         """Return the names of the constants that are known."""
@@ -106,17 +107,17 @@ def value_of(field_type: FieldType, *, is_made: bool = False) -> Value:
     """
     if field_type.nested and not field_type.array:
         return Message(field_type.nested, is_made)
+    if field_type.array and (field_type.nested or not is_made):
+        return ArrayField(field_type, is_made)
     if is_made:
         return UNKNOWN
-    if field_type.array:
-        return ArrayField(field_type)
     return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
 
 
-def item_of(field_type: FieldType) -> Value:
+def item_of(field_type: FieldType, *, is_made: bool = False) -> Value:
     """Return what an item of an array is when it is read."""
     if field_type.nested:
-        return Message(field_type.nested)
+        return Message(field_type.nested, is_made)
     # NumPy's numbers come out of arrays of fixed length.
     if field_type.array == 'fixed' and field_type.kind not in ('string', 'wstring'):
         return UNKNOWN

@@ -8,19 +8,19 @@ import sys
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from composer.inference.values import UNKNOWN, External, Value
+from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
+from composer.inference.values import UNKNOWN, External, Primitive, Value
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.syntax import BLOCKS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
+    from composer.inference.classes.attribute_stores import AttributeStore
     from composer.python_source.module_finder import ModuleFinder
 
 _INSTALLED = {'site-packages', 'dist-packages'}
 _BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-# Methods that change what they are called on.
-_CHANGING = {'add', 'append', 'clear', 'extend', 'insert', 'pop', 'remove', 'setdefault', 'update'}
 
 
 class TopNames:
@@ -29,6 +29,7 @@ class TopNames:
     def __init__(self, body: Iterable[ast.stmt]) -> None:
         self.statements: dict[str, list[tuple[ast.AST, bool]]] = {}
         self.is_open = False
+        self.stars: list[ast.ImportFrom] = []
         self._body = list(body)
         pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(self._body)]
         while pending:
@@ -45,7 +46,10 @@ class TopNames:
             self.is_open |= statement.name == '__getattr__'
         elif isinstance(statement, ast.Import | ast.ImportFrom):
             for alias in statement.names:
-                self.is_open |= alias.name == '*'
+                if alias.name == '*' and isinstance(statement, ast.ImportFrom):
+                    self.is_open = True
+                    self.stars.append(statement)
+                    continue
                 yield alias.asname or alias.name.partition('.')[0]
         elif isinstance(statement, ast.ExceptHandler):
             yield from filter(None, [statement.name])
@@ -72,6 +76,17 @@ class TopNames:
     @cached_property
     def changed(self) -> frozenset[str]:
         """Names that functions store, and those whose values are changed somewhere."""
+        found = set(self.stored_again)
+        for node in (each for statement in self._body for each in ast.walk(statement)):
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
+                    if method in CHANGING:
+                        found.add(name)
+        return frozenset(found)
+
+    @cached_property
+    def stored_again(self) -> frozenset[str]:
+        """Names that functions store, and those of which items are stored."""
         found: set[str] = set()
         for node in (each for statement in self._body for each in ast.walk(statement)):
             match node:
@@ -79,9 +94,6 @@ class TopNames:
                     found |= set(names)
                 case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
                     found.add(name)
-                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
-                    if method in _CHANGING:
-                        found.add(name)
                 case ast.AugAssign(target=ast.Name(id=name)):
                     found.add(name)
         return frozenset(found)
@@ -114,8 +126,16 @@ class ProjectModules:
         self.followed: set[int] = set()
         # What calls of functions return, by their syntax trees.
         self.kinds: dict[int, FunctionKind] = {}
-        # How often the code of a module stores an attribute of a name.
-        self.attribute_stores: dict[tuple[int, str], int] = {}
+        self._stores: dict[int, dict[str, list[AttributeStore]]] = {}
+
+    def stores_of(self, name: str) -> list[AttributeStore]:
+        """Return the places in all modules that were read which store an attribute."""
+        found: list[AttributeStore] = []
+        for key, module in tuple(self._read.items()):
+            if key not in self._stores:
+                self._stores[key] = find_stores(module.body)
+            found += [*self._stores[key].get(name, ()), *self._stores[key].get(ANY, ())]
+        return found
 
     def is_patched(self, name: str) -> bool:
         """Return whether a module that was read stores an attribute of this name at its top."""
@@ -129,6 +149,21 @@ class ProjectModules:
         self._names.setdefault(id(module), name)
         self._read[id(module)] = module
         return module
+
+    def star_home(self, module: ModuleSource, name: str) -> ModuleSource | None:
+        """Return the module whose name a star import brings; `None` if none is known to."""
+        top = self.top(module)
+        if name in top.statements or name.startswith('_'):
+            return None
+        for statement in reversed(top.stars):
+            home = self.find(self.imported(module, statement, '*').removesuffix('.*'))
+            if home is None or home is module:
+                return None
+            if name in self.top(home).statements:
+                return home
+            if self.top(home).is_open:
+                return self.star_home(home, name)
+        return None
 
     def public_names(self, name: str) -> list[str]:
         """Return the names that a module lists in its `__all__`."""
@@ -172,11 +207,14 @@ class ProjectModules:
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
         # Of `try: import x`, and imports for type checkers, the first one counts.
         is_known = len(statements) == 1 and (not is_conditional or is_import)
-        if not is_known or name in top.changed:
+        if not is_known or name in top.stored_again:
             return UNKNOWN
         self._under_way.add(key)
         try:
-            self._values[key] = evaluate(statement, is_conditional)
+            value = evaluate(statement, is_conditional)
+            # What methods change is known only of what is no container: `event.clear()`.
+            is_kept = name not in top.changed or isinstance(value, Primitive)
+            self._values[key] = value if is_kept else UNKNOWN
         finally:
             self._under_way.discard(key)
         return self._values[key]

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 from composer.inference.values import (
     BY_FILE,
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     UNKNOWN,
     Scalar,
+    Unknown,
     Value,
     constant,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from typing import Any
 
     from composer.language.specs import EndSpec, NodeSpec
@@ -33,6 +35,7 @@ class NodeFacts:
 
     Args:
         has_real_type: Whether the type of an entity is the one that is meant.
+        kept: What behaviours keep in `node.state` and `node.own_state`, as far as that is known.
         tells_values: Whether it tells the node's name and the values of parameters, in which
             nodes differ most; else only what kind of value each is.
 
@@ -43,6 +46,7 @@ class NodeFacts:
     node: NodeSpec
     has_real_type: Callable[[EndSpec], bool]
     tells_values: bool = True
+    kept: Mapping[str, Value] = field(default_factory=dict)
     log: dict[Question, object] = field(default_factory=dict)
 
     def type_of(self, section: str, name: str) -> str | None:
@@ -52,6 +56,10 @@ class NodeFacts:
     def value_of_parameter(self, name: str) -> Value:
         """Return what a parameter may be: the value that it starts with, or another one."""
         return self._ask('parameter', name)  # type: ignore[return-value]
+
+    def kept_value(self, name: str) -> Value:
+        """Return what behaviours keep under a name of the state; `[name]` is of `own_state`."""
+        return self._ask('kept', name)  # type: ignore[return-value]
 
     def name(self) -> Value:
         """Return the name of the node."""
@@ -69,6 +77,8 @@ class NodeFacts:
         if topic == 'name':
             own = constant(self.node.name, is_chosen=BY_FILE)
             return own if self.tells_values else Scalar(str, BY_FILE)
+        if topic == 'kept':
+            return self.kept.get(name, Unknown(BY_STATE))
         if topic == 'parameter':
             return self._answer_parameter(name)
         entity: Any = getattr(self.node, topic).get(name)

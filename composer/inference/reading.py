@@ -10,11 +10,13 @@ from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
-    from composer.inference.values import Constant
+    from composer.inference.values import Constant, Held, Primitive, Value
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.
 Waited: TypeAlias = Literal['', 'answer', 'end']
+# What behaviours wait for, and bring about.
+Awaited: TypeAlias = 'Primitive | Held'
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
 # The methods of the node that send something, and the noun of what they use by its name.
@@ -104,6 +106,19 @@ class RemoteParameter:
     is_certain: bool
 
 
+@record
+class Block:
+    """A wait for something that another behaviour has to bring about, without an end.
+
+    Attributes:
+        related: What else has to do with it, and where.
+    """
+
+    what: Awaited
+    place: Span
+    related: tuple[tuple[str, Span], ...] = ()
+
+
 @dataclass(slots=True)
 class Reading:
     """All that is known of what a behaviour does.
@@ -123,7 +138,18 @@ class Reading:
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
             are as those of `state`.
         state_tested: The names that it asks for with `hasattr`.
+        unpublished: Where it gives away payloads that nothing publishes.
+        kept: What it keeps in `node.state`, and as `[name]` in `node.own_state`.
+        kept_by_file: The names of those of these that it has from the file, or keeps where the
+            file says so.
+        needs_state: Whether it hangs on what is kept in the state.
+        kept_read: The names of what it reads of these.
         remote_parameters: Parameters of nodes that it sets or reads by their names.
+        blocks: What it waits for without an end.
+        fills: What it brings about that others may wait for, and whether it does so itself: what
+            it starts may do so, too.
+        asked: What it asks first, as in `queue.empty()`.
+        sleeps: How long it sleeps, in seconds, where, and where that is written.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -141,7 +167,16 @@ class Reading:
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
+    unpublished: list[Span] = field(default_factory=list)
+    kept: dict[str, Value] = field(default_factory=dict)
+    kept_by_file: set[str] = field(default_factory=set)
+    needs_state: bool = False
+    kept_read: set[str] = field(default_factory=set)
     remote_parameters: list[RemoteParameter] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)
+    fills: dict[Awaited, set[bool]] = field(default_factory=dict)
+    asked: set[Awaited] = field(default_factory=set)
+    sleeps: list[tuple[float, Span, Span]] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""
@@ -151,6 +186,8 @@ class Reading:
 
     def settle(self) -> None:
         """Forget what was noted twice."""
+        self.blocks = list(dict.fromkeys(self.blocks))
+        self.sleeps = list(dict.fromkeys(self.sleeps))
         self.uses = list(dict.fromkeys(self.uses))
         self.problems = list(dict.fromkeys(self.problems))
         self.own_state_read = list(dict.fromkeys(self.own_state_read))

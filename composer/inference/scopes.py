@@ -39,6 +39,7 @@ class Scope:
         waits: Whether who calls the behaviour waits for it.
         doubtful: The expressions that it returns where only the file decides, by their nodes.
         stored: What its names stood for anywhere.
+        is_body: Whether it is the body of a class.
     """
 
     module: ModuleSource
@@ -56,6 +57,7 @@ class Scope:
     waits: bool = True
     doubtful: set[int] = field(default_factory=set)
     stored: Names = field(default_factory=dict)
+    is_body: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Store what a name stands for from now on."""

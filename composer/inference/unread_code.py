@@ -26,10 +26,12 @@ class Mentions:
     Attributes:
         names: The names that it may use, of whatever kind.
         open_kinds: The kinds of which it may use any.
+        attributes: Attributes of something that it names, and globals that it stores.
     """
 
     names: set[str] = field(default_factory=set)
     open_kinds: set[str] = field(default_factory=set)
+    attributes: set[str] = field(default_factory=set)
 
 
 def find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
@@ -41,6 +43,10 @@ def find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
     found = Mentions()
     plain: set[int] = set()
     for node in _unread(module, followed):
+        if isinstance(node, ast.Attribute):
+            found.attributes.add(node.attr)
+        elif isinstance(node, ast.Global):
+            found.attributes.update(node.names)
         match node:
             case ast.Constant(value=str(text)):
                 found.names.add(text)

@@ -37,8 +37,10 @@ class Unknown:
 
     Attributes:
         is_chosen: Whether the file decides on it: `BY_FILE` for an argument under `with:` or the
-            name of the node, `BY_PARAMETER` for what may change while the system runs, and
-            `BY_STATE` for what behaviours keep, which they may have from the file.
+            name of the node, `BY_PARAMETER` for what may change while the system runs,
+            `BY_STATE` for what behaviours keep, which they may have from the file, and `BY_RUN`
+            for what goes either way while the system runs, whatever the file says: a message's
+            number that is compared with a parameter.
     """
 
     is_chosen: int = 0
@@ -52,12 +54,14 @@ class Constant:
         kind: Its type, as 1 and `True` are equal.
         origin: Where it is written.
         is_chosen: As that of `Unknown`.
+        member: Of a member of an enumeration, its `Class` and its name there.
     """
 
     kind: type
     value: Any
     is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
+    member: Any = field(default=None, compare=False)
 
 
 @record
@@ -90,9 +94,14 @@ class MessageClass:
 
 @record
 class ArrayField:
-    """The value of a field that is an array."""
+    """The value of a field that is an array.
+
+    Attributes:
+        is_made: As that of `Message`.
+    """
 
     type: FieldType
+    is_made: bool = False
 
 
 @record
@@ -157,14 +166,48 @@ class Mapping:
 
     Attributes:
         entries: The values by their keys, and where each is written.
-        is_open: Whether it may have further entries.
+        has_unknown: Whether it may have further entries, of which nothing is known.
         depth: On how many conditions it was made.
+        others: What it holds under keys that are not known, if it has any.
     """
 
     entries: dict[object, tuple[Value, Place]]
-    is_open: bool = False
+    has_unknown: bool = False
     depth: int = 0
     is_lost: bool = False
+    others: Value | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it may have further entries."""
+        return self.has_unknown or self.others is not None
+
+    @is_open.setter
+    def is_open(self, is_open: bool) -> None:
+        self.has_unknown = is_open
+
+    def set_other(self, value: Value) -> None:
+        """Store a value under a key that is not known."""
+        self.others = value if self.others is None else join([self.others, value])
+
+    def value_of(self, key: Value) -> Value | None:
+        """Return what it may hold under a key, `None` if that is nothing."""
+        if self.is_lost:
+            return UNKNOWN
+        if not isinstance(key, Constant):
+            return self.any_value()
+        held = self.entries.get(key.value)
+        found = [*([held[0]] if held else []), *([self.others] if self.others else [])]
+        if not held and self.has_unknown:
+            return UNKNOWN
+        return join(found) if found else None
+
+    def any_value(self) -> Value:
+        """Return what any of its entries may hold."""
+        if self.is_lost or self.has_unknown:
+            return UNKNOWN
+        values = [value for value, _ in self.entries.values()]
+        return join([*values, *([self.others] if self.others else [])] or [UNKNOWN])
 
     def set(self, key: object, value: Value, place: Place, depth: int) -> None:
         """Store a value; one that is stored on a condition is one of two."""
@@ -196,6 +239,11 @@ class Sequence:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
 
+    @property
+    def is_ordered(self) -> bool:
+        """Whether its first item comes first, in whatever runs."""
+        return self.kind not in (set, frozenset) or len(self.items) < 2  # noqa: PLR2004
+
     def item_at(self, index: int | None) -> Value:
         """Return what the item at an index may be; `None` for one that is not known."""
         count = len(self.items)
@@ -218,6 +266,7 @@ class Function:
         outer: The `Scope` around it; `None` for the module's own.
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
+        of: The `Class` that defines it, if it is a method.
     """
 
     module: ModuleSource
@@ -225,15 +274,22 @@ class Function:
     outer: Any = None
     owner: Value | None = None
     is_read: bool = False
+    of: Any = None
 
 
 @dataclass(slots=True, eq=False)
 class Class:
-    """A class of the project."""
+    """A class of the project.
+
+    Attributes:
+        outer: The `Scope` around it; `None` for the module's own.
+        attributes: What was stored in it later, wherever that was.
+    """
 
     module: ModuleSource
     definition: ast.ClassDef
     outer: Any = None
+    attributes: dict[str, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -242,15 +298,45 @@ class Instance:
 
     Attributes:
         attributes: What was stored in it, wherever that was.
+        is_shared: Whether other behaviours may have it, too.
+        doubtful: The attributes that were stored on conditions.
+        version: How often what it has changed.
+        is_open: Whether something unknown may have stored attributes in it.
+        is_unmade: Whether nobody has seen how it was made.
+        is_member: Whether it is a member of an enumeration.
     """
 
     of: Class
     attributes: dict[str, Value] = field(default_factory=dict)
+    is_shared: bool = False
+    doubtful: set[str] = field(default_factory=set)
+    version: int = 0
+    is_open: bool = False
+    is_unmade: bool = False
+    is_member: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Note what an attribute may be."""
         before = self.attributes.get(name)
         self.attributes[name] = value if before is None else join([before, value])
+        self.version += before != self.attributes[name]
+
+
+@record
+class Descriptor:
+    """What a class stores for `property`, `staticmethod`, `classmethod` or `partialmethod`."""
+
+    kind: str
+    function: Value
+    setter: Value | None = None
+
+
+@record
+class Super:
+    """What `super()` gives: the attributes of an object that come after those of a class."""
+
+    of: Class
+    owner: Value
 
 
 @dataclass(slots=True, eq=False)
@@ -268,9 +354,44 @@ class ProjectModule:
     module: ModuleSource
 
 
+@dataclass(slots=True, eq=False)
+class Primitive:
+    """Something that threads wait for, such as an event, a queue or a lock; or a thread.
+
+    Attributes:
+        kind: The full name of its class.
+        origin: Where it is made.
+        target: What a thread runs.
+        is_lost: Whether something unknown may bring about what is waited for.
+    """
+
+    kind: str
+    origin: Place
+    target: Any = None
+    is_lost: bool = False
+
+
+@record
+class Held:
+    """A name of `node.state`, of a module, or what is kept there.
+
+    Attributes:
+        kind: The class of what is kept; `state` for the name itself, or the file of the module.
+    """
+
+    kind: str
+    name: str
+
+
 @record
 class Never:
-    """What a call gives that always raises."""
+    """What a call gives that always raises.
+
+    Attributes:
+        is_again: Whether it is only not known yet: a call of a function in that function.
+    """
+
+    is_again: bool = False
 
 
 @record
@@ -337,18 +458,23 @@ Value: TypeAlias = (
     | Function
     | Class
     | Instance
+    | Descriptor
+    | Super
     | Partial
     | ProjectModule
+    | Primitive
     | Never
     | Alternatives
 )
 
-BY_STATE = 1
-BY_FILE = 2
-BY_PARAMETER = 3
+BY_RUN = 1
+BY_STATE = 2
+BY_FILE = 3
+BY_PARAMETER = 4
 
 UNKNOWN = Unknown()
 NEVER = Never()
+AGAIN = Never(is_again=True)
 CHOSEN = Unknown(BY_PARAMETER)
 NODE = NodeValue()
 NONE = Constant(type(None), None)
@@ -364,20 +490,35 @@ def alternatives(value: Value) -> tuple[Value, ...]:
     return value.values if isinstance(value, Alternatives) else (value,)
 
 
-def join(values: Iterable[Value]) -> Value:
-    """Return the value that is one of several."""
+def join(values: Iterable[Value], *, like: Value | None = None) -> Value:
+    """Return the value that is one of several.
+
+    Args:
+        like: Of what they are a part; one expression chooses between them if it does there.
+    """
     found: dict[Value, None] = {}
     for value in values:
         found.update(dict.fromkeys(alternatives(value)))
     if len(found) > 1:
         found.pop(NEVER, None)
+    if len(found) > 1:
+        found.pop(AGAIN, None)
     if len(found) == 1:
         return next(iter(found))
     if not found or len(found) > _MOST_ALTERNATIVES:
         return Unknown(max(map(is_chosen, found), default=0))
     if any(isinstance(value, Unknown) for value in found):
-        return Unknown(max(map(is_chosen, found), default=0))
-    return Alternatives(tuple(found))
+        unknown = Unknown(max(map(is_chosen, found), default=0))
+        # Of what may be called, something is known still.
+        called = [each for each in found if _is_acting(each)]
+        return Alternatives((unknown, *called)) if called else unknown
+    return Alternatives(tuple(found), isinstance(like, Alternatives) and like.is_direct)
+
+
+def _is_acting(value: Value) -> bool:
+    if isinstance(value, Instance):
+        return not value.is_member
+    return isinstance(value, Function | Partial | Class | NodeValue)
 
 
 def is_none(value: Value) -> bool:
@@ -388,6 +529,24 @@ def is_none(value: Value) -> bool:
 def is_chosen(value: Value) -> int:
     """Return whether the file decides on a value, and how."""
     return max(getattr(each, 'is_chosen', 0) for each in alternatives(value))
+
+
+def chosen_with(*values: Value) -> int:
+    """Return how the file decides on what comes of several values together.
+
+    It has the last word only if all of them are its own, or written in the code: who compares
+    what a message says with a parameter does not ask which part the node plays.
+    """
+    chosen = max(map(is_chosen, values), default=0)
+    return BY_RUN if chosen and any(map(_moves, values)) else chosen
+
+
+def _moves(value: Value) -> bool:
+    """Return whether a value comes from outside while the system runs."""
+    return all(
+        isinstance(each, Unknown | Scalar | ArrayField | PartOfNode) and is_chosen(each) <= BY_RUN
+        for each in alternatives(value)
+    )
 
 
 def truth_of(value: Value) -> bool | None:
@@ -409,7 +568,8 @@ def _truth_of(value: Value) -> bool | None:
     return None
 
 
-def are_chosen(arguments: Arguments) -> bool:
-    """Return whether the file decides on one of the arguments."""
+def chosen_by(arguments: Arguments) -> int:
+    """Return whether the file decides on one of the arguments, and how."""
     values = [argument.value for argument in arguments.all()]
-    return any(is_chosen(each.yielded if isinstance(each, Generated) else each) for each in values)
+    given = (each.yielded if isinstance(each, Generated) else each for each in values)
+    return max(map(is_chosen, given), default=0)

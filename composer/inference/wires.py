@@ -21,6 +21,7 @@ class Wire:
         yielded: The type that each yielded payload becomes.
         returned: The type that a returned payload becomes.
         ended: The type that a payload becomes which a generator returns.
+        is_unpublished: Whether nothing publishes what it gives, although `publish:` could.
         needs_payload: Whether a response has to be returned.
     """
 
@@ -29,6 +30,7 @@ class Wire:
     returned: str | None = None
     ended: str | None = None
     needs_payload: bool = False
+    is_unpublished: bool = False
 
 
 def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
@@ -51,7 +53,7 @@ def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
         given=type_of(key.given),
         yielded=type_of(key.yielded),
         returned=type_of(key.returned),
-        # Timers do not publish what a generator returns at its end.
-        ended=None if key.returned == PUBLISHED else type_of(key.returned),
+        ended=type_of(key.returned),
         needs_payload=key.returned not in (None, PUBLISHED),
+        is_unpublished=key.returned == PUBLISHED and published is None,
     )

@@ -64,10 +64,10 @@ class InterfaceCatalogue:
 
     def has(self, full_name: str) -> bool:
         """Return whether an interface exists, by its full name: `std_msgs/msg/String`."""
+        if full_name in self._added:
+            return True
         package, kind, _ = full_name.split('/')
-        return full_name in self._added or full_name in self._indexed(
-            package, cast('InterfaceKind', kind)
-        )
+        return full_name in self._indexed(package, cast('InterfaceKind', kind))
 
     def describe(self, full_name: str) -> InterfaceDescription | None:
         """Describe an interface, such as `std_msgs/msg/String`.

@@ -140,21 +140,24 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
     )
 
 
-def find_declaration_errors(argument: ArgumentSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Yield the errors of a declaration that the schema does not find, with their keys.
+def find_declaration_errors(
+    argument: ArgumentSpec,
+) -> Iterator[tuple[tuple[str | int, ...], str, str | None]]:
+    """Yield the errors of a declaration that the schema does not find, with their keys and help.
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
     if not is_variable_name(argument.name):
-        yield (), f"'{argument.name}' cannot be used as a name in expressions"
+        yield (), f"'{argument.name}' cannot be used as a name in expressions", None
     default, choices = argument.default, argument.choices
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
         if value is not None and (problem := _find_default_problem(value, argument.type)):
-            yield keys, problem
+            yield keys, problem, None
     if default is not None and choices and default not in choices:
-        yield ('default',), f'the default {default!r} is not one of the choices'
+        message = f'the default {default!r} is not one of the choices'
+        yield ('default',), message, suggest(default, choices)
 
 
 def _find_default_problem(value: Any, type_name: str) -> str | None:

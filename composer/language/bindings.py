@@ -37,6 +37,11 @@ class Binding:
         return self.key.arguments
 
     @property
+    def own_state_of(self) -> object:
+        """What it shares its `own_state` with: the behaviours of one entity have the same."""
+        return self.entity.path if self.entity is not None else self.key.key
+
+    @property
     def may_yield(self) -> bool:
         """Whether it may be a generator."""
         return self.key.may_yield

@@ -82,7 +82,7 @@ def _check_declarations(
     declared: Mapping[str, ArgumentSpec], positions: SourceMap
 ) -> Iterable[Diagnostic]:
     for name, argument in declared.items():
-        for key, problem in find_declaration_errors(argument):
+        for key, problem, advice in find_declaration_errors(argument):
             path = ('args', name, *key)
             span = positions.value(path) if key else positions.key(path)
-            yield diagnostic_at(span, 'bad-argument-declaration', problem)
+            yield diagnostic_at(span, 'bad-argument-declaration', problem, help=advice)

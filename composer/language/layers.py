@@ -11,13 +11,14 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.entity_kinds import WORK_KEYS
+from composer.entity_kinds import ENTITY_KINDS, WORK_KEYS
 from composer.language.specs import NodeSpec
-from composer.spelling import suggest
+from composer.schema.structure import lacks_keys
+from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from composer.diagnostics import Diagnostic
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -75,10 +76,18 @@ class _Merging:
             elif isinstance(value, dict) and isinstance(merged.get(key), dict):
                 merged[key] = self.merge(merged[key], value, at)
             else:
+                if key not in merged and (meant := _find_meant(at, value, below)):
+                    self._report_incomplete(at, meant)
+                    # What it says is read as what it means, and has findings of its own.
+                    self._new_positions.move(at, (*path, meant))
+                    merged[meant] = self.merge(merged[meant], value, (*path, meant))
+                    continue
                 if key not in merged and _only_changes_a_node(at, value):
                     self._report(at, f"there is no node '{key}' to change", below)
                 if key not in merged and path == ('args',) and not self._is_used(key):
                     self._report(at, f"there is no argument '{key}' to change", below)
+                if key not in merged and (near := self._find_typo(at, below)):
+                    self._report(at, f"there is no '{key}' to change", [near])
                 merged[key] = self._without_removals(value, at)
                 self.positions.replace(at, self._new_positions)
         return merged
@@ -96,6 +105,18 @@ class _Merging:
                 self._report(at, f"null removes '{key}', which does not exist", {})
         return kept
 
+    def _find_typo(self, path: DataPath, there: dict[str, Any]) -> str | None:
+        """Return the entry that a new one, which is whole in itself, is a misspelling of."""
+        *outer, name = path
+        is_simple = tuple(outer) in (('qos',), ('environment',)) or (
+            len(outer) == _IN_NODE and outer[-1] in ('env', 'parameters', 'state')
+        )
+        near = find_nearest(name, there) if is_simple else None
+        if near is None or not is_typo(str(name), near):
+            return None
+        is_used = any(name == each for user in self._users for each in _values(user.data))
+        return None if is_used else near
+
     def _is_used(self, argument: str) -> bool:
         """Return whether an expression of a layer may use an argument that it declares."""
         word = re.compile(rf'\b{re.escape(argument)}\b')
@@ -105,7 +126,14 @@ class _Merging:
             for text in _texts(each.data)
         )
 
-    def _report(self, path: DataPath, message: str, there: dict[str, Any]) -> None:
+    def _report_incomplete(self, path: DataPath, meant: str) -> None:
+        what = _NOUNS[str(path[-2])]
+        message = f"there is no {what} '{path[-1]}' to change, and for a new one keys are missing"
+        span = self._new_positions.key(path)
+        finding = diagnostic_at(span, 'missing-key', message, help=did_you_mean(meant))
+        self.findings.append(finding)
+
+    def _report(self, path: DataPath, message: str, there: Iterable[str]) -> None:
         self.findings.append(
             diagnostic_at(
                 self._new_positions.key(path),
@@ -114,6 +142,13 @@ class _Merging:
                 help=suggest(str(path[-1]), there, 'there are'),
             )
         )
+
+
+def _values(data: Any) -> Iterator[Any]:
+    """Yield the scalars of data, without its keys."""
+    inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    for each in inner:
+        yield from _values(each) if isinstance(each, dict | list) else (each,)
 
 
 def _texts(data: Any) -> Iterator[str]:
@@ -126,6 +161,21 @@ def _texts(data: Any) -> Iterator[str]:
             yield from _texts(value)
     elif isinstance(data, str):
         yield data
+
+
+def _find_meant(path: DataPath, value: Any, there: dict[str, Any]) -> str | None:
+    """Return the entry that a new one without all its keys was meant to change."""
+    if not isinstance(value, dict) or len(path) == 1:
+        return None
+    if path[-2] not in _SECTIONS.get((len(path), str(path[0])), ()):
+        return None
+    meant = find_nearest(path[-1], there)
+    if meant is None or not isinstance(there[meant], dict):
+        return None
+    part: Any = value
+    for key in reversed(path):
+        part = {key: part}
+    return meant if lacks_keys(part) else None
 
 
 def _only_changes_a_node(path: DataPath, value: Any) -> bool:
@@ -142,6 +192,19 @@ def is_null_a_value(path: DataPath) -> bool:
     )
 
 
+# The sections with entries that need some keys, by the depth of these and the first key.
+_NOUNS = {
+    **{kind.section: kind.noun for kind in ENTITY_KINDS if kind.section != 'parameters'},
+    'nodes': 'node',
+    'include': 'include',
+    'processes': 'process',
+}
+_SECTIONS = {
+    (2, 'nodes'): ('nodes',),
+    (2, 'include'): ('include',),
+    (2, 'processes'): ('processes',),
+    (4, 'nodes'): tuple(_NOUNS),
+}
 _NODE = 2
 _IN_NODE = 3
 _IN_ENTITY = 5

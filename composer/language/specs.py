@@ -351,13 +351,13 @@ class NodeSpec:
     def entities(self) -> Iterator[tuple[EntityKind, EntitySpec]]:
         """Yield all that the node has, each with its kind."""
         for kind in ENTITY_KINDS:
-            for entity in self._of(kind):
+            for entity in getattr(self, kind.section).values():
                 yield kind, entity
 
     def ends(self) -> Iterator[tuple[EntityKind, EndSpec]]:
         """Yield all that meets others on a topic, service or action, each with its kind."""
         for kind in CHANNEL_KINDS:
-            for entity in self._of(kind):
+            for entity in getattr(self, kind.section).values():
                 yield kind, entity
 
     @property

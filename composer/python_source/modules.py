@@ -279,6 +279,9 @@ class _ModuleReader:
         for target in targets:
             if not isinstance(target, ast.Name):
                 self._read_stores(target)
+            # Of something that may be this module: `sys.modules[__name__].run = walk`.
+            if isinstance(target, ast.Attribute) and target.attr in self.functions:
+                self._bind(target.attr, FunctionSource())
         for target in targets:
             for node in ast.walk(target):
                 if not isinstance(node, ast.Name):

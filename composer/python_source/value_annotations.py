@@ -1,7 +1,8 @@
 """Compare values of a file with annotations of parameters.
 
-These are `bool`, `int`, `float`, `str`, `Literal['fast', 'slow']`, `Annotated[float, '> 0']`, and
-unions of them. What a bound compares with is a number, or the name of another argument.
+These are `bool`, `int`, `float`, `str`, `Literal['fast', 'slow']`, `Annotated[float, '> 0']`,
+lists of them, mappings, and unions of all these. What a bound compares with is a number, or the
+name of another argument.
 """
 
 from __future__ import annotations
@@ -24,6 +25,12 @@ _SCALARS: dict[str, tuple[type, ...]] = {
     'int': (int,),
     'str': (str,),
 }
+_COLLECTIONS: dict[str, tuple[type, str]] = {
+    **dict.fromkeys(('dict', 'Dict', 'Mapping', 'MutableMapping'), (dict, 'a mapping')),
+    **dict.fromkeys(('list', 'List', 'MutableSequence'), (list, 'a list')),
+    **dict.fromkeys(('Collection', 'Iterable', 'Sequence'), (list, 'a list')),
+}
+_OF_TEXTS = ('Collection', 'Iterable', 'Sequence')
 _BOUND = re.compile(r'(>=|<=|>|<)\s*(?:(-?\d+(?:\.\d+)?)|([A-Za-z_]\w*))')
 _COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
     '<': operator.lt,
@@ -84,6 +91,8 @@ def _read(expression: ast.expr, value: Any, given: Mapping[str, Any]) -> Iterato
             yield from _read(expression.right, value, given)
         case ast.Name(id=name) if name in _SCALARS:
             yield WantedValue(name, _is_scalar(value, name))
+        case ast.Name() | ast.Attribute() if _last_name(expression) in _COLLECTIONS:
+            yield _read_collection(_last_name(expression), [], value, given)
         case ast.Subscript(value=form, slice=inner):
             items = inner.elts if isinstance(inner, ast.Tuple) else [inner]
             yield from _read_form(_last_name(form), items, value, given)
@@ -107,8 +116,27 @@ def _read_form(
             holds = not wanted.fits or all(holds(value) for _, holds in bounds)
             text = ' '.join([wanted.text, ' and '.join(text for text, _ in bounds)]).strip()
             yield WantedValue(text, wanted.fits and holds)
+    elif name in _COLLECTIONS:
+        yield _read_collection(name, items, value, given)
     else:
         raise _UnknownAnnotationError
+
+
+def _read_collection(
+    name: str, items: list[ast.expr], value: Any, given: Mapping[str, Any]
+) -> WantedValue:
+    kind, text = _COLLECTIONS[name]
+    if kind is dict or not isinstance(value, list):
+        # Texts are sequences as well.
+        is_text = isinstance(value, str) and name in _OF_TEXTS
+        return WantedValue(text, isinstance(value, kind) or is_text)
+    try:
+        wanted = [list(_read(items[0], each, given)) for each in value] if items else []
+    except _UnknownAnnotationError:
+        return WantedValue(text, fits=True)
+    names = sorted({each.text for options in wanted for each in options})
+    fits = all(any(each.fits for each in options) or not options for options in wanted)
+    return WantedValue(f'{text} of {" or ".join(names)}' if names else text, fits)
 
 
 def _read_bounds(

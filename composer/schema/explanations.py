@@ -28,6 +28,37 @@ _KINDS = ('msg', 'srv', 'action')
 _SEPARATORS = re.compile(r'[/.:]+')
 
 
+# What launch files and other tools call the keys; the values may have other forms.
+_OTHER_WORDS = {
+    'args': ('arguments', 'with'),
+    'callback': ('behaviour',),
+    'cmd': ('command',),
+    'depends_on': ('wait_for',),
+    'environment': ('env',),
+    'exec': ('executable',),
+    'exec_name': ('name',),
+    'freq': ('rate',),
+    'frequency': ('rate',),
+    'hz': ('rate',),
+    'interval': ('period',),
+    'max': ('maximum',),
+    'min': ('minimum',),
+    'msg': ('message',),
+    'ns': ('namespace',),
+    'params': ('parameters',),
+    'params_file': ('parameter_files',),
+    'pkg': ('package',),
+    'plugin': ('behaviour',),
+    'queue': ('depth',),
+    'remappings': ('remap',),
+    'respawn': ('restart',),
+    'respawn_delay': ('restart',),
+    'unless': ('when',),
+    'if': ('when',),
+    'working_dir': ('cwd',),
+}
+
+
 def explain(error: ValidationError) -> Iterator[Violation]:
     """Yield the violations behind an error: one for each unknown key of a mapping."""
     explanation = _EXPLANATIONS.get(str(error.validator), _explain_otherwise)
@@ -41,14 +72,15 @@ def _explain_unknown_keys(error: ValidationError) -> Iterator[Violation]:
     for key in error.instance:
         if key in known or any(re.search(p, key) for p in schema.get('patternProperties', {})):
             continue
+        same = next((each for each in _OTHER_WORDS.get(key, ()) if each in known), None)
         yield Violation(
             'unknown-key',
             f"unknown key '{key}'{owner_of(error)}",
             (*path, key),
             (*path, key),
             at_key=True,
-            help=suggest(key, known, 'the keys are'),
-            meant=find_nearest(key, known),
+            help=did_you_mean(same) or suggest(key, known, 'the keys are'),
+            meant=None if same else find_nearest(key, known),
         )
 
 

@@ -162,6 +162,11 @@ def is_sound(part: dict[str, Any]) -> bool:
     return not _find_violations(_REQUIRED | part)
 
 
+def lacks_keys(part: dict[str, Any]) -> bool:
+    """Return whether keys are missing in some top-level keys alone, expressions or not."""
+    return any(each.rule == 'missing-key' for each in _find_violations(_REQUIRED | part))
+
+
 def without_templates(schema: Any) -> Any:
     """Return a schema without the alternatives for expressions.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from composer.records import record
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 _TIMEOUT = 'timeout: float | None = 5.0'
 # What a mapping has of its own: `node.parameters.keys` is no parameter.
 _OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
+# The types of Python that parameters have.
+_OF_PYTHON = frozenset({'bool', 'bytes', 'float', 'int', 'list', 'str'})
 # The classes of a system narrow what `composer.Node` allows.
 _SETTINGS = (
     '# mypy: disable-error-code="misc, override, overload-overlap, overload-cannot-match"',
@@ -80,6 +83,10 @@ class _Writer:
         mapping = self.imports.take('typing', 'Mapping')
         yield from ('', f'class {self.name}Parameters({mapping}[str, {anything}]):')
         types = {name: ' | '.join(map(self._value, each)) for name, each in shape.parameters}
+        # A parameter may have the name of a type, which means the parameter in the class.
+        for hidden in _OF_PYTHON & types.keys():
+            alias = self.imports.take('builtins', hidden)
+            types = {name: re.sub(rf'\b{hidden}\b', alias, each) for name, each in types.items()}
         for name, of_type in types.items():
             if is_writable(name) and name not in _OF_MAPPINGS and not name.startswith('__'):
                 yield from self._property(name, of_type)
@@ -93,11 +100,12 @@ class _Writer:
         # No `SimpleNamespace`, which has any name for type checkers.
         yield from ('', f'class {self.name}State:')
         yield f'    __dict__: dict[str, {anything}]'
-        yield from (f'    {each}: {anything}' for each in shape.state or () if is_writable(each))
         # A behaviour may set what no other one does yet.
         yield f'    def __setattr__(self, name: str, value: {anything}) -> None: ...'
         if shape.state is None:
             yield f'    def __getattr__(self, name: str) -> {anything}: ...'
+        # Last, as a name may be that of a type.
+        yield from (f'    {each}: {anything}' for each in shape.state or () if is_writable(each))
 
     def _publish(self, name: str, types: Sequence[str]) -> str:
         return self._method('publish', self._literal(name), self._payloads(types), '', 'None')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.input_limits import MAX_DEPTH, MAX_FINDINGS, MAX_VALUES
@@ -51,7 +51,9 @@ class _Constructor:
         self._merging = 0
 
     def construct(self, node: TreeNode, path: DataPath) -> Any:
-        self._count_up(node, path)
+        self._count += 1
+        if self._count > MAX_VALUES:
+            self._stop_expanding(node, path)
         self._values[path] = node.span
         if isinstance(node, ScalarNode):
             return self._scalar(node)
@@ -64,11 +66,9 @@ class _Constructor:
             return [self.construct(item, (*path, index)) for index, item in enumerate(node.items)]
         return self._mapping(node, path)
 
-    def _count_up(self, node: TreeNode, path: DataPath, values: int = 1) -> None:
-        self._count += values
-        if self._count > MAX_VALUES:
-            entry = self._keys.get(path[:1], node.span)
-            self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
+    def _stop_expanding(self, node: TreeNode, path: DataPath) -> NoReturn:
+        entry = self._keys.get(path[:1], node.span)
+        self._stop(entry, 'alias-bomb', f'aliases expand to more than {MAX_VALUES:,} values')
 
     def _scalar(self, node: ScalarNode) -> Any:
         try:
@@ -83,14 +83,14 @@ class _Constructor:
         data: dict[str, Any] = {}
         merge: tuple[TreeNode, TreeNode] | None = None
         for key_node, value_node in node.pairs:
-            if isinstance(key_node, ScalarNode) and key_node.plain and key_node.text == _MERGE_KEY:
+            key = self._key(key_node)
+            if key is None:
+                continue
+            if key == _MERGE_KEY and isinstance(key_node, ScalarNode) and key_node.plain:
                 if merge is None:
                     merge = key_node, value_node
                 else:
                     self._duplicate(_MERGE_KEY, key_node, merge[0].span)
-                continue
-            key = self._key(key_node)
-            if key is None:
                 continue
             key_path = (*path, key)
             if key in data:
@@ -153,7 +153,9 @@ class _Constructor:
                 )
                 continue
             # An empty mapping counts as well: merging it many times takes time too.
-            self._count_up(part, path, max(1, len(part.pairs)))
+            self._count += max(1, len(part.pairs))
+            if self._count > MAX_VALUES:
+                self._stop_expanding(part, path)
             merged = MappingNode(None, part.span)
             for key_node, value_node in part.pairs:
                 known = isinstance(key_node, ScalarNode) and key_node.text in data
@@ -167,5 +169,5 @@ class _Constructor:
         if len(self.findings) <= MAX_FINDINGS:
             self.findings.append(diagnostic_at(node.span, rule, message, help=help))
 
-    def _stop(self, span: Span, rule: str, message: str) -> None:
+    def _stop(self, span: Span, rule: str, message: str) -> NoReturn:
         raise CompositionError(diagnostic_at(span, rule, message))

@@ -16,6 +16,8 @@ _FLOAT = re.compile(r'[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?')
 _INF = re.compile(r'[-+]?\.(inf|Inf|INF)')
 _NAN = frozenset({'.nan', '.NaN', '.NAN'})
 _NUMBER_START = frozenset('+-.0123456789')
+# All others begin a text.
+_OTHER_START = _NUMBER_START | {text[0] for text in (*_NULL, *_BOOL) if text}
 
 # No ROS field or parameter holds an integer of more than 20 digits. Beyond this bound they are not
 # even doubles, and much longer ones Python will not read or print (sys.set_int_max_str_digits).
@@ -43,13 +45,13 @@ def parse_plain_scalar(text: str) -> Scalar:
     Raises:
         ScalarError: A number is longer than 250 digits.
     """
+    if text and text[0] not in _OTHER_START:
+        return text
     if text in _NULL:
         return None
     if text in _BOOL:
         return _BOOL[text]
-    if text[0] not in _NUMBER_START:
-        return text
-    return _parse_number(text)
+    return _parse_number(text) if text[0] in _NUMBER_START else text
 
 
 def parse_tagged_scalar(text: str, tag: str) -> Scalar:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import yaml
 
-from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
 from composer.input_limits import MAX_DEPTH, MAX_VALUES
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _QUOTES = ("'", '"')
 
@@ -43,7 +47,6 @@ class MappingNode:
     tag: str | None
     span: Span
     pairs: list[tuple[TreeNode, TreeNode]] = field(default_factory=list)
-    pending_key: TreeNode | None = None
 
 
 TreeNode: TypeAlias = ScalarNode | SequenceNode | MappingNode
@@ -104,10 +107,14 @@ def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> tuple[list
 def _parse(text: str, source: SourceFile, builder: _TreeBuilder) -> None:
     try:
         loader = _Loader(text)
+        takers = builder.takers()
         while (event := loader.get_event()) is not None:
-            builder.take(event)
+            if take := takers.get(type(event)):
+                take(event)
     except yaml.MarkedYAMLError as error:
-        raise CompositionError(_syntax_problem(error, source)) from error
+        quote = _find_open_quote(error, builder.last_quoted)
+        finding = _quote_problem(quote, source) if quote else _syntax_problem(error, source)
+        raise CompositionError(finding) from error
     except yaml.reader.ReaderError as error:
         raise CompositionError(_character_problem(error, text, source)) from error
     except yaml.YAMLError as error:
@@ -129,39 +136,71 @@ class _TreeBuilder:
     ) -> None:
         self.roots: list[TreeNode] = []
         self.values = 0
+        self.last_quoted: Any = None
         self._source = source
         self._alias_rule = alias_rule
         self._most_documents = most_documents
         self._most_values = most_values
-        self._open: list[SequenceNode | MappingNode] = []
+        # The lists and mappings that have not ended, and what the last of them has: of a mapping,
+        # keys and values in turn.
+        self._open: list[tuple[SequenceNode | MappingNode, list[TreeNode]]] = []
+        self._inner = self.roots
         self._anchors: dict[str, TreeNode] = {}
         self._documents = 0
 
-    def take(self, event: Any) -> None:
-        if isinstance(event, yaml.ScalarEvent):
-            plain = event.implicit[0] and not event.style
-            tag = None if event.implicit[0] or event.implicit[1] else event.tag
-            quoted = event.style in _QUOTES
-            node = ScalarNode(event.value, tag, plain, self._span(event), quoted)
-            self._add(node, event.anchor)
-        elif isinstance(event, yaml.MappingStartEvent):
-            self._enter(MappingNode(event.tag, self._span(event)), event)
-        elif isinstance(event, yaml.SequenceStartEvent):
-            self._enter(SequenceNode(event.tag, self._span(event)), event)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            self._open.pop()
-        elif isinstance(event, yaml.AliasEvent):
-            self._add(self._aliased(event), None)
-        elif isinstance(event, yaml.DocumentStartEvent):
-            self._documents += 1
-            if self._most_documents is not None and self._documents > self._most_documents:
-                self._stop(event, 'several-documents', 'a file holds only one YAML document')
+    def takers(self) -> dict[type, Callable[[Any], None]]:
+        """Return what takes an event, by its class."""
+        return {
+            yaml.ScalarEvent: self._take_scalar,
+            yaml.MappingStartEvent: self._begin_mapping,
+            yaml.SequenceStartEvent: self._begin_sequence,
+            yaml.MappingEndEvent: self._end,
+            yaml.SequenceEndEvent: self._end,
+            yaml.AliasEvent: self._take_alias,
+            yaml.DocumentStartEvent: self._begin_document,
+        }
 
-    def _enter(self, node: SequenceNode | MappingNode, event: Any) -> None:
+    def _take_scalar(self, event: Any) -> None:
+        is_plain, is_text = event.implicit
+        tag = None if is_plain or is_text else event.tag
+        start, end = event.start_mark, event.end_mark
+        line, column = start.line, start.column
+        if line == end.line:
+            length = end.column - column
+        else:
+            length = max(len(self._source.line(line + 1).rstrip()) - column, 1)
+        span = Span(self._source, line + 1, column + 1, length)
+        style = event.style
+        plain, quoted = is_plain and not style, style in _QUOTES
+        self._add(ScalarNode(event.value, tag, plain, span, quoted), event.anchor)
+        if quoted:
+            self.last_quoted = event
+
+    def _begin_mapping(self, event: Any) -> None:
+        node = MappingNode(event.tag, self._start(event))
+        self._begin(node, [], event)
+
+    def _begin_sequence(self, event: Any) -> None:
+        node = SequenceNode(event.tag, self._start(event))
+        self._begin(node, node.items, event)
+
+    def _begin(self, node: SequenceNode | MappingNode, inner: list[TreeNode], event: Any) -> None:
         self._add(node, event.anchor)
-        self._open.append(node)
+        self._open.append((node, inner))
+        self._inner = inner
         if len(self._open) > MAX_DEPTH:
             self._stop(event, 'too-deep', f'the data is nested more than {MAX_DEPTH} levels deep')
+
+    def _end(self, _event: Any) -> None:
+        node, inner = self._open.pop()
+        if isinstance(node, MappingNode):
+            node.pairs = list(zip(inner[::2], inner[1::2], strict=True))
+        self._inner = self._open[-1][1] if self._open else self.roots
+
+    def _begin_document(self, event: Any) -> None:
+        self._documents += 1
+        if self._most_documents is not None and self._documents > self._most_documents:
+            self._stop(event, 'several-documents', 'a file holds only one YAML document')
 
     def _add(self, node: TreeNode, anchor: str | None) -> None:
         self.values += 1
@@ -171,41 +210,52 @@ class _TreeBuilder:
             raise CompositionError(diagnostic_at(node.span, 'unreadable-file', message))
         if anchor is not None:
             self._anchors[anchor] = node
-        if not self._open:
-            self.roots.append(node)
-            return
-        parent = self._open[-1]
-        if isinstance(parent, SequenceNode):
-            parent.items.append(node)
-        elif parent.pending_key is None:
-            parent.pending_key = node
-        else:
-            parent.pairs.append((parent.pending_key, node))
-            parent.pending_key = None
+        self._inner.append(node)
 
-    def _aliased(self, event: Any) -> TreeNode:
+    def _take_alias(self, event: Any) -> None:
         if self._alias_rule is not None:
             message = f'ROS does not support aliases here: write what *{event.anchor} stands for'
             self._stop(event, self._alias_rule, message)
         node = self._anchors.get(event.anchor)
         if node is None:
-            self._stop(event, 'unknown-alias', f'no anchor &{event.anchor} before this alias')
-        if node in self._open:
+            message = f'no anchor &{event.anchor} before this alias'
+            help_text = suggest(event.anchor, self._anchors, 'there are')
+            self._stop(event, 'unknown-alias', message, help=help_text)
+        if any(node is each for each, _ in self._open):
             self._stop(event, 'cyclic-alias', f'the alias *{event.anchor} contains itself')
-        return node
+        self._add(node, None)
 
-    def _span(self, event: Any) -> Span:
-        start, end = event.start_mark, event.end_mark
-        if not isinstance(event, yaml.ScalarEvent | yaml.AliasEvent):
-            return Span(self._source, start.line + 1, start.column + 1)
-        if start.line == end.line:
-            length = end.column - start.column
-        else:
-            length = max(len(self._source.line(start.line + 1).rstrip()) - start.column, 1)
-        return Span(self._source, start.line + 1, start.column + 1, length)
+    def _start(self, event: Any, length: int = 1) -> Span:
+        mark = event.start_mark
+        return Span(self._source, mark.line + 1, mark.column + 1, length)
 
-    def _stop(self, event: Any, rule: str, message: str) -> NoReturn:
-        raise CompositionError(diagnostic_at(self._span(event), rule, message))
+    def _stop(
+        self,
+        event: Any,
+        rule: str,
+        message: str,
+        help: str | None = None,  # noqa: A002 - the word that the finding shows
+    ) -> NoReturn:
+        # Only an alias has a name here, after its asterisk.
+        length = len(f'*{event.anchor}') if isinstance(event, yaml.AliasEvent) else 1
+        span = self._start(event, length)
+        raise CompositionError(diagnostic_at(span, rule, message, help=help))
+
+
+def _find_open_quote(error: yaml.MarkedYAMLError, last: Any) -> Any:
+    """Return where a quote begins that is not closed, or only by the beginning of another one."""
+    if error.context and 'quoted scalar' in error.context and 'unexpected' in str(error.problem):
+        return error.context_mark
+    mark = error.problem_mark
+    is_long = last is not None and last.start_mark.line != last.end_mark.line
+    is_at_its_end = is_long and mark is not None and mark.line == last.end_mark.line
+    return last.start_mark if is_at_its_end else None
+
+
+def _quote_problem(begun: Any, source: SourceFile) -> Diagnostic:
+    span = Span(source, begun.line + 1, begun.column + 1)
+    message = 'this is not YAML: the quote that begins here is not closed in its line'
+    return diagnostic_at(span, 'yaml-syntax', message)
 
 
 def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
@@ -214,11 +264,12 @@ def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnost
     problem = error.problem or error.context or 'it cannot be parsed'
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
+    related: tuple[Related, ...] = ()
     if context and begun and mark and begun.line != mark.line:
         context += f' that begins on line {begun.line + 1}'
-    return diagnostic_at(
-        span, 'yaml-syntax', f'this is not YAML: {problem}{context}', help=_syntax_help(span)
-    )
+        related = (Related('it begins here', Span(source, begun.line + 1, begun.column + 1)),)
+    message = f'this is not YAML: {problem}{context}'
+    return diagnostic_at(span, 'yaml-syntax', message, help=_syntax_help(span), related=related)
 
 
 def _syntax_help(span: Span) -> str | None:

@@ -55,6 +55,12 @@ def test_a_process_that_is_left_out_may_be_of_another_machine(
             ["no package 'none' is installed"],
         ),
         ('{command: [own], cwd: nib, when: false}', []),
+        ('{command: [sh, bin/text]}', []),
+        ('{command: [sh, -e, bin/txet, x]}', ["there is no script 'bin/txet'"]),
+        ('{command: [python3, -u, none.py], cwd: bin}', ["there is no script 'none.py'"]),
+        ('{command: [python3, -m, none.py]}', []),
+        ('{command: [python3, -W, none.py]}', []),
+        ('{command: [own, none.py], env: {PATH: bin}}', []),
         ('{command: ["{{ program }}"]}', []),
     ],
 )

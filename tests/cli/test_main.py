@@ -324,3 +324,15 @@ def test_python_m_composer_is_the_command():
 )  # fmt: skip
 def test_ros_arguments_are_taken_out(arguments, own, ros):
     assert cli.split_ros_arguments(arguments) == (own, ros)
+
+
+def test_a_check_imports_only_what_the_file_needs():
+    script = """
+import sys
+from composer.cli.main import run
+
+code = run(['check', '-q', 'configs/greeter.yaml'])
+print(code, *({'asyncio', 'jinja2', 'jsonschema', 'rclpy', 'statistics'} & {*sys.modules}))
+"""
+    done = start([sys.executable, '-c', script])
+    assert (done.stdout, done.stderr) == ('0\n', '')

@@ -102,6 +102,32 @@ def test_a_layer_that_changes_nothing_is_a_finding(write, site, place, message, 
 
 
 @pytest.mark.parametrize(
+    ('site', 'place', 'what', 'meant'),
+    [
+        ('nodes: {talker: {timers: {tik: {period: 2}}}}', 'site.yaml:1:27', "timer 'tik'", 'tick'),
+        (
+            'nodes: {talkr: {timers: {tick: {period: 2}}}}',
+            'site.yaml:1:9',
+            "node 'talkr'",
+            'talker',
+        ),
+        ('include: {prat: {args: {x: 1}}}', 'site.yaml:1:11', "include 'prat'", 'part'),
+        ('processes: {dirver: {cwd: .}}', 'site.yaml:1:13', "process 'dirver'", 'driver'),
+    ],
+)
+def test_a_layer_with_half_an_entry_means_the_nearest(write, site, place, what, meant):
+    base = (
+        textwrap.dedent(BASE)
+        + 'processes: {driver: {command: [sh]}}\ninclude: {part: {file: part.yaml}}\n'
+    )
+    paths = write(base=base, site=site, part='version: 1\nargs: {x: 2}\nnodes: {}\n')[:2]
+    (finding,) = load(paths).diagnostics
+    message = f'there is no {what} to change, and for a new one keys are missing'
+    assert (finding.rule, str(finding.span), finding.message) == ('missing-key', place, message)
+    assert finding.help == f"did you mean '{meant}'?"
+
+
+@pytest.mark.parametrize(
     ('layers', 'found'),
     [
         (['args: {rat: 2}'], ["there is no argument 'rat' to change"]),

@@ -28,11 +28,15 @@ def wanted(annotation, value, **others):
         ("Annotated[int, 'in metres', Gt(0)]", -5),
         ("Annotated[str, '> 0']", 'a'),
         ("Annotated[int, '< other']", 3),
-        ("Annotated[list[int], '> 0']", -3),
         ('Sequence[int]', 'a'),
+        ('list[int]', [1, 2]),
+        ('list[Colour]', [1, 'a']),
+        ('dict[str, int]', {'a': 1}),
+        ('Mapping[str, str]', {'a': 1}),
+        ('tuple[int, int]', [1]),
         ('int |', 'a'),
         ('Colour', 'a'),
-        ('list', 3),
+        ('list', []),
     ],
 )
 def test_a_value_that_fits_or_may_fit_is_let_pass(annotation, value):
@@ -52,6 +56,9 @@ def test_a_value_that_fits_or_may_fit_is_let_pass(annotation, value):
         ("Annotated[float, '> 0'] | None", -1, ['float > 0']),
         ("Annotated[float, '>= 0', '< 1']", 1, ['float >= 0 and < 1']),
         ("Annotated[float, '> 0']", 'a', ['float > 0']),
+        ('list[int] | None', [1, 'a'], ['a list of int']),
+        ('Sequence[str]', 3, ['a list']),
+        ('Mapping[str, str]', ['a'], ['a mapping']),
         ("Annotated[int, '< other']", 7, ["int < 'other' (5)"]),
     ],
 )

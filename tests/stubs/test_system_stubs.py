@@ -14,7 +14,7 @@ from composer.language.pipeline import load_system
 from composer.stubs.system_stubs import read_template, stubs_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-SYSTEMS = sorted((ROOT / 'configs').glob('*.yaml'))
+SYSTEMS = [*sorted((ROOT / 'configs').glob('*.yaml')), ROOT / 'tests/data/valid/everything.yaml']
 
 pytestmark = pytest.mark.ros
 
@@ -135,8 +135,31 @@ def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out == 'typings: composer_stubs.my_robot\n'
     text = (tmp_path / 'typings' / 'composer_stubs' / 'my_robot.py').read_text()
     assert 'class Rover(_Node):' in text
-    assert cli.run(['stubs', 'my-robot.yaml', 'my-robot.yaml']) == 1
+    (tmp_path / 'other').mkdir()
+    (tmp_path / 'other' / 'my-robot.yaml').write_text((tmp_path / 'my-robot.yaml').read_text())
+    assert cli.run(['stubs', 'my-robot.yaml', 'other']) == 1
     assert "would both be 'composer_stubs.my_robot'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('words', 'names'),
+    [
+        (['robot.yaml'], {'Small'}),
+        (['robot.yaml', 'site.yaml'], {'Small', 'Added'}),
+        (['robot.yaml', 'name:=large'], {'Large'}),
+        (['robot.yaml', 'site.yaml', 'large'], {'Large', 'Added'}),
+        (['robot.yaml', '--set', 'args.name=large'], {'Large'}),
+    ],
+)
+def test_the_nodes_are_those_that_the_command_line_gives(tmp_path, monkeypatch, words, names):
+    monkeypatch.chdir(tmp_path)
+    text = 'version: 1\nargs: {name: small}\nnodes: {"{{ name }}": {on_start: go:go}}\n'
+    (tmp_path / 'robot.yaml').write_text(text)
+    (tmp_path / 'site.yaml').write_text('nodes: {added: {on_start: go:go}}\n')
+    assert cli.run(['stubs', *words]) == 0
+    text = (tmp_path / 'typings' / 'composer_stubs' / 'robot.py').read_text()
+    known = {'Small', 'Large', 'Added'}
+    assert {each for each in known if each in text} == names
 
 
 def test_a_system_with_errors_has_no_stubs(tmp_path, monkeypatch, capsys):

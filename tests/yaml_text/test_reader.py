@@ -265,7 +265,7 @@ def test_an_unreadable_text_gets_one_clear_line(text, line):
         ('a: b: c\n', 1, 5, "put a value that contains ': ' in quotes"),
         ('a: [1, 2\nb: 3\n', 2, 2, None),
         ('a: {b: 1\n', 2, 1, None),
-        ('a: "b\n', 2, 1, None),
+        ('a: "b\n', 1, 4, None),
         ('a:\n  b: 1\n c: 2\n', 3, 2, None),
         ('a: @b\n', 1, 4, None),
         ('a: !x!y z\n', 1, 4, None),
@@ -281,7 +281,10 @@ def test_a_finding_of_syntax_has_a_place(text, line, column, help_text):
 
 
 def test_an_open_quote_says_where_it_was_opened():
-    assert 'begins on line 2' in first_line('a: 1\nb: "never\nclosed\n')
+    expected = 'file.yaml:2:4: error[yaml-syntax]: this is not YAML: the quote that begins here is not closed in its line'  # fmt: skip
+    assert first_line('a: 1\nb: "never\nclosed\n') == expected
+    # Another quote closes it.
+    assert first_line('a: 1\nb: "never\nc: "closed"\n') == expected
 
 
 @pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? '])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from typing import TYPE_CHECKING
 
+from composer.checks.behaviours.behaviour_functions import is_called_wrongly
+from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.bindings import node_bindings
+from composer.entity_kinds import PUBLISHED
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import find_nearest, is_typo, suggest
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from composer.inference.reading import Reading, RemoteParameter
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.python_source.modules import ModuleSource
 
 Readings = list[tuple['Binding', 'Reading']]
 
@@ -31,10 +35,11 @@ def bound_at(context: CheckContext, binding: Binding) -> Related:
 def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use fields, attributes and names of `node.state` that exist; each place once."""
     found: dict[tuple[Span, str], Diagnostic] = {}
+    used = _publishing_behaviours(context)
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
-            for binding in node_bindings(node)
+            for binding in context.bindings(node)
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
@@ -42,6 +47,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
             *_check_state(context, node, readings),
             *_check_own_state(context, readings),
             *_check_remote_parameters(context, node, readings),
+            *_check_unpublished(context, readings, used),
         ):
             if finding.span is not None:
                 found.setdefault((finding.span, finding.rule), finding)
@@ -51,6 +57,13 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
 def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     for binding, reading in readings:
         for each in reading.problems:
+            if is_shipped(context, binding.behaviour.module):
+                if is_called_wrongly(context, binding):
+                    continue
+                # Its user cannot change what stands there.
+                said = f"'{binding.behaviour.name}' does not work here: {each.message}"
+                yield context.at_value(binding.behaviour.path, each.rule, said, help=each.help)
+                continue
             yield diagnostic_at(
                 each.place,
                 each.rule,
@@ -61,6 +74,47 @@ def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Dia
                     bound_at(context, binding),
                 ],
             )
+
+
+def _publishing_behaviours(context: CheckContext) -> set[str]:
+    """Return the behaviours of whose payloads something becomes somewhere."""
+    return {
+        binding.behaviour.name
+        for node in context.spec.nodes.values()
+        for binding in context.bindings(node)
+        if getattr(binding.entity, 'publish', None)
+        or binding.key.returned not in (None, PUBLISHED)
+    }
+
+
+def _check_unpublished(
+    context: CheckContext, readings: Readings, used: set[str]
+) -> Iterator[Diagnostic]:
+    """Check that what timers and subscriptions give is for something, or for other functions."""
+    for binding, reading in readings:
+        function = binding.behaviour.function
+        if not reading.unpublished or binding.behaviour.name in used:
+            continue
+        if any(_mentions(module, function) for module in reading.modules.values()):
+            continue
+        for place in reading.unpublished:
+            yield diagnostic_at(
+                place,
+                'no-effect',
+                f'nothing publishes this: {binding.owner} has no publish:',
+                help="write 'publish:' beside 'behaviour:', or node.publish here",
+                related=[bound_at(context, binding)],
+            )
+
+
+def _mentions(module: ModuleSource, function: str) -> bool:
+    """Return whether the code of a module uses a function."""
+    for node in (each for statement in module.body for each in ast.walk(statement)):
+        match node:
+            case ast.Name(id=name) | ast.Attribute(attr=name) | ast.alias(name=name):
+                if name == function:
+                    return True
+    return False
 
 
 def _check_state(
@@ -90,8 +144,8 @@ def _check_state(
 
 def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
-    for owner in dict.fromkeys(_owner_of(binding) for binding, _ in readings):
-        own = [(binding, reading) for binding, reading in readings if _owner_of(binding) == owner]
+    for owner in dict.fromkeys(binding.own_state_of for binding, _ in readings):
+        own = [each for each in readings if each[0].own_state_of == owner]
         if any(reading.is_own_state_open for _, reading in own):
             continue
         known = set().union(*(reading.own_state_set for _, reading in own))
@@ -106,10 +160,6 @@ def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diag
                     help=suggest(use.name, known, 'there are', 'set it first, or read it by get'),
                     related=[bound_at(context, binding)],
                 )
-
-
-def _owner_of(binding: Binding) -> object:
-    return binding.entity.path if binding.entity is not None else binding.key.key
 
 
 def _check_remote_parameters(
@@ -196,6 +246,4 @@ def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec 
 
 
 def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return any(
-        context.behaviours.read(node, binding).reaches_ros for binding in node_bindings(node)
-    )
+    return any(each.reaches_ros for each in context.readings(node))

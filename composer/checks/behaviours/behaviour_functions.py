@@ -7,17 +7,18 @@ import sys
 from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related
-from composer.language.bindings import Binding, node_bindings
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
+    from composer.entity_kinds import BehaviourKey
+    from composer.language.bindings import Binding
     from composer.python_source.modules import FunctionKind, FunctionSource, ModuleSource
 
 # Modules of the standard library with functions that take anything, such as `print`.
@@ -27,17 +28,29 @@ _TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'uni
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     """Check all behaviours without importing them."""
     told: set[str] = set()
+    # Calls without arguments that fit; many nodes may have the same.
+    fitting: set[tuple[str, BehaviourKey]] = set()
     for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
-            if context.was_dropped(binding.behaviour.path):
+        for binding in context.bindings(node):
+            call = (binding.behaviour.name, binding.key)
+            is_known = call in fitting and not binding.behaviour.arguments
+            if is_known or context.was_dropped(binding.behaviour.path):
                 continue
             module = context.modules.find(binding.behaviour.module)
             if isinstance(module, MissingModule) or not (module.syntax_error or module.unread):
-                yield from _check_source(context, binding, module)
+                found = [*_check_source(context, binding, module)]
+                yield from found
+                if not (found or binding.behaviour.arguments or context.system.dropped):
+                    fitting.add(call)
             elif binding.behaviour.module not in told:
                 told.add(binding.behaviour.module)
                 explain = _explain_broken_module if module.syntax_error else _explain_unread_module
                 yield explain(context, binding, module)
+
+
+def is_called_wrongly(context: CheckContext, binding: Binding) -> bool:
+    """Return whether `check_behaviour_sources` finds something wrong with a behaviour."""
+    return any(_check_source(context, binding, context.modules.find(binding.behaviour.module)))
 
 
 def check_behaviour_call(
@@ -45,13 +58,8 @@ def check_behaviour_call(
     binding: Binding,
     kind: FunctionKind | None,
     signature: inspect.Signature | None,
-    related: Sequence[Related] = (),
 ) -> Iterator[Diagnostic]:
-    """Check that a function fits its place; a kind or signature of `None` is unknown.
-
-    Args:
-        related: Where it is defined, if that is known.
-    """
+    """Check that a function fits its place; a kind or signature of `None` is unknown."""
     behaviour = binding.behaviour
     if kind is not None and kind.is_generator and not binding.may_yield:
         yield context.at_value(
@@ -60,11 +68,9 @@ def check_behaviour_call(
             f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
             part=behaviour.function,
             help='timers and actions take generators; return the value instead',
-            related=related,
         )
     if signature is not None:
-        for finding in _check_signature(context, binding, signature):
-            yield finding.with_related(related)
+        yield from _check_signature(context, binding, signature)
 
 
 def _explain_broken_module(
@@ -112,8 +118,9 @@ def _check_source(
     elif isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
     elif function := module.functions.get(behaviour.function):
-        place = [Related('it is defined here', at) for at in _places_of(module, function)]
-        yield from check_behaviour_call(context, binding, function.kind, function.signature, place)
+        for found in check_behaviour_call(context, binding, function.kind, function.signature):
+            places = _places_of(module, function)
+            yield found.with_related(Related('it is defined here', at) for at in places)
     elif not module.is_open:
         yield _explain_missing_function(context, binding, module)
 
@@ -192,13 +199,15 @@ def _check_signature(
     taken = _positional_parameters(signature)[: len(binding.parameters)]
     free = [name for name in by_keyword or () if name not in taken]
     # A misspelt name counts as the name that it means: it has a finding of its own.
-    was_dropped = context.was_dropped((*behaviour.path[:-1], 'with'))
+    owner = behaviour.path[:-1]
+    # An unknown key may be `with`, misspelt.
+    was_dropped = any(path[:-1] == owner for path in context.system.dropped)
     given = set(free if was_dropped else behaviour.arguments)
     # An argument counts as given although its expression has an error.
     given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
-            given.remove(keyword)
+            given.discard(keyword)
             given.add(find_nearest(keyword, free) or '')
             yield context.at_key(
                 (*behaviour.path[:-1], 'with', keyword),

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
-from composer.language.bindings import node_bindings
 from composer.python_source.local_names import find_parameter, is_name, stored_names
 from composer.python_source.modules import ModuleSource
 from composer.spelling import suggest
@@ -29,7 +28,7 @@ def check_compared_arguments(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         if not any(parameter.choices for parameter in node.parameters.values()):
             continue
-        for binding in node_bindings(node):
+        for binding in context.bindings(node):
             behaviour = binding.behaviour
             if behaviour.arguments and behaviour.name not in pairs:
                 pairs[behaviour.name] = _read_pairs(context, behaviour)

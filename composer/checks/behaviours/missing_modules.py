@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import Span, diagnostic_at
-from composer.language.bindings import node_bindings
+from composer.inference.module_names import TopNames
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 from composer.records import record
@@ -47,7 +47,7 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the imports of the modules of behaviours, and of what these import of the project."""
     walk = _Walk(context)
     for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
+        for binding in context.bindings(node):
             if not context.was_dropped(binding.behaviour.path):
                 walk.visit(binding.behaviour.module, binding)
                 walk.visit_function(binding)
@@ -222,9 +222,12 @@ class _Walk:
         elif not (source.is_open or source.syntax_error or alias.name in known):
             # It may be bound where nobody looks, unless it is only misspelt.
             nearest = find_nearest(alias.name, known)
-            if nearest:
+            top = TopNames(source.body)
+            bound = top.statements.keys() | top.changed
+            if nearest or not (top.is_open or alias.name in bound or alias.name[:2] == '__'):
                 message = f"{home} has no '{alias.name}'"
-                self._report(message, did_you_mean(nearest), importer, place)
+                help_text = suggest(alias.name, known or bound, 'it has')
+                self._report(message, help_text, importer, place)
 
     def _report(
         self, message: str, help_text: str | None, importer: _Importer, place: Span

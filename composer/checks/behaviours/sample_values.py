@@ -287,8 +287,9 @@ def _formats(node: nodes.Node, operands: list[Any]) -> bool:
 
 def _either(one: Any, other: Any) -> Any:
     """Return a value that stands for both."""
-    is_same = type(one) is type(other) and not isinstance(one, SampleMessage)
-    return one if is_same else UNKNOWN
+    if isinstance(one, SampleMessage) and isinstance(other, SampleMessage):
+        return one if describe_sample(one) == describe_sample(other) else UNKNOWN
+    return one if type(one) is type(other) else UNKNOWN
 
 
 def _noun(value: Any) -> str:

@@ -14,9 +14,8 @@ from composer.entity_kinds import (
     NODE_BEHAVIOURS,
     USED_KINDS,
 )
-from composer.language.bindings import node_bindings
 from composer.language.specs import NodeSpec
-from composer.spelling import find_nearest, is_typo, suggest
+from composer.spelling import find_nearest, is_short, is_typo, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -57,7 +56,7 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
-    bindings = node_bindings(node)
+    bindings = context.bindings(node)
     return [each for each in bindings if not context.was_dropped(each.behaviour.path)]
 
 
@@ -80,6 +79,7 @@ def _check_names(
     for name, node in context.spec.nodes.items():
         # A behaviour may declare parameters with rclpy.
         is_open = any(reading.reaches_ros for _, reading in uses[name])
+        used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
             for use in reading.uses:
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
@@ -87,7 +87,9 @@ def _check_names(
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
                 is_needed = use.is_certain and not (use.has_default or use.is_change)
-                if not is_needed and not _is_typo(node, use, declared[binding.behaviour.name]):
+                if not is_needed and not _is_typo(
+                    node, use, declared[binding.behaviour.name], used
+                ):
                     continue
                 finding = _explain_name(context, node, binding, use)
                 key = (use.place, finding.rule)
@@ -108,13 +110,18 @@ def _declared_by_behaviour(
     return found
 
 
-def _is_typo(node: NodeSpec, use: NodeUse, declared: set[tuple[str, str]]) -> bool:
+def _is_typo(
+    node: NodeSpec, use: NodeUse, declared: set[tuple[str, str]], used: set[tuple[str, str]]
+) -> bool:
     """Return whether a name that is used on a condition of the file is wrong in any case."""
-    section = KIND_OF_NOUN[use.kind].section
-    near = find_nearest(use.name, getattr(node, section))
-    if near is None or (use.kind, use.name) in declared:
+    names = getattr(node, KIND_OF_NOUN[use.kind].section)
+    near = find_nearest(use.name, names)
+    if (use.kind, use.name) in declared:
         return False
-    return is_typo(use.name, near)
+    if near is not None and is_typo(use.name, near):
+        return True
+    # What nobody uses is meant by its longer or shorter form.
+    return any(is_short(use.name, each) for each in names if (use.kind, each) not in used)
 
 
 def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> bool:

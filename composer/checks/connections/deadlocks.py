@@ -14,7 +14,6 @@ from composer.checks.connections.cycles import find_knots, find_way
 from composer.checks.connections.wait_conditions import StartOrder
 from composer.diagnostics import Related
 from composer.entity_kinds import KIND_OF_NOUN
-from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec
 from composer.records import record
 
@@ -89,10 +88,10 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
     if not servers:
         return
     for node in context.spec.nodes.values():
-        for binding in node_bindings(node):
+        for binding in context.bindings(node):
             if context.was_dropped(binding.behaviour.path):
                 continue
-            group = _group_in(node, binding)
+            group = group_in(node, binding)
             for use in _waiting_uses(context, node, binding):
                 ends = [
                     servers.get((KIND_OF_NOUN[use.kind].section, node.full_name, name))
@@ -152,7 +151,7 @@ def _need(server: Endpoint, waited: Waited) -> Group | None:
     return _group_of(server.node, getattr(server.entity, 'group', None))
 
 
-def _group_in(node: NodeSpec, binding: Binding) -> Group | None:
+def group_in(node: NodeSpec, binding: Binding) -> Group | None:
     """Return the mutually exclusive group that a behaviour runs in, if there is one."""
     if isinstance(binding.entity, ActionSpec):
         if binding.key.key == 'accept':

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.connections.cycles import find_cycles
 from composer.python_source.modules import FunctionKind, ModuleSource
 from composer.python_source.return_values import always_answers
@@ -64,7 +65,7 @@ def _find_relays(context: CheckContext) -> Iterator[_Relay]:
             if target is None or context.was_dropped((*relay.path, 'behaviour')):
                 continue
             behaviour = getattr(relay, 'behaviour', None)
-            if behaviour is None or _always_answers(context, behaviour):
+            if behaviour is None or _passes_on(context, behaviour):
                 yield _Relay(end, channel.name, target, is_plain=behaviour is None)
 
 
@@ -94,6 +95,15 @@ def _explain(context: CheckContext, loop: list[_Relay], rule: str) -> Diagnostic
             for relay in others
         ],
     )
+
+
+# Of those that come with Composer; `drop` lets each message die out.
+_PASSING = ('behaviours.topics:mux', 'behaviours.topics:throttle')
+
+
+def _passes_on(context: CheckContext, behaviour: BehaviourSpec) -> bool:
+    is_passing = behaviour.name in _PASSING and is_shipped(context, behaviour.module)
+    return is_passing or _always_answers(context, behaviour)
 
 
 def _always_answers(context: CheckContext, behaviour: BehaviourSpec) -> bool:

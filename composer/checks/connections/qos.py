@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from composer.language.bindings import node_bindings
 from composer.language.qos import (
     BEST_OF_PUBLISHERS,
     BEST_OF_SERVICES,
@@ -95,7 +94,7 @@ def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
     subscription can ask for: their deadlines are no shorter, or do not match.
     """
     for node in context.spec.nodes.values():
-        if any(path[:2] == node.path for path in context.system.dropped):
+        if node.path in context.incomplete:
             continue
         published = _published_by_behaviours(context, node)
         for publisher in node.publishers.values():
@@ -110,7 +109,7 @@ def check_deadlines(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _published_by_behaviours(context: CheckContext, node: NodeSpec) -> set[str] | None:
     """Return what the behaviours of a node publish by themselves; `None` if anything."""
-    readings = [context.behaviours.read(node, binding) for binding in node_bindings(node)]
+    readings = context.readings(node)
     if any(each.reaches_ros or 'publisher' in each.open_kinds for each in readings):
         return None
     return {use.name for each in readings for use in each.uses if use.kind == 'publisher'}
@@ -158,8 +157,20 @@ def _explain_deadline(
         f"publisher '{publisher.name}' promises a message every {deadline_sec:g} s, and {who} "
         f'one every {period_sec:g} s',
         help='make the deadline longer than the period',
-        related=[context.related(timer.path, 'this publishes on it') for timer in timers],
+        related=[
+            *_place_of_deadline(context, publisher),
+            *(context.related(timer.path, 'this publishes on it') for timer in timers),
+        ],
     )
+
+
+def _place_of_deadline(context: CheckContext, publisher: PublisherSpec) -> Iterator[Related]:
+    """Yield where a profile that the publisher uses promises its deadline."""
+    for source in _sources(context, publisher.qos):
+        path = (*source, 'deadline')
+        if source[:1] == ('qos',) and path in context.system.positions.values:
+            yield context.related(path, 'it is promised here')
+            return
 
 
 def _find_conflicts(

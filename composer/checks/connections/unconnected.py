@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import OF_ACTIONS, TOPICS_OF_ROS, is_misnamed
+from composer.checks.connections.typos import find_typo
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
@@ -24,9 +25,8 @@ _MOST_COMPARED = 5_000
 
 def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that every end has another end, or is marked as external."""
-    if context.spec.processes:
-        # Nobody knows what programs publish, hear and serve.
-        return
+    # Nobody knows what programs publish, hear and serve; a typo may still be one.
+    is_known = not context.spec.processes
     partners = _Partners(context.topology)
     for channel in context.topology.channels.values():
         if not _is_alone(context, channel):
@@ -34,6 +34,8 @@ def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
         for end in channel.ends:
             if end.kind.unmatched and not getattr(end.entity, 'external', True):
                 near = partners.nearest(channel, end)
+                if not (is_known or (near and find_typo(channel.name, [near]))):
+                    continue
                 yield _explain(context, channel, end, near, *end.kind.unmatched)
 
 

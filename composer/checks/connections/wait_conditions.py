@@ -58,7 +58,10 @@ def _check_name(
         namespace, _, last = expand_name(name, waiter.name, waiter.namespace or '/').rpartition(
             '/'
         )
-        problem = find_node_name_problem(last) or (namespace and find_namespace_problem(namespace))
+        own = waiter.namespace or '/'
+        is_own_wrong = not name.startswith('/') and find_namespace_problem(own) is not None
+        in_namespace = namespace and not is_own_wrong and find_namespace_problem(namespace)
+        problem = find_node_name_problem(last) or in_namespace or None
     elif kind != 'process':
         problem = find_topic_name_problem(name, kind)
     if problem:

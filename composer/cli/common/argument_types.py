@@ -135,7 +135,9 @@ def check_rule(
 
 
 def _folder_error(folder: str) -> UsageError:
-    from composer.cli.common.file_selection import list_systems
+    from composer.cli.common.file_selection import (
+        list_systems,
+    )
 
     systems = [escape(str(path)) for path in list_systems(Path(folder))]
     shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import glob
 import os
 import re
@@ -183,6 +182,8 @@ def _find_near(wanted: str, keys: Mapping[str, int]) -> str | None:
     """Return the wanted key, or one that differs by about one letter."""
     if wanted in keys:
         return wanted
+    import difflib
+
     near = difflib.get_close_matches(wanted, keys, n=1, cutoff=_SIMILAR)
     return near[0] if near else None
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.classes.project_classes import CLASS_NAMES
 from composer.inference.current_run import name_place
+from composer.inference.evaluation.library.known_functions import MAPPINGS
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
     BY_PARAMETER,
-    BY_STATE,
     CHOSEN,
     NODE,
     UNKNOWN,
@@ -23,6 +24,7 @@ from composer.inference.values import (
     External,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
     Message,
@@ -30,14 +32,17 @@ from composer.inference.values import (
     NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     ProjectModule,
     Scalar,
     Sequence,
+    Super,
     Unknown,
     Value,
     alternatives,
     constant,
     is_chosen,
+    is_none,
     join,
 )
 from composer.interfaces.field_errors import unknown_field
@@ -81,10 +86,12 @@ NAMES_OF_PART: dict[str, frozenset[str]] = {
         }
     ),
     'time': frozenset({'clock_type', 'from_msg', 'nanoseconds', 'seconds_nanoseconds', 'to_msg'}),
+    'duration': frozenset({'from_msg', 'get_c_duration', 'nanoseconds', 'to_msg'}),
     'goal': frozenset({'cancel', 'feedback', 'result', 'result_async', 'status'}),
 }
 _SHOWN_PARTS = {
     'logger': "the node's logger",
+    'duration': 'a duration',
     'time': 'a time',
     'goal': 'a goal',
     'own_state': 'own_state',
@@ -109,7 +116,10 @@ class Attributes(Part):
         """Return what an attribute may be; one that no alternative has is a problem."""
         found: list[Value] = []
         problem: tuple[str, str, str | None] | None = None
-        for each in alternatives(owner):
+        several = alternatives(owner)
+        # What may be None is read where it is something else.
+        values = [each for each in several if not is_none(each)] or several
+        for each in values:
             value = self._read(each, name, place)
             if isinstance(value, tuple):
                 problem = problem or value
@@ -122,7 +132,9 @@ class Attributes(Part):
 
     def _read(self, owner: Value, name: str, place: Place) -> Value | tuple[str, str, str | None]:
         """Return an attribute, or a problem: the rule, what is wrong, and help."""
-        if name.startswith('__'):
+        if isinstance(owner, Class | Function) and name in CLASS_NAMES:
+            return self._evaluator.classes.name_of(owner)
+        if name.startswith('__') and not isinstance(owner, Instance | Class | Super):
             if name == '__class__' and isinstance(owner, Message):
                 return MessageClass(owner.type)
             if name in ('__name__', '__qualname__') and isinstance(owner, MessageClass):
@@ -141,12 +153,24 @@ class Attributes(Part):
                 return self._evaluator.imports.external(f'{owner.name}.{name}', place)
             case ProjectModule():
                 return self._read_module(owner, name)
+            case Instance() if name in ('_asdict', '_replace'):
+                return BoundMethod(owner, name)
             case Instance():
-                return self._read_instance(owner, name)
+                self._evaluator.run.moves += name in owner.attributes
+                return (
+                    owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
+                )
             case Class():
+                if name == '__subclasses__':
+                    return BoundMethod(owner, name)
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
+            case Super(of=of, owner=Instance() | Class() as mine):
+                whole = mine.of if isinstance(mine, Instance) else mine
+                return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
+            case Primitive():
+                return BoundMethod(owner, name)
             case Awaitable():
                 if name in _COROUTINE or name.startswith('cr_'):
                     return UNKNOWN
@@ -184,7 +208,9 @@ class Attributes(Part):
                 return run.facts.value_of_parameter(name)
             case 'state':
                 run.use_state(name, place)
-                return self._evaluator.kept.get(name, Unknown(BY_STATE))
+                if run.probed is not None:
+                    run.probed.add(Held('state', name))
+                return self._evaluator.kept_value(name)
             case 'own_state' | 'changes':
                 if hasattr(dict, name):
                     return BoundMethod(owner, name)
@@ -200,6 +226,8 @@ class Attributes(Part):
             return Generated(Message(f'{owner.type}_Feedback') if owner.type else UNKNOWN, UNKNOWN)
         if name in ('status', 'name'):
             return Scalar(str)
+        if name == 'nanoseconds':
+            return Scalar(int)
         return BoundMethod(owner, name)
 
     def _read_message(
@@ -214,7 +242,7 @@ class Attributes(Part):
             return MessageClass(f'{owner.type}_{name}')
         if name == 'get_fields_and_field_types':
             return BoundMethod(owner, name)
-        if description is None or name == 'SLOT_TYPES' or name[0] == '_':
+        if description is None or name == 'SLOT_TYPES' or name.startswith('_'):
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN
@@ -237,17 +265,6 @@ class Attributes(Part):
         message = f"{path.name if path else 'the module'} has no '{name}'"
         return 'undefined-name', message, suggest(name, known)
 
-    def _read_instance(self, owner: Instance, name: str) -> Value:
-        found = self._evaluator.classes.class_attribute(owner.of, name, owner)
-        stored = owner.attributes.get(name)
-        if stored is None:
-            return found or UNKNOWN
-        # What other behaviours store in it is not known here.
-        is_lasting = isinstance(stored, NodeValue | PartOfNode | BoundMethod | Function | Instance)
-        if is_lasting or self._evaluator.classes.is_stored_once(owner.of, name):
-            return stored
-        return UNKNOWN
-
     def _read_array(self, owner: ArrayField, name: str) -> Value | tuple[str, str, str | None]:
         nested = owner.type.nested
         if nested is None or hasattr(list, name):
@@ -258,10 +275,15 @@ class Attributes(Part):
     def _read_builtin(
         self, owner: Constant | Scalar | Mapping | Sequence, name: str
     ) -> Value | tuple[str, str, str | None]:
+        if isinstance(owner, Constant) and owner.member is not None:
+            found = self._evaluator.classes.enumerations.read(owner, name)
+            if found is not None:
+                return found
         kind = dict if isinstance(owner, Mapping) else owner.kind
         if kind is type(None):
             return UNKNOWN
-        if hasattr(kind, name):
+        kinds = MAPPINGS if isinstance(owner, Mapping) else (kind,)
+        if any(hasattr(each, name) for each in kinds):
             return BoundMethod(owner, name)
         help_text = suggest(name, [each for each in dir(kind) if each[0] != '_'])
         return 'unknown-attribute', f"a {kind.__name__} has no attribute '{name}'", help_text
@@ -269,6 +291,8 @@ class Attributes(Part):
     def read_item(self, owner: Value, index: Value, place: Place) -> Value:
         """Return what `owner[index]` may be, of a part of the node."""
         run = self._evaluator.run
+        if isinstance(owner, Class | Instance):
+            return self._read_item_of_object(owner, index)
         if isinstance(owner, Message):
             name = index.value if isinstance(index, Constant) else '…'
             message = f'{in_python(owner.type)} is a message, and has no items'
@@ -280,7 +304,7 @@ class Attributes(Part):
             else:
                 run.reading.is_own_state_open = True
             key = str(index.value) if isinstance(index, Constant) else ''
-            return self._evaluator.kept.get(f'[{key}]', Unknown(BY_STATE))
+            return self._evaluator.kept_value(f'[{key}]')
         if not isinstance(owner, PartOfNode) or owner.name not in ('parameters', 'changes'):
             return UNKNOWN
         found: list[Value] = []
@@ -298,6 +322,19 @@ class Attributes(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+    def _read_item_of_object(self, owner: Class | Instance, index: Value) -> Value:
+        classes = self._evaluator.classes
+        if isinstance(owner, Class):
+            is_one = classes.enumerations.is_one(owner)
+            # `Box[str]` is the class itself, unless it says otherwise.
+            is_own = classes.bodies.find(owner, '__class_getitem__') is not None
+            other = UNKNOWN if is_own else owner
+            return classes.enumerations.member_of_name(owner, index) if is_one else other
+        items = classes.fields.items_of(owner)
+        if items is not None and isinstance(index, Constant) and isinstance(index.value, int):
+            return items[index.value] if -len(items) <= index.value < len(items) else UNKNOWN
+        return classes.call_method(owner, '__getitem__', index) or UNKNOWN
 
     def note_containment(self, item: Value, container: Value, place: Place) -> None:
         """`'x' in node.parameters` uses a parameter, and works without it."""
@@ -346,6 +383,7 @@ class Attributes(Part):
         match owner:
             case PartOfNode(name='state'):
                 run.reading.state_set.add(name)
+                self._evaluator.waiting.fill(Held('state', name))
                 self._evaluator.keep(name, value)
             case PartOfNode(name='parameters'):
                 self._refuse_parameter(name, place)
@@ -359,7 +397,9 @@ class Attributes(Part):
             case Message():
                 self._store_field(owner, name, value, place)
             case Instance():
-                owner.set(name, value)
+                self._evaluator.classes.store(owner, name, value)
+            case Class():
+                self._evaluator.classes.store_in_class(owner, name, value)
             case _:
                 self._evaluator.escape(value)
 
@@ -368,7 +408,7 @@ class Attributes(Part):
             'unset-parameter',
             place,
             f"this does not set the parameter '{name}'",
-            f'write node.set_parameters(node.name, {{{name!r}: …}})',
+            f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?',
         )
 
     def store_item(self, index: Value, place: Place) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit, signature_of
 from composer.inference.message_types import in_python
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.values import (
-    CHOSEN,
     NODE,
     UNKNOWN,
     Argument,
@@ -28,12 +28,14 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
+    Super,
     Unknown,
     Value,
     alternatives,
-    are_chosen,
+    chosen_by,
     is_chosen,
     is_none,
     join,
@@ -42,6 +44,12 @@ from composer.interfaces.field_errors import unknown_field
 
 if TYPE_CHECKING:
     from composer.inference.scopes import Scope
+
+# Methods that call a function with the arguments after it, and the position of the function.
+_CALLING_LATER = {
+    **dict.fromkeys(('call_soon', 'call_soon_threadsafe', 'callback', 'submit', 'to_thread'), 0),
+    **dict.fromkeys(('call_at', 'call_later', 'run_in_executor'), 1),
+}
 
 
 class Calls(Part):
@@ -53,22 +61,53 @@ class Calls(Part):
         arguments = self._arguments(node, scope)
         place = Place(scope.module, node)
         self._note_keys(function, arguments)
-        if function == External('builtins.super') or function == External('builtins.locals'):
+        if function == External('builtins.super'):
+            return _super_in(scope)
+        if function == External('builtins.locals'):
             return UNKNOWN
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
-        if isinstance(function, Unknown) and method in SENDING_METHODS:
+        if method in _CALLING_LATER or isinstance(function, External):
+            arguments = _with_work(arguments, _CALLING_LATER.get(method))
+        is_open = any(isinstance(each, Unknown) for each in alternatives(function))
+        if is_open and method in SENDING_METHODS:
             # It may be the node, in another guise.
             name = arguments.get(0, 'name')
             if name is None or not isinstance(name.value, Constant):
                 self._evaluator.run.reading.open_kinds.add(SENDING_METHODS[method])
         self._evaluator.call_places.append(place)
+        if isinstance(function, Unknown):
+            self._note_wait(node, arguments, scope)
         try:
             return join(
                 self.invoke(each, arguments, place, waits=scope.waits, is_awaited=is_awaited)
-                for each in alternatives(function)
+                for each in self._fitting(function, arguments)
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _fitting(self, function: Value, arguments: Arguments) -> list[Value]:
+        """Return which of several functions may be called so, or all if none may."""
+        several = list(alternatives(function))
+        if len(several) == 1:
+            return several
+        with self._evaluator.run.silence():
+            found = [
+                each
+                for each in several
+                if not isinstance(each, Function)
+                or self._evaluator.functions.fits(each, arguments)
+            ]
+        return found or several
+
+    def _note_wait(self, node: ast.Call, arguments: Arguments, scope: Scope) -> None:
+        """Note a call of a method of what is kept in the state: `node.state.event.wait()`."""
+        match node.func:
+            case ast.Attribute(value=ast.Attribute(value=owner, attr=name), attr=method):
+                with self._evaluator.run.silence():
+                    is_state = self._evaluator.evaluate(owner, scope) == PartOfNode('state')
+                if is_state:
+                    place = Place(scope.module, node)
+                    self._evaluator.waiting.call_held(name, method, arguments, place)
 
     def _note_keys(self, function: Value, arguments: Arguments) -> None:
         """Note that arguments decide which attribute or entry of a table is meant."""
@@ -84,13 +123,18 @@ class Calls(Part):
         is_open = False
         for each in node.args:
             place = Place(scope.module, each)
-            if isinstance(each, ast.Starred):
+            if is_open:
+                # Nobody knows which position this has.
+                self._evaluator.escape(self._evaluator.evaluate(each, scope))
+            elif isinstance(each, ast.Starred):
                 value = self._evaluator.evaluate(each.value, scope)
-                if isinstance(value, Sequence) and not value.is_lost and not value.is_open:
-                    positional += [Argument(*item) for item in value.items]
-                else:
+                try:
+                    leaves = leaves_of(value, place)
+                except NotKnownError:
                     is_open = True
                     self._evaluator.escape(value)
+                    continue
+                positional += [Argument(each.value, each.place) for each in leaves]
             else:
                 positional.append(Argument(self._evaluator.evaluate(each, scope), place))
         for keyword in node.keywords:
@@ -126,11 +170,16 @@ class Calls(Part):
             is_awaited: Whether its result is awaited at once.
         """
         match function:
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                return self._evaluator.waiting.call(owner, name, arguments, place)
             case BoundMethod(owner=owner, name=name) if owner == NODE:
+                self._evaluator.run.moves += 1
                 self._fits('node', name, arguments, place)
                 return self._evaluator.node_calls.call(
                     name, arguments, waits=waits, is_awaited=is_awaited
                 )
+            case BoundMethod(owner=Class() as owner):
+                return self._evaluator.classes.subclasses(owner)
             case BoundMethod():
                 owner, name = function.owner, function.name
                 if isinstance(owner, PartOfNode):
@@ -160,13 +209,21 @@ class Calls(Part):
             case Instance():
                 method = self._evaluator.classes.class_attribute(function.of, '__call__', function)
                 if isinstance(method, Function):
-                    return self._evaluator.functions.follow(method, arguments, waits=waits)
+                    return self.invoke(
+                        method, arguments, place, waits=waits, is_awaited=is_awaited
+                    )
             case External():
+                if is_awaited:
+                    self._evaluator.waiting.await_asyncio(function.name, arguments, place)
+                made = self._evaluator.callables.call(function.name, arguments, place)
+                if made is not None:
+                    return made
                 return self._evaluator.library.call(function.name, arguments, place)
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
+        self._evaluator.run.moves += 1
         self.escape_all(arguments)
-        return CHOSEN if is_chosen(function) or are_chosen(arguments) else UNKNOWN
+        return Unknown(max(is_chosen(function), chosen_by(arguments)))
 
     def _refuse(self, function: Value, place: Place) -> None:
         """Report a call of what cannot be called; `None` may be something else later."""
@@ -193,9 +250,8 @@ class Calls(Part):
         given = partial.arguments
         arguments = Arguments(given.positional, given.named, is_open=True)
         function = partial.function
-        if (isinstance(function, Function) and given.positional) or (
-            function == BoundMethod(NODE, 'publish') and given.positional
-        ):
+        is_publish = function == BoundMethod(NODE, 'publish')
+        if given.positional and (isinstance(function, Function) or is_publish):
             with self._evaluator.run.condition():
                 self.invoke(function, arguments, given.positional[0].place, waits=False)
         else:
@@ -235,3 +291,36 @@ class Calls(Part):
                 message = str(error).replace(function.type, shown)
                 evaluator.run.report('unknown-field', argument.place, message, error.help)
         return made
+
+
+def _with_work(arguments: Arguments, position: int | None) -> Arguments:
+    """Return arguments in which a function and what it will be called with are one."""
+    named = dict(arguments.named)
+    work, given = named.get('target'), named.get('args')
+    if work is not None and given is not None and isinstance(given.value, Sequence):
+        rest = Arguments(tuple(Argument(*item) for item in given.value.items))
+        later = Argument(Partial(work.value, rest), work.place)
+        others = [(name, each) for name, each in arguments.named if name not in ('target', 'args')]
+        return Arguments(arguments.positional, (*others, ('target', later)), arguments.is_open)
+    if position is None or len(arguments.positional) <= position or arguments.is_open:
+        return arguments
+    work = arguments.positional[position]
+    if not isinstance(work.value, Function | BoundMethod):
+        return arguments
+    rest = Arguments(arguments.positional[position + 1 :])
+    return Arguments(
+        (*arguments.positional[:position], Argument(Partial(work.value, rest), work.place)),
+        arguments.named,
+    )
+
+
+def _super_in(scope: Scope) -> Value:
+    """Return what `super()` gives in a method."""
+    current: Scope | None = scope
+    while current is not None:
+        function = current.function
+        if function is not None and function.of is not None:
+            owner = function.owner
+            return UNKNOWN if owner is None else Super(function.of, owner)
+        current = current.outer
+    return UNKNOWN

@@ -6,41 +6,53 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.classes.made_callables import MadeCallables
+from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
 from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
-from composer.inference.evaluation.library_calls import LibraryCalls
+from composer.inference.evaluation.library.library_calls import LibraryCalls
+from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
-from composer.inference.evaluation.project_classes import Classes
+from composer.inference.evaluation.sleeping import Sleeping
+from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.scopes import Scope
+from composer.inference.statements.guards import Guards
 from composer.inference.statements.loop_rounds import Loops
+from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
+from composer.inference.statements.registries import Registries
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
     BY_STATE,
     CHOSEN,
     NODE,
+    NONE,
     UNKNOWN,
     Alternatives,
     ArrayField,
     Awaitable,
     BoundMethod,
+    Class,
     Constant,
     Function,
     Generated,
+    Held,
     Instance,
     Mapping,
+    Message,
     NodeValue,
     Partial,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Unknown,
@@ -73,16 +85,23 @@ class Evaluator:
         self.expressions = Expressions(self)
         self.statements = Statements(self)
         self.loops = Loops(self)
+        self.guards = Guards(self)
+        self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
+        self.registries = Registries(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
         self.library = LibraryCalls(self)
+        self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
+        self.callables = MadeCallables(self)
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.waiting = Waiting(self)
+        self.sleeping = Sleeping(self)
         self.call_places: list[Place] = []
         self.kept: dict[str, Value] = {}
 
@@ -97,7 +116,13 @@ class Evaluator:
             return CHOSEN
         current: Scope | None = scope
         while current is not None:
-            if name in current.local:
+            is_later = current.is_body and name not in (current.names or ())
+            if current is scope and name not in current.local and name in (current.names or ()):
+                held = current.names[name] if current.names else UNKNOWN
+                if all(isinstance(each, Instance | Unknown) for each in alternatives(held)):
+                    # A global one that was just stored.
+                    return held
+            if name in current.local and not is_later:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
                     value = current.names[name]
@@ -110,11 +135,19 @@ class Evaluator:
             message = f"'{name}' is not defined"
             self.run.report('undefined-name', place, message, suggest(name, known))
             return UNKNOWN
+        if self.run.probed is not None and name in modules.top(scope.module).changed:
+            self.run.probed.add(Held(str(scope.module.path), name))
         return self.top_value(scope.module, name)
 
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
         self.run.reading.modules.setdefault(id(module), module)
+        home = self.run.modules.star_home(module, name)
+        if home is not None:
+            return self.top_value(home, name)
+        registry = self.registries.find(module, name)
+        if registry is not None:
+            return registry
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
@@ -161,6 +194,10 @@ class Evaluator:
             text = 'this is an async generator'
             place = Place(scope.module, node)
             self.run.report('missing-await', place, text, "go through it with 'async for'")
+        elif is_async and all(map(_is_plain, alternatives(value))):
+            text = 'this is no async generator'
+            place = Place(scope.module, node)
+            self.run.report('missing-await', place, text, "go through it with 'for'")
         return value
 
     @contextmanager
@@ -174,9 +211,11 @@ class Evaluator:
         is_dead = truth is not None and truth != is_taken
         is_doubt = is_dead or (truth is None and is_chosen(test) > 0)
         with ExitStack() as around:
-            by_state = is_chosen(test) == BY_STATE
-            around.enter_context(self.run.condition(is_doubt=is_doubt, by_state=by_state))
-            if is_dead and is_chosen(test) != BY_PARAMETER:
+            chosen = is_chosen(test)
+            around.enter_context(
+                self.run.condition(is_doubt=is_doubt, chosen=chosen, decided=chosen > BY_STATE)
+            )
+            if is_dead and chosen != BY_PARAMETER:
                 around.enter_context(self.run.dead_branch())
             yield
 
@@ -195,11 +234,13 @@ class Evaluator:
     def _item_of(self, value: Value) -> Value:
         match value:
             case ArrayField():
-                return item_of(value.type)
+                return item_of(value.type, is_made=value.is_made)
             case Sequence():
                 return value.item()
             case Generated():
                 return value.yielded
+            case Instance() | Class():
+                return self._item_of_object(value)
             case Mapping() if not (value.is_open or value.is_lost) and value.entries:
                 return join(constant(key) for key in value.entries)
             case Constant() | Scalar() if value.kind is str:
@@ -208,19 +249,62 @@ class Evaluator:
                 self.run.reading.open_kinds.add('parameter')
         return Unknown(is_chosen(value))
 
+    def _item_of_object(self, value: Instance | Class) -> Value:
+        items = self.loops.items_of(value)
+        if items is not None:
+            return join(items)
+        if isinstance(value, Class):
+            return UNKNOWN
+        iterator = self.classes.call_method(value, '__iter__')
+        if iterator is None:
+            iterator = self.classes.call_method(value, '__aiter__')
+        if isinstance(iterator, Instance):
+            item = self.classes.call_method(iterator, '__next__')
+            if item is None:
+                item = self.classes.call_method(iterator, '__anext__')
+            return item.result if isinstance(item, Awaitable) else item or UNKNOWN
+        return UNKNOWN if iterator is None else self.item_of(iterator)
+
     def entered(self, value: Value) -> Value:
         """Return what `with value as name` stores."""
-        return join(
-            each.yielded if isinstance(each, Generated) else UNKNOWN
-            for each in alternatives(value)
-        )
+        return join(self._entered(each) for each in alternatives(value))
+
+    def _entered(self, value: Value) -> Value:
+        if isinstance(value, Instance):
+            entered = self.classes.call_method(value, '__enter__')
+            if entered is None:
+                entered = self.classes.call_method(value, '__aenter__')
+                return entered.result if isinstance(entered, Awaitable) else UNKNOWN
+            return entered
+        return value.yielded if isinstance(value, Generated) else UNKNOWN
+
+    def left(self, value: Value) -> Value | None:
+        """Return what the end of `with value` gives: true if it catches what was raised."""
+        if not isinstance(value, Instance):
+            return None
+        reason = (UNKNOWN, UNKNOWN, UNKNOWN)
+        ended = self.classes.call_method(value, '__exit__', *reason)
+        if ended is None:
+            ended = self.classes.call_method(value, '__aexit__', *reason)
+            return ended.result if isinstance(ended, Awaitable) else ended
+        return ended
 
     def keep(self, name: str, value: Value) -> None:
         """Note that an object is kept in `node.state` or `node.own_state`, to be used later."""
-        if isinstance(value, Instance):
+        kept = self.run.reading.kept
+        if is_chosen(value) > BY_STATE or self.run.decided or not self.run.is_sure:
+            self.run.reading.kept_by_file.add(name)
+        found = join(map(_lasting, alternatives(value)))
+        kept[name] = join([kept[name], found]) if name in kept else found
+        if isinstance(value, Instance) and not value.is_member:
+            value.is_shared = True
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
+
+    def kept_value(self, name: str) -> Value:
+        """Return what is kept under a name in `node.state`; `[name]` is of `node.own_state`."""
+        return self.kept[name] if name in self.kept else self.run.facts.kept_value(name)
 
     def escape(self, value: Value) -> None:
         """Note that something unknown has a value: it may change it, or call it."""
@@ -238,18 +322,26 @@ class Evaluator:
                 self.run.reading.is_state_open = True
             case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
                 self._escape_method(value)
+            case Primitive():
+                value.is_lost = True
+            case BoundMethod(owner=Primitive() as owner, name=name):
+                owner.is_lost |= name not in WAITING.get(owner.kind, ())
             case Mapping() | Sequence() if not value.is_lost:
                 value.is_lost = True
                 held = value.entries.values() if isinstance(value, Mapping) else value.items
                 for each, _ in list(held):
                     self.escape(each)
+                if isinstance(value, Mapping) and value.others is not None:
+                    self.escape(value.others)
             case Function() if not value.is_read and value.definition not in self.functions.active:
                 self.functions.follow_later(value)
             case Partial():
                 self.calls.invoke_later(value)
             case Instance():
-                if any(isinstance(each, NodeValue) for each in value.attributes.values()):
-                    self.run.reading.open_all()
+                value.is_open = True
+                for each in value.attributes.values():
+                    if isinstance(each, NodeValue | BoundMethod | PartOfNode):
+                        self.escape(each)
 
     def _escape_method(self, method: BoundMethod) -> None:
         kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)
@@ -257,3 +349,22 @@ class Evaluator:
             self.run.reading.open_kinds.add(kind)
         elif method.name == 'get_parameters':
             self.run.reading.reads_others = True
+
+
+def _lasting(value: Value) -> Value:
+    """Return what of a value holds in other calls, too."""
+    match value:
+        case Message():
+            return Message(value.type, is_made=True)
+        case Constant(value=None):
+            return NONE
+        case PartOfNode(name='time' | 'goal'):
+            return value
+    return UNKNOWN
+
+
+def _is_plain(value: Value) -> bool:
+    """Return whether a value is gone through without waiting."""
+    if isinstance(value, Generated):
+        return not value.is_async
+    return isinstance(value, Sequence | Mapping | ArrayField | Constant | Scalar)

@@ -6,6 +6,11 @@ import ast
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.evaluation.library.known_values import (
+    Computation,
+    NotKnownError,
+    leaves_of,
+)
 from composer.inference.evaluation.operators import combine, compare, negate
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
@@ -18,8 +23,10 @@ from composer.inference.values import (
     Awaitable,
     Constant,
     Generated,
+    Instance,
     Mapping,
     Message,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -37,11 +44,27 @@ if TYPE_CHECKING:
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
 _UNREAD = (ast.Slice,)
+_NOT_AWAITED = (Message, Constant, Scalar, Mapping, Sequence, PartOfNode)
 # Expressions that make a value, rather than find one.
 _MAKING = (ast.BinOp, ast.Call, ast.JoinedStr, ast.UnaryOp)
 _NO_CONVERSION = -1
 # Of more texts, none is known.
 _MOST_TEXTS = 16
+_OPERATORS: dict[type[ast.operator], str] = {
+    ast.Add: 'add',
+    ast.BitAnd: 'and',
+    ast.BitOr: 'or',
+    ast.BitXor: 'xor',
+    ast.Div: 'truediv',
+    ast.FloorDiv: 'floordiv',
+    ast.LShift: 'lshift',
+    ast.MatMult: 'matmul',
+    ast.Mod: 'mod',
+    ast.Mult: 'mul',
+    ast.Pow: 'pow',
+    ast.RShift: 'rshift',
+    ast.Sub: 'sub',
+}
 
 
 class Expressions(Part):
@@ -146,9 +169,25 @@ class Expressions(Part):
             right = self._evaluator.awaited(each.right, scope)
             if isinstance(value, Mapping) and isinstance(right, Mapping):
                 value = self._merge(value, right)
+            elif any(isinstance(one, Instance) for one in (value, right)):
+                value = self._call_operator(each.op, value, right)
             else:
                 value = combine(each.op, value, right)
         return value
+
+    def _call_operator(self, sign: ast.operator, left: Value, right: Value) -> Value:
+        """Return what the method of an object makes of an operator: `__add__`."""
+        name = _OPERATORS[type(sign)]
+        classes = self._evaluator.classes
+        found: Value | None = None
+        if isinstance(left, Instance):
+            found = classes.call_method(left, f'__{name}__', right)
+        if found is None and isinstance(right, Instance):
+            found = classes.call_method(right, f'__r{name}__', left)
+        if found is None:
+            self._evaluator.escape(left)
+            self._evaluator.escape(right)
+        return UNKNOWN if found is None else found
 
     def _merge(self, left: Mapping, right: Mapping) -> Value:
         if left.is_lost or right.is_lost:
@@ -238,34 +277,59 @@ class Expressions(Part):
         owner = self.evaluate(node.value, scope)
         index = self.evaluate(node.slice, scope)
         self._evaluator.run.decide(index)
+        if _is_globals(node.value) and isinstance(index, Constant):
+            is_known = self._evaluator.run.modules.has_name(scope.module, index.value)
+            return self._evaluator.top_value(scope.module, index.value) if is_known else UNKNOWN
         is_slice = isinstance(node.slice, _UNREAD)
         place = Place(scope.module, node.slice)
         return join(
             self._item(each, index, place, is_slice=is_slice) for each in alternatives(owner)
         )
 
+    def read_item(self, owner: Value, index: Value, place: Place) -> Value:
+        """Return what `owner[index]` may be."""
+        return join(self._item(each, index, place, is_slice=False) for each in alternatives(owner))
+
     def _slice(self, node: ast.Slice, scope: Scope) -> Value:
-        self._evaluate_all(ast.iter_child_nodes(node), scope)
-        return UNKNOWN
+        """Return the limits of a slice, as a tuple."""
+        limits: list[tuple[Value, Place]] = []
+        for each in (node.lower, node.upper, node.step):
+            value = self.evaluate(each, scope) if each is not None else NONE
+            limits.append((value, Place(scope.module, each or node)))
+        return Sequence(limits, tuple)
 
     def _item(self, owner: Value, index: Value, place: Place, *, is_slice: bool) -> Value:
         match owner:
             case ArrayField():
-                return owner if is_slice else item_of(owner.type)
+                return owner if is_slice else item_of(owner.type, is_made=owner.is_made)
             case Mapping() if not owner.is_lost:
-                if isinstance(index, Constant):
-                    held = owner.entries.get(index.value)
-                    return held[0] if held else UNKNOWN
-                return join([v for v, _ in owner.entries.values()] or [UNKNOWN])
-            case Sequence() if not owner.is_lost and not is_slice:
-                at: int | None = None
-                if isinstance(index, Constant) and index.kind is int:
-                    at = index.value
-                return owner.item_at(at)
-            case Constant(value=str()) | Scalar():
-                if owner.kind is str:
-                    return Scalar(str, is_chosen(owner))
+                return owner.value_of(index) or UNKNOWN
+            case Sequence() if not owner.is_lost:
+                if is_slice:
+                    return self._slice_of(owner, index, place)
+                at = index.value if isinstance(index, Constant) else None
+                return owner.item_at(at if isinstance(at, int) else None)
+            case Constant() | Scalar() if owner.kind is str:
+                if isinstance(owner, Constant) and isinstance(index, Constant | Sequence):
+                    return self._slice_of(owner, index, place)
+                return Scalar(str, is_chosen(owner))
         return self._evaluator.attributes.read_item(owner, index, place)
+
+    def _slice_of(self, owner: Sequence | Constant, index: Value, place: Place) -> Value:
+        """Return what `owner[1:3]` gives, and of a text also `owner[1]`."""
+        made = Computation(place)
+        try:
+            at = made.python(index)
+            at = slice(*at) if isinstance(index, Sequence) else at
+            if isinstance(owner, Sequence):
+                leaves = leaves_of(owner, place)
+                kind = list if owner.kind is list else tuple
+                return made.call_plainly(lambda: kind(leaves[at]))
+            return made.call(lambda text: text[at], owner)
+        except NotKnownError:
+            if isinstance(owner, Constant):
+                return Scalar(str, is_chosen(owner))
+            return Sequence([(owner.item(), place)], owner.kind, is_open=True)
 
     # Calls, functions and what waits
 
@@ -281,7 +345,7 @@ class Expressions(Part):
         else:
             value = self.evaluate(node.value, scope)
         several = alternatives(value)
-        if all(isinstance(each, Message | Constant | Scalar | Mapping) for each in several):
+        if all(isinstance(each, _NOT_AWAITED) for each in several):
             place = Place(scope.module, node.value)
             text = 'what is awaited here is no coroutine'
             self._evaluator.run.report('missing-await', place, text, 'leave out the await')
@@ -347,10 +411,17 @@ class Expressions(Part):
         for inner, is_certain in self._evaluator.loops.rounds(node.generators, scope):
             keys = self.evaluate(node.key, inner)
             value = self.evaluate(node.value, inner)
-            made.is_open |= not is_certain
             for key in alternatives(keys):
                 if isinstance(key, Constant):
                     made.set(key.value, value, Place(scope.module, node.key), run.conditions)
+                    made.has_unknown |= not is_certain
                 else:
-                    made.is_open = True
+                    made.set_other(value)
         return made
+
+
+def _is_globals(node: ast.expr) -> bool:
+    match node:
+        case ast.Call(func=ast.Name('globals')):
+            return True
+    return False

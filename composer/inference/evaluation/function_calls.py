@@ -9,6 +9,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.signatures import explain_misfit
 from composer.inference.scopes import LocalNames, Scope, find_local_names
 from composer.inference.values import (
+    AGAIN,
     NEVER,
     NONE,
     UNKNOWN,
@@ -16,6 +17,8 @@ from composer.inference.values import (
     Argument,
     Arguments,
     Awaitable,
+    Constant,
+    Descriptor,
     External,
     Function,
     Generated,
@@ -35,12 +38,24 @@ _TRANSPARENT = {
     'functools.cache',
     'functools.lru_cache',
     'functools.wraps',
-    'builtins.staticmethod',
-    'typing.no_type_check',
+    'abc.abstractmethod',
+    'dataclasses.dataclass',
+    'enum.unique',
+    'functools.total_ordering',
+    'typing.dataclass_transform',
     'typing.final',
+    'typing.no_type_check',
+    'typing.runtime_checkable',
     'typing_extensions.override',
     'typing.override',
 }
+_DESCRIPTORS = {
+    'builtins.classmethod': 'classmethod',
+    'builtins.property': 'property',
+    'builtins.staticmethod': 'staticmethod',
+    'functools.cached_property': 'property',
+}
+_OF_PROPERTY = ('getter', 'setter', 'deleter')
 
 
 class Functions(Part):
@@ -64,25 +79,42 @@ class Functions(Part):
     ) -> Function:
         """Return the function that a definition makes."""
         is_top = scope.function is None and scope.outer is None
-        function = Function(scope.module, node, None if is_top else scope)
+        around = None if is_top else scope
+        function = Function(scope.module, node, scope.outer if scope.is_body else around)
         for default in (*node.args.defaults, *node.args.kw_defaults):
             if default is not None:
                 self._evaluator.evaluate(default, scope)
-        if not is_top:
+        if not is_top and not scope.is_body:
             self._evaluator.home_of(scope).inner.append(function)
         return function
 
-    def define_decorated(
-        self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope
+    def decorate(
+        self,
+        value: Value,
+        node: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef,
+        scope: Scope,
     ) -> Value:
-        """Return what a definition makes, with its decorators."""
-        value: Value = self.define(node, scope)
+        """Return what the decorators of a definition make of it."""
         for decorator in reversed(node.decorator_list):
-            by = self._evaluator.evaluate(decorator, scope)
-            if isinstance(by, External) and by.name in _TRANSPARENT:
-                continue
             place = Place(scope.module, decorator)
-            value = self._evaluator.calls.invoke(by, Arguments((Argument(value, place),)), place)
+            if isinstance(decorator, ast.Call):
+                maker = self._evaluator.evaluate(decorator.func, scope)
+                if isinstance(maker, External) and maker.name in _TRANSPARENT:
+                    continue
+            elif isinstance(decorator, ast.Attribute) and decorator.attr in _OF_PROPERTY:
+                held = self._evaluator.evaluate(decorator.value, scope)
+                if isinstance(held, Descriptor):
+                    is_setter = decorator.attr == 'setter'
+                    value = Descriptor(
+                        held.kind, held.function, value if is_setter else held.setter
+                    )
+                    continue
+            by = self._evaluator.evaluate(decorator, scope)
+            if isinstance(by, External) and by.name in _DESCRIPTORS:
+                value = Descriptor(_DESCRIPTORS[by.name], value)
+            elif not isinstance(by, External) or by.name not in _TRANSPARENT:
+                arguments = Arguments((Argument(value, place),))
+                value = self._evaluator.calls.invoke(by, arguments, place)
         return value
 
     def kind_of(self, function: Function) -> FunctionKind:
@@ -104,12 +136,17 @@ class Functions(Part):
         """Return what a call of a function may return, and read what it does."""
         function.is_read = True
         key = self._key_of(function, arguments, waits=waits)
-        if key is not None and key in self._results:
+        if key is not None and key in self._results and self._evaluator.run.probed is None:
             self._evaluator.run.tried += 1
             return self._results[key]
-        if function.definition in self.active or len(self.active) >= _DEEPEST:
+        # With known numbers and texts, one that calls itself comes to an end.
+        is_simple = all(isinstance(each.value, Constant) for each in arguments.all())
+        is_again = function.definition in self.active and not (is_simple and key)
+        if is_again or len(self.active) >= _DEEPEST:
             self._evaluator.calls.escape_all(arguments)
-            return UNKNOWN
+            # What a call of itself gives, the other ways through it give, too.
+            is_plain = self.kind_of(function) is FunctionKind.PLAIN
+            return AGAIN if is_plain and function.definition in self.active else UNKNOWN
         if not self.fits(function, arguments):
             return UNKNOWN
         scope = self.enter(function, arguments, waits=waits)
@@ -148,12 +185,17 @@ class Functions(Part):
         at = (
             bool(run.doubts),
             run.is_sure,
+            bool(run.limits),
+            bool(run.decided),
             bool(run.guards),
             run.is_silent,
             waits,
+            tuple(id(lock) for lock, _ in run.held_locks),
             arguments.is_open,
         )
-        owner = function.owner if not isinstance(function.owner, Instance) else id(function.owner)
+        owner: object = function.owner
+        if isinstance(owner, Instance):
+            owner = (id(owner), owner.version)
         return (id(function.definition), id(function.outer), owner, names, at, *values)
 
     def enter(self, function: Function, arguments: Arguments, *, waits: bool) -> Scope:
@@ -169,7 +211,8 @@ class Functions(Part):
         self.active.append(definition)
         self._evaluator.run.modules.followed.add(id(definition))
         run = self._evaluator.run
-        doubts = run.doubts, run.state_doubts
+        standing = run.standing
+        before, run.waits = run.waits, waits
         try:
             if isinstance(definition, ast.Lambda):
                 value = self._evaluator.evaluate(definition.body, scope)
@@ -186,7 +229,8 @@ class Functions(Part):
                     self.follow_later(inner)
                     self._evaluator.run.doubts -= 1
         finally:
-            run.doubts, run.state_doubts = doubts
+            run.waits = before
+            run.standing = standing
             self.active.pop()
         return scope
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, cast
 
+from composer.inference.evaluation.library.known_functions import CONSTANTS
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import split_part
 from composer.inference.values import (
@@ -15,6 +16,7 @@ from composer.inference.values import (
     Place,
     ProjectModule,
     Value,
+    constant,
 )
 from composer.python_source.annotations import find_interface
 from composer.spelling import suggest
@@ -81,7 +83,10 @@ class Imports(Part):
         """Return what a full name stands for that is not of the project."""
         if full_name in _OF_THE_MACHINE:
             return CHOSEN
-        interface = find_interface(full_name)
+        if full_name in CONSTANTS:
+            return constant(CONSTANTS[full_name])
+        # 'rclpy.action' holds no actions.
+        interface = None if full_name.startswith('rclpy.') else find_interface(full_name)
         if interface is None:
             package, _, name = full_name.partition('.')
             if package == 'composer':

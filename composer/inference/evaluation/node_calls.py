@@ -26,6 +26,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -128,10 +129,35 @@ class NodeCalls(Part):
             if names is not None and isinstance(names.value, Sequence):
                 keys = [(name, place, UNKNOWN) for name, place in names.value.items]
                 self._note_remote(arguments, keys)
+                entries = {
+                    name.value: (UNKNOWN, place)
+                    for name, place, _ in keys
+                    if isinstance(name, Constant)
+                }
+                return Mapping(
+                    dict(entries), has_unknown=len(entries) < len(keys) or names.value.is_open
+                )
+            if names is not None and _kind_of(names.value) is str:
+                run.report(
+                    'bad-call',
+                    names.place,
+                    "'names' is a text, and has to be a list",
+                    'put it in […]',
+                )
             return UNKNOWN
         node_name, values = arguments.get(0, 'node_name'), arguments.get(1, 'values')
         if node_name is None or values is None:
             return NONE
+        if isinstance(values.value, Sequence) or _kind_of(values.value):
+            text = "'values' has to be a mapping of names to values"
+            run.report('bad-call', values.place, text, 'write {name: value}')
+        if isinstance(values.value, Constant | Scalar | Message | Sequence):
+            run.report(
+                'bad-call',
+                values.place,
+                'set_parameters takes the values as a dictionary',
+                'write node.set_parameters(node_name, {name: value})',
+            )
         if isinstance(values.value, Mapping):
             self._note_remote(
                 arguments,
@@ -166,7 +192,7 @@ class NodeCalls(Part):
                             span_of(place, key.value),
                             value if isinstance(value, Constant) else None,
                             span_of(where),
-                            is_certain=not self._evaluator.run.doubts,
+                            is_certain=self._evaluator.run.is_certain,
                         )
                     )
 
@@ -176,9 +202,13 @@ class NodeCalls(Part):
         key, value = arguments.get(0, ''), arguments.get(1, '')
         if name == 'update':
             reading.own_state_set |= {each for each, _ in arguments.named}
+            for field, argument in arguments.named:
+                self._evaluator.keep(f'[{field}]', argument.value)
             for argument in arguments.positional:
                 if isinstance(argument.value, Mapping) and not argument.value.is_open:
                     reading.own_state_set |= {str(each) for each in argument.value.entries}
+                    for key_of, (held, _) in argument.value.entries.items():
+                        self._evaluator.keep(f'[{key_of}]', held)
                 else:
                     reading.is_own_state_open = True
         elif key and name in ('get', 'setdefault', 'pop'):
@@ -189,19 +219,23 @@ class NodeCalls(Part):
                     self._evaluator.run.use_own_state(str(each.value), where)
             reading.own_state_set |= {str(each.value) for each in constants}
             reading.is_own_state_open |= not constants
-        kept = value.value if value else UNKNOWN
+        given = value.value if value else NONE
         found = alternatives(key.value) if key else ()
         keys = [str(each.value) for each in found if isinstance(each, Constant)]
-        if isinstance(kept, Instance):
+        if name == 'setdefault':
             for name_of_key in keys:
-                self._evaluator.keep(f'[{name_of_key}]', kept)
-        if isinstance(kept, Instance | Message):
-            return kept
-        if name in ('get', 'setdefault') and len(keys) == 1:
-            held = self._evaluator.kept.get(f'[{keys[0]}]')
-            if held is not None:
-                return held
+                self._evaluator.keep(f'[{name_of_key}]', given)
+        is_member = isinstance(given, Instance) and given.is_member
+        if isinstance(given, Instance | Message) and not is_member:
+            return given
+        if name in ('get', 'pop', 'setdefault') and len(keys) == 1:
+            held = self._evaluator.kept_value(f'[{keys[0]}]')
+            if not isinstance(held, Unknown):
+                return join([held, given]) if name != 'setdefault' else held
         self._evaluator.calls.escape_all(arguments)
+        if name == 'setdefault' and isinstance(given, Sequence):
+            # Of what is in it, other calls have a say.
+            return Sequence([], given.kind, is_open=True)
         return UNKNOWN
 
     def read_parameters(self, owner: PartOfNode, name: str, arguments: Arguments) -> Value:
@@ -235,3 +269,7 @@ class NodeCalls(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+
+def _kind_of(value: Value) -> type | None:
+    return value.kind if isinstance(value, Constant | Scalar) else None

@@ -7,19 +7,27 @@ import operator
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
+    AGAIN,
     UNKNOWN,
+    ArrayField,
+    Class,
     Constant,
+    Function,
+    Instance,
     Mapping,
     Message,
     MessageClass,
     NodeValue,
+    PartOfNode,
     Scalar,
     Sequence,
     Unknown,
     Value,
     alternatives,
+    chosen_with,
     constant,
     is_chosen,
+    is_none,
     join,
     truth_of,
 )
@@ -35,7 +43,13 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
     ast.Pow: operator.pow,
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
+    ast.BitXor: operator.xor,
+    ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
 }
+_SETS: tuple[type, ...] = (set, frozenset, type({}.keys()))
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
@@ -44,6 +58,8 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
 }
+# What makes a large number of two small ones.
+_POWERS = (ast.Pow, ast.LShift)
 _BITS = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
 _NUMBERS = (bool, int, float)
 # Larger numbers and longer texts are not computed.
@@ -58,22 +74,36 @@ _MOST_ITEMS = 256
 
 def combine(sign: ast.operator, left: Value, right: Value) -> Value:
     """Return what a binary operator makes of two values."""
-    pairs = [(one, other) for one in alternatives(left) for other in alternatives(right)]
+    # What may be None is combined where it is something else.
+    ones, others = (
+        [each for each in alternatives(value) if not is_none(each)] or [value]
+        for value in (left, right)
+    )
+    pairs = [(one, other) for one in ones for other in others]
     if len(pairs) > _MOST_PAIRS:
         return UNKNOWN
     return join(_combine(sign, *pair) for pair in pairs)
 
 
 def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
-    chosen = max(is_chosen(left), is_chosen(right))
+    chosen = chosen_with(left, right)
     if isinstance(left, Constant) and isinstance(right, Constant):
         compute = _ARITHMETIC.get(type(sign))
-        is_power = isinstance(sign, ast.Pow) and abs(hash(right.value)) > _GREATEST_POWER
+        is_power = isinstance(sign, _POWERS) and abs(hash(right.value)) > _GREATEST_POWER
         if compute and not is_power and _is_small(left.value) and _is_small(right.value):
             try:
                 return constant(compute(left.value, right.value), is_chosen=chosen)
             except (ArithmeticError, TypeError, ValueError):
                 return Unknown(chosen)
+    if isinstance(left, PartOfNode) and isinstance(right, PartOfNode):
+        is_difference = left.name == right.name == 'time' and isinstance(sign, ast.Sub)
+        return PartOfNode('duration') if is_difference else UNKNOWN
+    if isinstance(left, ArrayField) and left == right and left.type.nested:
+        return left
+    if AGAIN in (left, right) and isinstance(sign, ast.Add):
+        other = right if left == AGAIN else left
+        if isinstance(other, Sequence) and not other.is_lost:
+            return Sequence(list(other.items), other.kind, is_open=True)
     if isinstance(left, Sequence):
         return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))
@@ -87,6 +117,8 @@ def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value
     """Return what `[0.0] * 6` and `[1] + [2]` make."""
     if left.is_lost:
         return UNKNOWN
+    if left.kind in _SETS and isinstance(right, Sequence) and right.kind in _SETS:
+        return _combine_sets(sign, left, right)
     if isinstance(sign, ast.Add) and isinstance(right, Sequence) and not right.is_lost:
         items = [*left.items, *right.items]
         return Sequence(items, left.kind, left.is_open or right.is_open, origin=left.origin)
@@ -96,6 +128,21 @@ def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value
     if isinstance(sign, ast.Mult):
         return Sequence(list(left.items), left.kind, is_open=True, origin=left.origin)
     return UNKNOWN
+
+
+def _combine_sets(sign: ast.operator, left: Sequence, right: Sequence) -> Value:
+    """Return what `{1, 2} - {2}` makes."""
+    items = [*left.items, *right.items]
+    values = [value for value, _ in items]
+    if not (left.is_whole and right.is_whole and all(isinstance(v, Constant) for v in values)):
+        return UNKNOWN
+    known = {item[0]: item for item in items}
+    both = [dict.fromkeys(value for value, _ in each.items).keys() for each in (left, right)]
+    try:
+        found = _ARITHMETIC[type(sign)](*both)
+    except (KeyError, TypeError):
+        return UNKNOWN
+    return Sequence([item for value, item in known.items() if value in found], set)
 
 
 def _is_small(value: object) -> bool:
@@ -117,11 +164,14 @@ def _result(sign: ast.operator, left: type | None, right: type | None) -> type |
         return str
     if left not in _NUMBERS or right not in _NUMBERS:
         return None
+    if isinstance(sign, _BITS) and float in (left, right):
+        return None
     if isinstance(sign, _BITS):
-        return int if int in (left, right) else None
+        is_shift = isinstance(sign, ast.LShift | ast.RShift)
+        return int if int in (left, right) or is_shift else bool
     if isinstance(sign, ast.Div) or float in (left, right):
         return float
-    return int if type(sign) in _ARITHMETIC else None
+    return int
 
 
 def negate(sign: ast.unaryop, value: Value) -> Value:
@@ -140,6 +190,8 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
             return Constant(value.kind, -value.value, value.is_chosen, value.origin)
         if isinstance(sign, ast.UAdd):
             return value
+    if isinstance(value, Constant) and value.kind is int and isinstance(sign, ast.Invert):
+        return Constant(int, ~value.value, value.is_chosen, value.origin)
     if isinstance(value, Scalar) and value.kind in (int, float):
         return value
     return UNKNOWN
@@ -148,10 +200,12 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
 def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     """Return what a comparison says, as far as it is known."""
     known = _compare(sign, left, right)
-    chosen = max(is_chosen(left), is_chosen(right))
+    chosen = chosen_with(left, right)
     if known is not None:
         return constant(known, is_chosen=chosen)
-    plain = all(isinstance(each, Constant | Scalar) for each in (left, right))
+    plain = all(isinstance(each, Constant | Scalar) for each in (left, right)) or all(
+        isinstance(each, Sequence | Mapping) for each in (left, right)
+    )
     if plain or isinstance(sign, ast.Is | ast.IsNot | ast.In | ast.NotIn):
         return Scalar(bool, chosen)
     # NumPy compares item by item.
@@ -159,6 +213,9 @@ def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
 
 
 def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:
+    if isinstance(sign, ast.Eq | ast.NotEq) and isinstance(left, Class | Function | Instance):
+        same = _is_same(left, right)
+        return None if same is None else same == isinstance(sign, ast.Eq)
     if isinstance(sign, ast.Is | ast.IsNot):
         same = _is_same(left, right)
         return None if same is None else same == isinstance(sign, ast.Is)
@@ -187,6 +244,10 @@ def _are_one(left: Value, right: Value) -> bool | None:
         return same if known or left.kind is not right.kind else None
     if left == right and isinstance(left, NodeValue):
         return True
+    if isinstance(left, Instance) and isinstance(right, Instance):
+        return left is right if left.is_member and right.is_member else None
+    if isinstance(left, Function | Class) and isinstance(right, Function | Class):
+        return None if left.definition is right.definition else False
     for one, other in ((left, right), (right, left)):
         if isinstance(one, Constant) and one.value is None:
             certain = (Message, MessageClass, NodeValue, Mapping, Sequence)
@@ -201,13 +262,16 @@ def _are_equal(left: Value, right: Value) -> bool:
 
 
 def _is_in(item: Value, container: Value) -> bool | None:
+    if isinstance(item, MessageClass) and isinstance(container, Sequence) and container.is_whole:
+        same = [_are_one(item, value) for value, _ in container.items]
+        return True if True in same else None if None in same else False
     if not isinstance(item, Constant):
         return None
     if isinstance(container, Constant) and isinstance(container.value, str):
         return item.value in container.value if isinstance(item.value, str) else None
     if isinstance(container, Mapping) and not container.is_lost:
         return True if item.value in container.entries else None if container.is_open else False
-    if isinstance(container, Sequence) and not (container.is_lost or container.is_open):
+    if isinstance(container, Sequence) and container.is_whole:
         values = [value for value, _ in container.items]
         if all(isinstance(value, Constant) for value in values):
             return any(_are_equal(item, value) for value in values)

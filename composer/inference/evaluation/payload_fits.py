@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from composer.inference.evaluation.library.known_functions import KNOWN_RESULTS
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import in_python
 from composer.inference.values import (
     Alternatives,
     ArrayField,
+    Class,
     Constant,
+    External,
+    Function,
     Mapping,
     Message,
+    MessageClass,
     NodeValue,
+    Partial,
     PartOfNode,
     Place,
+    ProjectModule,
     Scalar,
     Sequence,
     Value,
@@ -92,6 +100,12 @@ class Payloads(Part):
         found = fit.any_of(value, lambda each: fit.field(field.type, each, place, path))
         self._settle(found, fit, place)
 
+    def check_item(self, item_type: FieldType, value: Value, place: Place) -> None:
+        """Check what an array of a message is to hold."""
+        fit = _Fit('', self._evaluator.run.types)
+        found = fit.any_of(value, lambda each: fit.field(item_type, each, place, ()))
+        self._settle(found, fit, place)
+
     def _settle(self, found: list[Misfit], fit: _Fit, place: Place) -> None:
         if self._evaluator.run.is_silent:
             return
@@ -159,8 +173,13 @@ class _Fit:
                 yield from self._other_message(description, value, place, path)
             case Mapping() if not value.is_lost:
                 yield from self._entries(description, value, path)
-            case Mapping() | NodeValue() | PartOfNode(name='time'):
+            case PartOfNode(name='time' | 'duration' as part):
+                stamp = Message(f'builtin_interfaces/msg/{part.title()}')
+                yield from self._other_message(description, stamp, place, path)
+            case Mapping():
                 return
+            case _ if _is_no_value(value):
+                yield from self._bare(description, value, place, path)
             case Constant() | Scalar() | Sequence() | ArrayField() | PartOfNode():
                 yield from self._bare(description, value, place, path)
 
@@ -274,6 +293,8 @@ class _Fit:
             case Scalar():
                 if not _may_hold(field_type.kind, value.kind):
                     yield self._wrong(field_type, value, place, path)
+            case _ if _is_no_value(value):
+                yield self._wrong(field_type, value, place, path)
             case Message() | ArrayField() | Mapping() | Sequence() | PartOfNode():
                 if not getattr(value, 'is_lost', False):
                     yield self._wrong(field_type, value, place, path)
@@ -313,9 +334,26 @@ def _may_hold(kind: str, given: type) -> bool:
     return given is int or (kind == 'byte' and given is bytes and kind in INTEGER_RANGES)
 
 
+def _is_no_value(value: Value) -> bool:
+    """Return whether a value is a function or the like, which may have been meant to be called."""
+    if isinstance(value, External):
+        return value.name in KNOWN_RESULTS
+    return isinstance(value, Function | Class | MessageClass | Partial | ProjectModule | NodeValue)
+
+
 def _shown(value: Value) -> str:
     """Return a value in a few words."""
     match value:
+        case Function(definition=ast.FunctionDef() | ast.AsyncFunctionDef() as definition):
+            return f"the function '{definition.name}'"
+        case Function() | Partial() | External():
+            return 'a function'
+        case Class() | MessageClass():
+            return 'a class'
+        case ProjectModule():
+            return 'a module'
+        case NodeValue():
+            return 'the node'
         case Constant():
             return 'None' if value.value is None else f'{value.kind.__name__} {value.value!r}'
         case Scalar():

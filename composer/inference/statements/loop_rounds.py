@@ -11,8 +11,10 @@ from composer.inference.scopes import Names, Scope, join_names, own_nodes
 from composer.inference.values import (
     UNKNOWN,
     Alternatives,
+    Class,
     Constant,
     Generated,
+    Instance,
     Mapping,
     Scalar,
     Sequence,
@@ -49,6 +51,10 @@ class Loops(Part):
                 found = [value for value, _ in iterated.items]
             case Mapping() if not (iterated.is_open or iterated.is_lost):
                 found = [constant(key) for key in iterated.entries]
+            case Instance():
+                found = self._evaluator.classes.fields.items_of(iterated) or []
+            case Class() if self._evaluator.classes.enumerations.is_one(iterated):
+                found = self._evaluator.classes.enumerations.members(iterated)
             case Generated(items=tuple(items)):
                 found = list(items)
             case Constant(value=str(text)) if len(text) <= _MOST_ROUNDS:
@@ -71,6 +77,8 @@ class Loops(Part):
 
     def follow_while(self, node: ast.While, scope: Scope) -> None:
         """Follow a loop as long as a condition holds."""
+        self._evaluator.waiting.poll(node, scope)
+        self._evaluator.sleeping.spin(node, scope)
 
         def begin() -> None:
             test = self._evaluator.tested(node.test, scope)
@@ -88,12 +96,12 @@ class Loops(Part):
         """Keep the jumps of a loop apart, and forget at its end what they leave in doubt."""
         run = self._evaluator.run
         before = scope.broken, scope.continued
-        doubts = run.doubts, run.state_doubts
+        standing = run.standing
         scope.broken, scope.continued = [], []
         yield
         scope.broken, scope.continued = before
         if not any(isinstance(each, _ENDS) for each in own_nodes(node)):
-            run.doubts, run.state_doubts = doubts
+            run.standing = standing
 
     def _follow_each(self, node: ast.For | ast.AsyncFor, scope: Scope, items: list[Value]) -> None:
         """Follow a loop round by round."""
@@ -107,7 +115,12 @@ class Loops(Part):
                     self._evaluator.statements.store(node.target, item, scope)
                     self._evaluator.statements.follow_all(node.body, scope)
                 scope.names = join_names([scope.names, *scope.continued])
-        self._evaluator.statements.follow_all(node.orelse, scope)
+        # What is looked for among known items is expected to be one of them.
+        targets = {each.id for each in ast.walk(node.target) if _is_store(each)}
+        read = {each.id for each in own_nodes(node) if isinstance(each, ast.Name)}
+        is_search = bool(scope.broken and targets & read)
+        with self._evaluator.run.condition(is_doubt=is_search):
+            self._evaluator.statements.follow_all(node.orelse, scope)
         scope.names = join_names([scope.names, *scope.broken])
 
     @contextmanager

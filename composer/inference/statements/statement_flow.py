@@ -8,24 +8,33 @@ from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
+from composer.inference.evaluation.waiting import THREAD
 from composer.inference.scopes import Names, Scope, join_names
-from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
     BY_STATE,
     NEVER,
     NONE,
     UNKNOWN,
+    Argument,
+    Arguments,
     Awaitable,
+    BoundMethod,
     Class,
     Constant,
+    Function,
     Generated,
+    Held,
     Mapping,
+    NodeValue,
     PartOfNode,
     Place,
+    Primitive,
     Scalar,
     Sequence,
     Value,
+    alternatives,
     is_chosen,
+    join,
     truth_of,
 )
 
@@ -34,22 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence as SequenceOf
 
 
-# What a wrong name raises, and what catches it.
-_CATCHING = {
-    'AttributeError',
-    'ComposerError',
-    'KeyError',
-    'LookupError',
-    'PayloadError',
-    'TypeError',
-    'UndeclaredError',
-    'UndeclaredParameterError',
-    'ValueError',
-}
-_CATCHING_ALL = {'BaseException', 'Exception'}
 _WITHOUT_EFFECT = (ast.Name, ast.Dict, ast.Compare, ast.BinOp, ast.Tuple, ast.List)
-# Statements of a handler that say that nothing is to be done.
-_DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
 
 
 class Statements(Part):
@@ -71,6 +65,8 @@ class Statements(Part):
         """Store a value, in a name or in something."""
         match target:
             case ast.Name():
+                if scope.function is not None and target.id not in scope.local:
+                    self._evaluator.waiting.fill(Held(str(scope.module.path), target.id))
                 scope.set(target.id, value)
             case ast.Starred():
                 self.store(target.value, UNKNOWN, scope)
@@ -85,10 +81,15 @@ class Statements(Part):
                 self._store_item(target, value, scope)
 
     def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+        """Return what each target gets of something that is unpacked."""
+        rows = [
+            [item for item, _ in each.items]
+            for each in alternatives(value)
+            if isinstance(each, Sequence) and each.is_whole and len(each.items) == len(targets)
+        ]
         starred = any(isinstance(each, ast.Starred) for each in targets)
-        is_even = isinstance(value, Sequence) and len(value.items) == len(targets)
-        if isinstance(value, Sequence) and is_even and value.is_whole and not starred:
-            return [item for item, _ in value.items]
+        if len(rows) == len(alternatives(value)) and not starred:
+            return [join(column) for column in zip(*rows, strict=True)]
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
@@ -100,8 +101,25 @@ class Statements(Part):
 
     def _assign(self, node: ast.Assign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
+        if isinstance(value, Awaitable):
+            self._check_kept(node, scope)
         for target in node.targets:
             self.store(target, value, scope)
+
+    def _check_kept(self, node: ast.Assign, scope: Scope) -> None:
+        """Report a coroutine that is kept under a name that nothing uses."""
+        match node.targets:
+            case [ast.Name(id=name)] if scope.function and name in scope.local:
+                uses = (
+                    isinstance(each, ast.Name)
+                    and each.id == name
+                    and isinstance(each.ctx, ast.Load)
+                    for each in ast.walk(scope.function.definition)
+                )
+                if not any(uses):
+                    text = f"'{name}' is a coroutine that is never awaited, so it never runs"
+                    place = Place(scope.module, node.value)
+                    self._evaluator.run.report('missing-await', place, text, 'put await before it')
 
     def _annassign(self, node: ast.AnnAssign, scope: Scope) -> None:
         if node.value is not None:
@@ -113,10 +131,16 @@ class Statements(Part):
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
+                self._evaluator.keep(node.target.attr, UNKNOWN)
+                self._evaluator.waiting.fill(Held('state', node.target.attr))
                 return
         if isinstance(node.target, ast.Subscript):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('own_state'):
+                index = self._evaluator.evaluate(node.target.slice, scope)
+                for each in alternatives(index):
+                    if isinstance(each, Constant):
+                        self._evaluator.keep(f'[{each.value}]', UNKNOWN)
                 return
         is_union = isinstance(node.op, ast.BitOr)
         if isinstance(before, Mapping) and isinstance(value, Mapping) and is_union:
@@ -133,21 +157,34 @@ class Statements(Part):
             if isinstance(target, ast.Name):
                 scope.set(target.id, UNKNOWN)
             elif isinstance(target, ast.Subscript):
-                self._evaluator.read_target(target, scope)
-                self._evaluator.escape(self._evaluator.evaluate(target.value, scope))
+                self._delete_item(target, scope)
             elif isinstance(target, ast.Attribute):
-                self._evaluator.evaluate(target.value, scope)
+                self._evaluator.evaluate(target, scope)
+
+    def _delete_item(self, target: ast.Subscript, scope: Scope) -> None:
+        self._evaluator.read_target(target, scope)
+        owner = self._evaluator.evaluate(target.value, scope)
+        with self._evaluator.run.silence():
+            index = self._evaluator.evaluate(target.slice, scope)
+        if isinstance(owner, Mapping | Sequence) and isinstance(index, Constant):
+            given = Argument(index, Place(scope.module, target.slice))
+            place = Place(scope.module, target)
+            self._evaluator.methods.call(owner, 'pop', Arguments((given,)), place)
+        else:
+            self._evaluator.escape(owner)
 
     # Definitions
 
     def _functiondef(self, node: ast.FunctionDef | ast.AsyncFunctionDef, scope: Scope) -> None:
-        scope.set(node.name, self._evaluator.functions.define_decorated(node, scope))
+        function = self._evaluator.functions.define(node, scope)
+        scope.set(node.name, self._evaluator.functions.decorate(function, node, scope))
 
     _asyncfunctiondef = _functiondef
 
     def _classdef(self, node: ast.ClassDef, scope: Scope) -> None:
         outer = None if scope.function is None else scope
-        scope.set(node.name, Class(scope.module, node, outer))
+        made = Class(scope.module, node, outer)
+        scope.set(node.name, self._evaluator.functions.decorate(made, node, scope))
 
     def _import(self, node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
         for alias in node.names:
@@ -170,6 +207,9 @@ class Statements(Part):
         if isinstance(node.value, _WITHOUT_EFFECT) and is_plain:
             place = Place(scope.module, node.value)
             run.report('no-effect', place, 'this has no effect', 'return it, or remove it')
+        elif isinstance(node.value, ast.Attribute) and _is_method(value):
+            place = Place(scope.module, node.value)
+            run.report('no-effect', place, 'this is not called', f'write {node.value.attr}()')
         elif isinstance(value, Awaitable) and isinstance(node.value, ast.Call):
             called = ast.unparse(node.value.func)
             run.report(
@@ -178,6 +218,9 @@ class Statements(Part):
                 f"'{called}(…)' is never awaited, so it never runs",
                 'put await before it',
             )
+        elif isinstance(value, Primitive) and value.kind == THREAD:
+            place = Place(scope.module, node.value)
+            run.report('no-effect', place, 'this thread is never started', 'write .start()')
         elif isinstance(value, Generated) and isinstance(node.value, ast.Call | ast.GeneratorExp):
             run.report(
                 'no-effect',
@@ -223,12 +266,13 @@ class Statements(Part):
     def _if(self, node: ast.If, scope: Scope) -> None:
         """Follow the branches; a long chain of `elif` is not nested."""
         ends: list[Names | None] = []
-        doubt = 0
+        doubt = decided = 0
         with ExitStack() as branches:
             while True:
                 test = self._evaluator.tested(node.test, scope)
                 truth = truth_of(test)
                 doubt = max(doubt, is_chosen(test) if truth is None else 0)
+                decided = max(decided, is_chosen(test))
                 before = scope.copy_names()
                 self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
                 with self._evaluator.branch(test, is_taken=True):
@@ -249,38 +293,14 @@ class Statements(Part):
                 break
         has_jumped = any(names is None for names in ends)
         scope.names = join_names(ends)
-        if doubt and has_jumped:
+        if has_jumped:
             # Whether the rest is reached is for the file to decide, too.
-            self._evaluator.run.doubt(1, int(doubt == BY_STATE))
+            self._evaluator.run.decided += decided > BY_STATE
+            if doubt:
+                self._evaluator.run.doubt(doubt)
 
     def _match(self, node: ast.Match, scope: Scope) -> None:
-        subject = self._evaluator.evaluate(node.subject, scope)
-        run = self._evaluator.run
-        run.decide(subject)
-        ends: list[Names | None] = []
-        before = scope.copy_names()
-        for case in node.cases:
-            scope.names = None if before is None else dict(before)
-            doubt_rounds(node.subject, scope)
-            for pattern in ast.walk(case.pattern):
-                if isinstance(pattern, ast.MatchValue):
-                    self._evaluator.evaluate(pattern.value, scope)
-                elif isinstance(pattern, ast.MatchClass):
-                    self._evaluator.evaluate(pattern.cls, scope)
-            for name in _captured(case.pattern):
-                scope.set(name, UNKNOWN)
-            if isinstance(case.pattern, ast.MatchAs) and case.pattern.pattern is None:
-                if case.pattern.name:
-                    scope.set(case.pattern.name, subject)
-            elif isinstance(node.subject, ast.Name) and isinstance(case.pattern, ast.MatchClass):
-                scope.set(node.subject.id, UNKNOWN)
-            if case.guard is not None:
-                self._evaluator.evaluate(case.guard, scope)
-            chosen = is_chosen(subject)
-            with run.condition(is_doubt=chosen > 0, by_state=chosen == BY_STATE):
-                self.follow_all(case.body, scope)
-            ends.append(scope.names)
-        scope.names = join_names([before, *ends])
+        self._evaluator.match_cases.follow(node, scope)
 
     # Loops
 
@@ -295,83 +315,17 @@ class Statements(Part):
     # Guards
 
     def _try(self, node: ast.Try, scope: Scope) -> None:
-        run = self._evaluator.run
-        before = scope.copy_names()
-        is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
-        tried = run.tried
-        with run.guard(is_guard=is_guard, is_broad=is_broad):
-            self.follow_all(node.body, scope)
-        after = scope.names
-        if after is not None:
-            self.follow_all(node.orelse, scope)
-        # Only then the file may decide whether it raises.
-        is_doubtful = run.tried > tried
-        ends = [scope.names]
-        caught = join_names([before, after])
-        for handler in node.handlers:
-            scope.names = None if caught is None else dict(caught)
-            if handler.type is not None:
-                self._evaluator.evaluate(handler.type, scope)
-            if handler.name:
-                scope.set(handler.name, UNKNOWN)
-            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
-            with run.condition(is_doubt=is_doubt):
-                self.follow_all(handler.body, scope)
-            ends.append(scope.names)
-        scope.names = join_names(ends)
-        if node.finalbody:
-            is_over = scope.names is None
-            scope.names = caught if scope.names is None else scope.names
-            self.follow_all(node.finalbody, scope)
-            if is_over:
-                scope.names = None
+        self._evaluator.guards.follow_try(node, scope)
 
     _trystar = _try
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
-        for item in node.items:
-            value = self._evaluator.evaluate(item.context_expr, scope)
-            if item.optional_vars is not None:
-                self.store(item.optional_vars, self._evaluator.entered(value), scope)
-        is_guard = any(_suppresses(item.context_expr) for item in node.items)
-        before = scope.copy_names()
-        with self._evaluator.run.guard(is_guard=is_guard):
-            self.follow_all(node.body, scope)
-        if is_guard:
-            scope.names = join_names([before, scope.names])
+        self._evaluator.guards.follow_with(node, scope)
 
     _asyncwith = _with
 
 
-def _is_guard(handler: ast.ExceptHandler) -> bool:
-    """Return whether a handler expects wrong names: it catches them, or ignores everything."""
-    names = {'BaseException'} if handler.type is None else _names_in(handler.type)
-    does_nothing = all(isinstance(each, _DOING_NOTHING) for each in handler.body)
-    return bool(names & _CATCHING) or (does_nothing and bool(names & _CATCHING_ALL))
-
-
-def _is_broad(handler: ast.ExceptHandler) -> bool:
-    """Return whether a handler catches everything, and goes on."""
-    names = {'BaseException'} if handler.type is None else _names_in(handler.type)
-    raises = any(isinstance(node, ast.Raise) for each in handler.body for node in ast.walk(each))
-    return bool(names & _CATCHING_ALL) and not raises
-
-
-def _suppresses(expression: ast.expr) -> bool:
-    if not isinstance(expression, ast.Call) or not _names_in(expression.func) & {'suppress'}:
-        return False
-    caught = {name for argument in expression.args for name in _names_in(argument)}
-    return bool(caught & (_CATCHING | _CATCHING_ALL))
-
-
-def _names_in(expression: ast.expr) -> set[str]:
-    """Return all names in an expression, those of attributes included."""
-    nodes = list(ast.walk(expression))
-    names = {node.id for node in nodes if isinstance(node, ast.Name)}
-    return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-
-
-def _captured(pattern: ast.pattern) -> set[str]:
-    names = {getattr(node, 'name', None) for node in ast.walk(pattern)}
-    names |= {getattr(node, 'rest', None) for node in ast.walk(pattern)}
-    return {name for name in names if name}
+def _is_method(value: Value) -> bool:
+    """Return whether a value does nothing until it is called."""
+    owner = value.owner if isinstance(value, BoundMethod) else None
+    return isinstance(value, Function) or isinstance(owner, NodeValue | PartOfNode | Primitive)

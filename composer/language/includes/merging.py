@@ -106,6 +106,8 @@ class IncludeMerger:
         return keys
 
     def _report_duplicate(self, inclusion: Inclusion, name: str, full: str) -> None:
+        # What it has is missing now, which is the same mistake.
+        self._whole.dropped.add(('include', inclusion.entry.label))
         inner = inclusion.part.chains.get(('nodes', name), ())
         self._whole.diagnostics.append(
             diagnostic_at(

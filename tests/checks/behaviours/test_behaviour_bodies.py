@@ -23,7 +23,9 @@ SYSTEM = """
       cover: {type: nav_msgs/msg/Odometry, external: true}
     subscriptions:
       odom: {type: nav_msgs/msg/Odometry, external: true, behaviour: parts:hear}
-    service_clients: {enable: {type: std_srvs/srv/SetBool, external: true}}
+    service_clients:
+      enable: {type: std_srvs/srv/SetBool, external: true}
+      plan: {type: nav_msgs/srv/GetPlan, external: true}
     action_clients: {count: {type: test_msgs/action/Fibonacci, external: true}}
   camera:
     parameters: {gain: 0.5}
@@ -36,13 +38,23 @@ def use(node):
     node.publish('scan', {})
     node.publish('cover', {})
     node.call('enable', True)
+    node.call('plan', {})
     node.send_goal('count', 3)
     return node.parameters.speed, node.parameters.mode
 """
 HEAD = """
+import asyncio
+import threading
+from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
+from types import SimpleNamespace
+import copy
+import dataclasses
 import functools
+import itertools
 import math
+import random
 from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
 
 
@@ -53,12 +65,42 @@ class Keeper:
     def go(self, payload):
         self.publish('command', payload)
 
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *reason):
+        return None
+
     async def wait(self):
         return await self.node.call_async('enable', True)
 
 
+@dataclasses.dataclass
+class Turn:
+    linear: dict
+    angul: dict  # of VARS
+
+
+Move = namedtuple('Move', 'linear angul')  # of ASDICT
+
+
+def nested(depth):
+    if depth:
+        return nested(depth - 1)
+    return {'angul': {}}  # of NESTED
+
+
+def poses(node):
+    return node.call('plan', {}).plan.poses
+
+
 def pass_on(node, name, payload):
     node.publish(name, payload)
+
+
+async def run_beside(node):
+    await asyncio.sleep(1)
+    await asyncio.gather(asyncio.sleep(1), asyncio.sleep(2))
 
 
 def odometry(node):
@@ -125,14 +167,119 @@ WRONG = {
     "node.publish('scan', {'ranges': 1.0})": 'field-type',
     "node.publish('cover', {'pose': {'covariance': [0.0] * 9}})": 'field-length',
     "node.call('enable', 'yes')": 'field-type',
+    # payloads that are computed
+    "node.publish('command', dict(zip(('linear', 'angul'), ({}, {}))))": 'unknown-field',
+    "node.publish('command', dict.fromkeys(['linear', 'angul'], {}))": 'unknown-field',
+    "node.publish('command', dict([('linear', {}), ('angul', {})]))": 'unknown-field',
+    "node.publish('command', {'linear': {}} | {'angul': {}})": 'unknown-field',
+    "node.publish('command', copy.deepcopy({'angul': {}}))": 'unknown-field',
+    "node.publish('command', {name: {} for name in ('linear', 'angul')})": 'unknown-field',
+    "t = Twist(); [setattr(t, name, Vector3()) for name in ('linear', 'angul')]": 'unknown-field',
+    "node.publish('level', round(m.pose.pose.position.x, 1))": 'field-type',
+    "node.publish('level', divmod(7, 3))": 'field-type',
+    "node.publish('level', 1 << 8)": 'field-range',
+    "node.publish('level', max(100, 256))": 'field-range',
+    "node.publish('level', sum([200, 100]))": 'field-range',
+    "node.publish('level', len('x' * 300))": 'field-range',
+    "node.publish('level', int('2' + '56'))": 'field-range',
+    "for level in (1, 256): node.publish('level', level)": 'field-range',
+    "node.publish('level', '1,2'.split(','))": 'field-type',
+    "node.publish('level', math.pi)": 'field-type',
+    "node.call('enable', sum([True, True]))": 'field-type',
+    "node.publish('cover', {'pose': {'covariance': ([0.0] * 36)[1:]}})": 'field-length',
+    "ranges = [1.0]; ranges.append('x'); node.publish('scan', {'ranges': ranges})": 'field-type',
+    "node.publish('command', {**({'angul': {}} if m.pose else {})})": 'unknown-field',
+    "node.publish('command', {'linear': node.now()})": 'field-type',
+    'for each in Path(poses=[]).poses: each.pose.x = 1.0': 'unknown-field',
+    "node.publish('level', poses)": 'field-type',
+    "node.publish('level', len)": 'field-type',
+    "node.publish('command', Twist)": 'field-type',
+    "node.publish('level', ~0)": 'field-range',
+    "node.publish('level', [1, 2][0:1])": 'field-type',
+    "node.publish('level', {'a': 1, 'b': 300}.get('b'))": 'field-range',
+    "node.publish('level', '%d' % 3)": 'field-type',
+    "node.publish('level', random.choice(['a', 'b']))": 'field-type',
+    "node.publish('scan', {'ranges': list(zip([1.0], [2.0]))})": 'field-type',
+    "node.publish('scan', {'header': {'stamp': node.now().nanoseconds}})": 'field-type',
+    "node.publish('cover', {'pose': {'covariance': sum([[0.0] * 6] * 5, [])}})": 'field-length',
+    "p = {'linear': {}}; p |= {'angul': {}}; node.publish('command', p)": 'unknown-field',
+    # what is read of what holds messages
+    'print([each.positon for each in poses(node) + poses(node)])': 'unknown-field',
+    'by = {p.header.frame_id: p for p in poses(node)}; print(by["map"].positon)': 'unknown-field',
+    'by = {}; by[m.child_frame_id] = m; print(by[m.child_frame_id].positon)': 'unknown-field',
+    'by = {}; by[m.child_frame_id] = m; print([p.positon for p in by.values()])': 'unknown-field',
+    'q = deque(maxlen=3); q.append(m); print(q.popleft().positon)': 'unknown-field',
+    'pair = (m, 1); print(pair[0].positon)': 'unknown-field',
+    "print({'m': m}.get('m').positon)": 'unknown-field',
+    'print((m or None).positon)': 'unknown-field',
+    # what is read of the items of arrays
+    'print(next(each for each in poses(node)).pos)': 'unknown-field',
+    'print([b.pos for a, b in itertools.pairwise(poses(node))])': 'unknown-field',
+    'print([b.pos for a, b in zip(poses(node), poses(node))])': 'unknown-field',
+    'print([each.pos for i, each in enumerate(poses(node), start=1)])': 'unknown-field',
+    'print([each.pos for each in reversed(poses(node))])': 'unknown-field',
+    'found = list(poses(node)); found.sort(key=lambda each: each.pos)': 'unknown-field',
+    'print(sorted(poses(node), key=lambda each: each.pos))': 'unknown-field',
+    'print(max(poses(node), key=lambda each: each.pose.position.x).pos)': 'unknown-field',
+    'print(functools.reduce(lambda total, each: total + each.pos, poses(node), 0))': 'unknown-field',
+    'print(list(filter(lambda each: each.pos, poses(node))))': 'unknown-field',
+    'print(list(map(lambda each: each.pos, poses(node))))': 'unknown-field',
+    'first, *rest = poses(node); print(first.pos)': 'unknown-field',
+    # where a message or the state decides, and not the file alone
+    'if m.pose.pose.position.x < node.parameters.speed: print(m.velocity)': 'unknown-field',
+    'print(m.velocity if abs(m.pose.pose.position.x - node.parameters.speed) > 1 else 0)': 'unknown-field',
+    'print(node.parameters.speed < m.pose.pose.position.x < 3 and m.velocity)': 'unknown-field',
+    'if m.child_frame_id == node.name: node.logger.warn_throttle("near")': 'unknown-attribute',
+    'if node.now().nanoseconds > node.parameters.speed: print(m.velocity)': 'unknown-field',
+    # payloads that are kept, or made elsewhere
+    "kept = node.own_state.setdefault('kept', [0, 0]); node.publish('command', kept)": 'field-type',
+    "node.publish('command', [c for c in 'ab' if c in m.child_frame_id] == [])": 'field-type',
+    'path = Path(); path.poses.append(m)': 'field-type',
+    'Turn(linear={})': 'bad-call',
+    "node.set_parameters('camera', 'gain', 2.0)": 'bad-call',
+    "node.set_parameters('camera', 'gain')": 'bad-call',
     # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
+    'found = [Keeper(node).wait() for _ in range(2)]; print(all(found))': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
+    "kept = node.call_async('enable', True)": 'missing-await',
+    "await node.publish('command', {})": 'missing-await',
+    "await node.call('enable', True)": 'missing-await',
+    "await node.send_goal('count', 1)": 'missing-await',
+    "await node.send_goal('count', 1).result()": 'missing-await',
+    "async for f in node.send_goal('count', 1).feedback: print(f)": 'missing-await',
+    'await asyncio.sleep(m.pose.pose.position.x)': 'no-event-loop',
+    "await asyncio.gather(node.call_async('enable', True))": 'no-event-loop',
+    "await asyncio.wait_for(node.call_async('enable', True), 1)": 'no-event-loop',
+    "async with asyncio.timeout(1): await node.call_async('enable', True)": 'no-event-loop',
+    'node.shutdown': 'no-effect',
+    "node.send_goal('count', 1).cancel": 'no-effect',
+    "threading.Thread(target=pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Timer(1, pass_on(node, 'level', 1)).start()": 'no-effect',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1))": 'no-effect',
+    "node.get_parameters('camera', 'gain')": 'bad-call',
+    "node.set_parameters('camera', {'gain'})": 'bad-call',
+    "print(node.get_parameters('camera', ['gain']).gain)": 'unknown-attribute',
+    'if node.parameters.speed > 1: node.parameters.speed = 1.0': 'unset-parameter',
     'm': 'no-effect',
     'print(mesage)': 'undefined-name',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    'try: print(m.pose.pose.position)\nexcept AttributeError: print(m.pose.position, m.position)',
+    "kept = node.own_state.setdefault('kept', [0]); node.publish('scan', {'ranges': kept})",
+    "node.call('enable', [c for c in 'ab' if c in m.child_frame_id] == [])",
+    'path = Path(); path.poses.append(poses(node)[0])',
+    'print(Turn({}, angul={}), Turn(*m.child_frame_id))',
+    "node.set_parameters('camera', dict(gain=2.0))",
+    "found = [bool(c) for c in 'ab']; print(all(found))",
+    "if node.parameters.mode == 'fast': print(m.velocity)",
+    'if node.parameters.speed > 2: print(m.velocity)',
+    'node.state.distance = node.parameters.speed\nif node.state.distance > 2: print(m.velocity)',
+    "if node.parameters.mode == 'fast': node.state.distance = 3\nif node.state.distance == 3: print(m.velocity)",
+    "node.parameters.mode == 'fast' and m.pose.pose.position.x > 2 and print(m.velocity)",
+    'if node.parameters.speed * 2 > 3: print(m.velocity)',
+    "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})",
     "for n, on in (('command', True), ('other', False)): node.publish(n, {}) if on else None",
     "for n in ('command', 'other'):\n    if m.child_frame_id == n: node.publish(n, {})",
     "for n in ('command', 'other'):\n    if n == 'other': continue\n    node.publish(n, {})",
@@ -152,12 +299,48 @@ RIGHT = [
     'setattr(node.state, m.child_frame_id, 1); print(node.state.anything)',
     "node.logger.info('late', throttle_duration_sec=1.0)",
     "node.publish('scan', {'ranges': map(float, range(3))})",
+    "kept = node.call_async('enable', True); await kept",
+    'await asyncio.sleep(0)',
+    'asyncio.run(run_beside(node))',
+    'threading.Thread(target=lambda: asyncio.run(run_beside(node))).start()',
+    "threading.Thread(target=pass_on, args=(node, 'level', 1)).start()",
+    "thread = threading.Thread(target=functools.partial(pass_on, node, 'level', 1)); thread.start()",
+    "print(node.get_parameters('camera', ['gain'])['gain'], node.get_parameters('camera', ('gain',)))",
+    "values = {'gain': 1.0}; node.set_parameters('camera', values)",
+    'async with Keeper(node): pass',
+    'stop = node.shutdown; print(stop)',
+    "node.publish('level', round(m.pose.pose.position.x))",
+    "node.publish('level', round(m.pose.pose.position.x, None))",
+    "names = ['comand', 'command']; del names[0]; node.publish(names[0], {})",
+    "names = ['comand', 'command']; names.sort(reverse=True); node.publish(names[1][:3] + 'mand', {})",
+    "node.publish(*({'command': 1, 'comand': 2}.keys() - {'comand'}), {})",
+    "node.publish(max(['comand', 'command'], key=len), {})",
+    "parts = [m.child_frame_id]; node.publish(*parts, 'command')",
+    "for i in range(3):\n    if i == m.twist.twist.linear.x: break\nelse: node.publish('never', 1)",
+    'if m.__class__ in (Twist,): print(m.linear)',
+    "match 3:\n    case str(): node.publish('level', 'three')\n    case int(level): node.publish('level', level)",
+    "by = {'a': m}; by[m.child_frame_id] = Twist(); print(by['b'].linear, by['a'].linear)",
+    "node.publish('level', random.choice([1, 'x']))",
+    'q = deque([m], maxlen=3); q.appendleft(m); q.rotate(); print(q.pop().pose, tuple([m]).count(m))',
+    'q = deque(maxlen=3); q.extend([m, m]); print(q.maxlen, q[0].pose, list(q).sort())',
+    's = set(); s.add(1); s.update([2]); s.discard(1); print(s.pop() + 1, frozenset(s).union(s))',
+    "c = Counter('abc'); c.update('d'); print(c.most_common(1)[0][0], c['a'] + 1, c.total())",
+    "d = defaultdict(list); d['a'].append(m); print(d['a'][0].pose, d.default_factory)",
+    "o = OrderedDict(a=1); o.move_to_end('a'); print(o.popitem(last=False))",
+    'i = iter([1, 2]); next(i); print(next(i), list(i), i.__next__)',
+    'z = zip([1], [2]); print(next(z)[0] + 1, list(z)); e = enumerate([1]); print(next(e))',
+    'v = {1: 2}.items(); print(v.isdisjoint([]), {1: 2}.keys() | {3}, len(v), sorted(v)[0][0])',
+    "print((5).real, (5.5).is_integer(), (5).to_bytes(2, 'big').hex(), 'a'.encode().decode().upper())",
+    "print(range(3).start, range(3)[1].bit_length(), slice(1, 2).start, 'ab'[0].upper())",
+    "t = Twist(); t.linear = {'x': 1.0}; node.publish('command', t)",
+    "try: node.parameters.get(m)\nexcept AttributeError: pass\nelse: node.publish('never', 1)",
 ]
 
 
 def check_line(check, line):
     body = indent(line, '    ')
-    code = f'{HEAD}\n\ndef hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
+    kind = 'async def' if 'await ' in line or 'async ' in line else 'def'
+    code = f'{HEAD}\n\n{kind} hear(node, m):\n    use(node)\n{body}\n{USE_ALL}'
     found = check(SYSTEM, code)
     return code.splitlines().index(body.splitlines()[0]) + 1, found
 
@@ -167,6 +350,41 @@ def check_line(check, line):
 def test_what_is_wrong_is_found_in_its_line(check, line, rule):
     number, found = check_line(check, line)
     assert found == [(number, rule)]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('lines', 'mark'),
+    [
+        (
+            'if m.child_frame_id != node.parameters.mode: return\nprint(m.velocity)  # here',
+            '# here',
+        ),
+        (
+            'limit = node.parameters.speed\nif m.pose.pose.position.x > limit: return\n'
+            'print(m.velocity)  # here',
+            '# here',
+        ),
+        (
+            'if node.state.distance > 3: return\nnode.state.distance += 1.0\n'
+            'print(m.velocity)  # here',
+            '# here',
+        ),
+        (
+            "t = SimpleNamespace(linear={}, angul={})  # here\nnode.publish('command', vars(t))",
+            '# here',
+        ),
+        ("node.publish('command', nested(2))", '# of NESTED'),
+        ("node.publish('command', Move({}, {})._asdict())", '# of ASDICT'),
+        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of VARS'),
+        ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
+    ],
+)
+def test_a_field_is_found_where_it_is_written(check, lines, mark):
+    _, found = check_line(check, lines)
+    code = f'{HEAD}\n\ndef hear(node, m):\n    use(node)\n{indent(lines, "    ")}\n'
+    number = next(at for at, text in enumerate(code.splitlines(), 1) if text.endswith(mark))
+    assert found == [(number, 'unknown-field')]
 
 
 @pytest.mark.ros
@@ -184,6 +402,116 @@ def test_an_idiom_has_no_finding(folder, monkeypatch):
     monkeypatch.chdir(folder.parent)
     found = check_system(load_system(Path('system.yaml')), InterfaceCatalogue())
     assert [render_finding(each) for each in found] == []
+
+
+ANSWERS = """
+  rover:
+    parameters: {speed: 1.0}
+    actions:
+      drive: {type: test_msgs/action/Fibonacci, behaviour: parts:drive, accept: parts:accept}
+    on_parameters: parts:on_parameters
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('answer', 'are_wrong'),
+    [
+        ('GoalResponse.ACCEPT', (True, True)),
+        ('SetParametersResult(successful=True)', (True, True)),
+        ('{"successful": True}', (True, True)),
+        ('True', (False, True)),
+        ('None', (False, False)),
+        ('"too fast" if node.parameters.speed else None', (False, False)),
+    ],
+)
+def test_an_answer_says_whether_or_why_not(check, answer, are_wrong):
+    code = f"""
+        from rcl_interfaces.msg import SetParametersResult
+        from rclpy.action import GoalResponse
+        def accept(node, goal):
+            return {answer}
+        def on_parameters(node, changes):
+            return {answer}
+        def drive(node, goal):
+            return {{}}
+        """
+    found = [(5, 'bad-answer'), (7, 'bad-answer')]
+    wanted = [each for each, is_wrong in zip(found, are_wrong, strict=True) if is_wrong]
+    assert check(ANSWERS, code) == wanted
+
+
+KEPT = """
+  rover:
+    state: {last: null, count: 0}
+    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
+    subscriptions:
+      odom: {type: nav_msgs/msg/Odometry, external: true, behaviour: parts:hear}
+    timers: {tick: {period: 1.0, behaviour: parts:tick, publish: level}}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('kept', 'read', 'rule'),
+    [
+        ('state.last = m', 'state.last.positon', 'unknown-field'),
+        ('state.last = m', 'state.last and node.state.last.pose.positon', 'unknown-field'),
+        ('state.last = node.now()', '(node.now() - node.state.last).seconds', 'unknown-attribute'),
+        ('state.last = m if m.child_frame_id else node.now()', 'state.last.nanoseconds', None),
+        ('state.count = m', 'state.count.positon', None),
+        ('state.last = m; setattr(node.state, str(m), 3)', 'state.last.positon', None),
+        ('state.last = m; node.state.last += 1', 'state.last.positon', None),
+    ],
+)
+def test_what_is_kept_in_the_state_is_known_to_other_behaviours(check, kept, read, rule):
+    read = read if read.startswith('(') else f'node.{read}'
+    code = f'def hear(node, m):\n    node.{kept}\n\n\ndef tick(node):\n    print({read})\n    return 1\n'
+    assert check(KEPT, code) == ([(6, rule)] if rule else [])
+
+
+@pytest.mark.ros
+def test_what_a_behaviour_keeps_for_itself_is_known_to_it(check):
+    code = """
+        def hear(node, m):
+            before = node.own_state.get('before')
+            if before is not None:
+                print(before.positon)
+            node.own_state['before'] = m
+
+
+        def tick(node):
+            begin = node.own_state.setdefault('begin', node.now())
+            yield (node.now() - begin).seconds
+            return 'high'
+        """
+    found = check(KEPT, code)
+    assert found == [(5, 'unknown-field'), (11, 'unknown-attribute'), (12, 'field-type')]
+
+
+UNPUBLISHED = """
+  rover:
+    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
+    timers:
+      tick: {period: 1.0, behaviour: parts:tick}
+      send: {period: 1.0, behaviour: parts:send, publish: level}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('code', 'found'),
+    [
+        ('def tick(node):\n    return {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    yield {"data": 1}\n', [(2, 'no-effect')]),
+        ('def tick(node):\n    return 1\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nprint(tick)\n', []),
+        ('def tick(node):\n    return {"data": 1}\n\n\nsend = tick\n', []),
+    ],
+)
+def test_a_payload_is_for_something(check, code, found):
+    other = '' if 'send' in code else '\n\ndef send(node):\n    return 1\n'
+    assert check(UNPUBLISHED, code + other) == found
 
 
 def test_a_comment_in_python_silences_a_finding(check):

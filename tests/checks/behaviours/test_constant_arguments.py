@@ -78,7 +78,8 @@ def test_the_monitor_says_what_it_takes(check, behaviour, wrong, wanted):
         ('scan', '', False),
         ('scna', '', True),
         ('image', '', True),
-        ('scna', 'on_start: parts:start', False),
+        ('scna', 'on_start: parts:start', True),
+        ('scna', 'on_start: parts:count_all', False),
         ('scna', 'on_start: 3', False),
         ('"{{ topic }}"', '', False),
     ],
@@ -96,7 +97,13 @@ def test_what_is_watched_is_counted(check, topic, more, is_found):
     {more}
 """
     before = 'args: {topic: {type: string}}\n'
-    found = check(nodes, 'def start(node): ...', before=before, rule='bad-argument')
+    start = 'def start(node): ...'
+    code = (
+        'from behaviours.monitor import count\ndef count_all(node): ...'
+        if 'all' in more
+        else start
+    )
+    found = check(nodes, code, before=before, rule='bad-argument')
     assert found == ["nothing in node 'n' counts the messages of '" + topic + "'"] * is_found
 
 

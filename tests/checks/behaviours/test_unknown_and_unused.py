@@ -40,6 +40,7 @@ def test_a_name_that_the_node_does_not_declare_is_a_finding(check, line):
     'line',
     [
         "if node.name == 'b': node.publish('outt', 1)",
+        "node.parameters.get('spee_limit', 1.0)",
         "if 'limit' in node.parameters: print(node.parameters.limit)",
         "if hasattr(node.parameters, 'limit'): print(node.parameters.limit)",
         "print(node.parameters.get('limit', 1.0))",
@@ -50,6 +51,14 @@ def test_a_name_that_the_node_does_not_declare_is_a_finding(check, line):
 )
 def test_a_behaviour_that_copes_without_is_right(check, line):
     assert check(NODE, run(USES_ALL, line) + 'import contextlib\n') == []
+
+
+def test_an_abbreviated_name_that_has_a_default_is_a_finding(check):
+    text = NODE.replace('speed', 'maximum_speed')
+    code = run("print(node.parameters.get('max_speed', 1.0)); node.publish('out', 'hello')")
+    assert check(text, code) == [(2, 'missing-parameter')]
+    older = "print(node.parameters.get('max_speed', node.parameters.maximum_speed))"
+    assert check(text, run(older, "node.publish('out', 'hello')")) == []
 
 
 def test_a_parameter_may_be_declared_with_rclpy(check):
@@ -155,7 +164,10 @@ def test_what_nodes_share_is_used_if_one_of_them_uses_it(check):
         ('int | str', 'three', True),
         ('int | None', 'three', False),
         ('Path', '3', True),
-        ('list[int]', '3', True),
+        ('list[int]', '3', False),
+        ('list[int]', '[3]', True),
+        ('list[int]', '[a]', False),
+        ('dict[str, int]', '[3]', False),
     ],
 )
 def test_a_constant_argument_is_of_the_annotated_type(check, annotation, value, fits):

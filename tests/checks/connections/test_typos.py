@@ -214,3 +214,14 @@ processes:
   driver: {command: [true], remap: {a//b: c, d: e f, g: /h}}
 """
     assert check(nodes) == [(5, 'bad-name'), (5, 'bad-name')]
+
+
+def test_a_rule_of_a_node_that_is_left_out_is_checked_as_any_other(check):
+    nodes = """
+  n:
+    when: false
+    remap: {imgae: picture}
+    subscriptions: {image: {type: std_msgs/msg/String, behaviour: b:f}}
+"""
+    message = "node 'n' has nothing called '/imgae', and ROS ignores the rule"
+    assert check(nodes, CODE, rule=RULE, installed=False) == [message]

@@ -1,0 +1,168 @@
+"""Behaviours do not wait for what only others of their own callback group can bring about."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from composer.checks.behaviours.behaviour_bodies import bound_at
+from composer.checks.connections.deadlocks import group_in
+from composer.diagnostics import Related, diagnostic_at
+from composer.inference.evaluation.waiting import FILLING, shown
+from composer.inference.values import Held
+from composer.language.bindings import node_bindings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from collections.abc import Set as AbstractSet
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic, Span
+    from composer.inference.reading import Awaited, Block, Reading
+    from composer.language.bindings import Binding
+    from composer.language.specs import NodeSpec
+
+# What brings about what is waited for.
+_VERBS = {
+    'queue.LifoQueue': 'fills',
+    'queue.PriorityQueue': 'fills',
+    'queue.Queue': 'fills',
+    'queue.SimpleQueue': 'fills',
+    'threading.Barrier': 'comes to',
+    'threading.Condition': 'notifies',
+    'threading.Semaphore': 'releases',
+}
+_Read: TypeAlias = 'tuple[NodeSpec, Binding, Reading]'
+
+
+def check_blocked_groups(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check what behaviours wait for in their threads; each place once."""
+    every = [
+        (node, binding, context.behaviours.read(node, binding))
+        for node in context.spec.nodes.values()
+        for binding in node_bindings(node)
+        if not context.was_dropped(binding.behaviour.path)
+    ]
+    found: dict[Span, Diagnostic] = {}
+    for waiter in every:
+        for block in waiter[2].blocks:
+            fillers = _find_fillers(context, waiter, block.what, every)
+            if fillers and all(_is_blocked(waiter, each) for each in fillers):
+                found.setdefault(block.place, _explain(context, waiter, block, fillers[0]))
+        for seconds, place, length in waiter[2].sleeps:
+            if _is_long(waiter, seconds, every):
+                related = _elsewhere(place, [('until then', length)])
+                finding = _explain_length(context, waiter[1], seconds, place)
+                found.setdefault(place, finding.with_related(related))
+    yield from found.values()
+
+
+def _is_long(waiter: _Read, seconds: float, every: list[_Read]) -> bool:
+    """Return whether a behaviour keeps others of its group, or its own timer, from running."""
+    node, binding, _ = waiter
+    group, entity = group_in(node, binding), binding.entity
+    limit = getattr(entity, 'warn_after_sec', None)
+    if (
+        group is None
+        or limit is None
+        or seconds < limit
+        or not getattr(binding.kind, 'has_group', 0)
+    ):
+        return False
+    others = (group_in(other, each) == group for other, each, _ in every if each is not binding)
+    return any(others) or seconds > getattr(entity, 'period_sec', seconds)
+
+
+def _explain_length(
+    context: CheckContext, binding: Binding, seconds: float, place: Span
+) -> Diagnostic:
+    return diagnostic_at(
+        place,
+        'long-sleep',
+        f'{binding.owner} does nothing for {seconds:g} s here, and nothing else of its callback '
+        'group runs meanwhile',
+        help='let a timer do the rest, or a generator, which a timer resumes',
+        related=[bound_at(context, binding)],
+    )
+
+
+def _find_fillers(
+    context: CheckContext, waiter: _Read, what: Awaited, every: list[_Read]
+) -> list[_Read]:
+    """Return the behaviours that bring about what one waits for; none if others may."""
+    node, _, waiting = waiter
+    several = every
+    if _is_of_state(what):
+        # Each node has its own.
+        several = [each for each in every if each[0] is node]
+        if any(reading.is_state_open for _, _, reading in several):
+            return []
+    if waiting.reaches_ros or what in waiting.asked or getattr(what, 'is_lost', False):
+        return []
+    # Those who wait at a barrier are those who open it.
+    if what in waiting.fills and what.kind != 'threading.Barrier':
+        return []
+    fillers = [each for each in several if each is not waiter and _may_fill(each[2], what)]
+    is_beside = any(False in reading.fills.get(what, ()) for _, _, reading in fillers)
+    names: AbstractSet[str] = FILLING.get(what.kind) or {_name_of(what)}
+    for _, _, reading in several:
+        if names & context.behaviours.mentions(reading).attributes:
+            return []
+    return [] if is_beside or not any(what in each[2].fills for each in fillers) else fillers
+
+
+def _name_of(what: Awaited) -> str:
+    return what.name if isinstance(what, Held) else ''
+
+
+def _may_fill(reading: Reading, what: Awaited) -> bool:
+    """Return whether a behaviour brings something about, or changes it in another way."""
+    if what in reading.fills:
+        return True
+    return _is_of_state(what) and any(use.name == _name_of(what) for use in reading.state_read)
+
+
+def _is_of_state(what: Awaited) -> bool:
+    return isinstance(what, Held) and (what.kind == 'state' or what.kind in FILLING)
+
+
+def _is_blocked(waiter: _Read, filler: _Read) -> bool:
+    """Return whether a behaviour cannot run while another one waits."""
+    (node, binding, _), (other, filling, _) = waiter, filler
+    if binding.owner == 'on_start':
+        if filling.kind is None:
+            return False
+        # What serves may do so from the start of its node on.
+        return other is node or (not node.wait_for and filling.kind.channel in (None, 'topic'))
+    group = group_in(node, binding)
+    return group is not None and group == group_in(other, filling)
+
+
+def _explain(context: CheckContext, waiter: _Read, block: Block, filler: _Read) -> Diagnostic:
+    _, binding, _ = waiter
+    _, filling, _ = filler
+    verb = _VERBS.get(block.what.kind, 'sets')
+    if binding.owner == 'on_start':
+        reason = f'which only {filling.owner} {verb}, and that runs after it'
+        help_text = 'do the rest in the behaviour that it comes to'
+    else:
+        reason = (
+            f'which only {filling.owner} of the same callback group {verb}: neither can continue'
+        )
+        help_text = f'give {filling.owner} a group of its own, or do the rest there'
+    return diagnostic_at(
+        block.place,
+        'blocked-group',
+        f'{binding.owner} waits for {shown(block.what)}, {reason}',
+        help=help_text,
+        related=[
+            *_elsewhere(block.place, block.related),
+            bound_at(context, binding),
+            bound_at(context, filling),
+        ],
+    )
+
+
+def _elsewhere(place: Span, several: Iterable[tuple[str, Span]]) -> list[Related]:
+    """Return the places that are in other lines."""
+    here = (place.source, place.line)
+    return [Related(text, span) for text, span in several if (span.source, span.line) != here]

@@ -1,0 +1,1 @@
+"""Evaluate the classes of behaviours, and their objects."""

@@ -1,0 +1,169 @@
+"""Fields of dataclasses and named tuples."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.inference.evaluation.part import Part
+from composer.inference.values import (
+    UNKNOWN,
+    Arguments,
+    Class,
+    External,
+    Instance,
+    Place,
+    Value,
+)
+from composer.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Container
+
+
+@record
+class _Field:
+    """A field, and the class that declares it."""
+
+    name: str
+    of: Class
+    target: ast.expr
+    default: ast.expr | None
+    kind: str
+
+
+class MadeFields(Part):
+    """Evaluates the fields of objects whose `__init__` Python writes."""
+
+    def has_fields(self, of: Class) -> bool:
+        """Return whether Python writes the `__init__` of a class from its fields."""
+        return self.is_tuple(of) or self._is_dataclass(of) or self.is_namespace(of)
+
+    def is_tuple(self, of: Class) -> bool:
+        """Return whether a class is that of a named tuple."""
+        return 'typing.NamedTuple' in self._evaluator.classes.bodies.externals(of)
+
+    def _is_dataclass(self, of: Class) -> bool:
+        return any(
+            isinstance(each, Class) and 'dataclasses.dataclass' in self._decorators(each)
+            for each in self._evaluator.classes.bodies.line_of(of)
+        )
+
+    def _decorators(self, of: Class) -> set[str]:
+        found = set()
+        for each in of.definition.decorator_list:
+            bare = each.func if isinstance(each, ast.Call) else each
+            value = self._evaluator.classes.bodies.evaluate_in(of, bare)
+            if isinstance(value, External):
+                found.add(value.name)
+        return found
+
+    def _fields(self, of: Class) -> dict[str, _Field]:
+        """Return the fields of a class, those of its bases first."""
+        found: dict[str, _Field] = {}
+        line = self._evaluator.classes.bodies.line_of(of)
+        for each in reversed([each for each in line if isinstance(each, Class)]):
+            for statement in each.definition.body:
+                match statement:
+                    case ast.AnnAssign(target=ast.Name(id=name) as target, value=default):
+                        kind = _kind_of(statement)
+                        if kind != 'ClassVar':
+                            found[name] = _Field(name, each, target, default, kind)
+        return found
+
+    def is_namespace(self, of: Class) -> bool:
+        """Return whether a class is that of a plain namespace."""
+        return 'types.SimpleNamespace' in self._evaluator.classes.bodies.externals(of)
+
+    def store(self, instance: Instance, arguments: Arguments) -> None:
+        """Store the arguments of a call in the fields, and the defaults of others."""
+        fields = self._fields(instance.of)
+        for name, argument in arguments.named:
+            instance.set(name, argument.value)
+        marks = [name for name, field in fields.items() if field.kind == 'KW_ONLY']
+        by_position = [name for name, field in fields.items() if field.kind in ('', 'InitVar')]
+        if marks:
+            before = list(fields)[: list(fields).index(marks[0])]
+            by_position = [name for name in by_position if name in before]
+        given = dict(zip(by_position, arguments.positional, strict=False))
+        given |= dict(arguments.named)
+        if not arguments.is_open:
+            self._check_missing(instance.of, fields, given)
+        for name, field in fields.items():
+            if name in given:
+                instance.set(name, given[name].value)
+            elif field.default is not None and not arguments.is_open:
+                instance.set(name, self._default(field))
+            else:
+                instance.set(name, UNKNOWN)
+        extra = [name for name, field in fields.items() if field.kind == 'InitVar']
+        values = [instance.attributes.get(name, UNKNOWN) for name in extra]
+        self._evaluator.classes.call_method(instance, '__post_init__', *values)
+
+    def _check_missing(self, of: Class, fields: dict[str, _Field], given: Container[str]) -> None:
+        """Report fields without a default that a call leaves out."""
+        calls = self._evaluator.call_places
+        bases = self._evaluator.classes.bodies.line_of(of)
+        is_made = any(isinstance(each, ast.Call) for each in of.definition.decorator_list)
+        if not calls or is_made or not all(isinstance(each, Class | External) for each in bases):
+            return
+        missing = [
+            name
+            for name, field in fields.items()
+            if field.kind in ('', 'InitVar') and field.default is None and name not in given
+        ]
+        if missing:
+            text = f"'{of.definition.name}' is called with other arguments than it takes: "
+            text += f"missing a required argument: '{missing[0]}'"
+            self._evaluator.run.report('bad-call', calls[-1], text)
+
+    def _default(self, field: _Field) -> Value:
+        bodies = self._evaluator.classes.bodies
+        default = field.default
+        value: Value = UNKNOWN
+        if isinstance(default, ast.Call):
+            maker = bodies.evaluate_in(field.of, default.func)
+            if maker == External('dataclasses.field'):
+                given = {each.arg: each.value for each in default.keywords}
+                if 'default' in given:
+                    value = bodies.evaluate_in(field.of, given['default'])
+                elif 'default_factory' in given:
+                    factory = bodies.evaluate_in(field.of, given['default_factory'])
+                    place = Place(field.of.module, given['default_factory'])
+                    value = self._evaluator.calls.invoke(factory, Arguments(), place)
+                return value
+        if default is not None:
+            value = bodies.evaluate_in(field.of, default)
+        return value
+
+    def fields_of(self, owner: Instance) -> dict[str, tuple[Value, Place]] | None:
+        """Return the fields of an object, and where each is declared."""
+        if not self.has_fields(owner.of):
+            return None
+        if self.is_namespace(owner.of):
+            place = Place(owner.of.module, owner.of.definition)
+            return {name: (value, place) for name, value in owner.attributes.items()}
+        return {
+            name: (owner.attributes.get(name, UNKNOWN), Place(field.of.module, field.target))
+            for name, field in self._fields(owner.of).items()
+        }
+
+    def items_of(self, owner: Instance) -> list[Value] | None:
+        """Return the items of a named tuple; `None` for other objects."""
+        if not self.is_tuple(owner.of):
+            return None
+        return [owner.attributes.get(name, UNKNOWN) for name in self._fields(owner.of)]
+
+
+def _kind_of(statement: ast.AnnAssign) -> str:
+    """Return what is special about a field: `no init` is set by the class itself."""
+    for mark in ('ClassVar', 'InitVar', 'KW_ONLY'):
+        if mark in ast.unparse(statement.annotation):
+            return mark
+    if isinstance(statement.value, ast.Call):
+        for keyword in statement.value.keywords:
+            if keyword.arg == 'init' and ast.unparse(keyword.value) == 'False':
+                return 'no init'
+            if keyword.arg == 'kw_only' and ast.unparse(keyword.value) == 'True':
+                return 'no init'
+    return ''

@@ -1,0 +1,1 @@
+"""What Python and its library make of values."""

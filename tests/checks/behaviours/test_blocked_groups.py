@@ -1,0 +1,215 @@
+"""Behaviours that wait for ever, or for long, and those that only look like it."""
+
+from textwrap import indent
+
+import pytest
+
+SYSTEM = """
+  rover:
+    state: {ready: false, items: [], event: null}
+    subscriptions:
+      go: {type: std_msgs/msg/Empty, behaviour: parts:go, external: true}
+    timers:
+      tick: {period: 1, behaviour: parts:tick}
+"""
+HEAD = """
+import concurrent.futures
+import queue
+import threading
+import time
+from queue import Queue
+from threading import Event, Thread
+
+GO, LATER, BY_HAND = Event(), Event(), threading.Event()
+JOBS, LAST = queue.Queue(), queue.LifoQueue()
+CAME = threading.Condition()
+FREE = threading.Semaphore(0)
+ANSWER = concurrent.futures.Future()
+LOCK, AGAIN = threading.Lock(), threading.RLock()
+READY = False
+
+
+class Gate:
+    def __init__(self):
+        self.opened = Event()
+
+    def open(self):
+        self.opened.set()
+
+    def wait(self):
+        self.opened.wait()
+
+
+GATE = Gate()
+
+
+def wait_until(condition, pause=0.1):
+    while not condition():
+        time.sleep(pause)
+
+
+def add(node):
+    with LOCK:
+        node.state.items.append(1)
+
+
+def go(node, message):
+    global READY
+    READY = True
+    node.state.ready = True
+    GO.set()
+    GATE.open()
+    JOBS.put(1)
+    LAST.put(1)
+    with CAME:
+        CAME.notify_all()
+    FREE.release()
+    ANSWER.set_result(1)
+    node.state.event.set()
+    Thread(target=BY_HAND.set).start()
+"""
+# By the rule: what each is in line with.
+WRONG = {
+    'GO.wait()': 'blocked-group',
+    'GO.wait(None)': 'blocked-group',
+    'GO.clear(); GO.wait()': 'blocked-group',
+    'if not GO.wait(): return': 'blocked-group',
+    'if node.state.items: GO.wait()': 'blocked-group',
+    'wait = GO.wait; wait()': 'blocked-group',
+    'GATE.wait()': 'blocked-group',
+    'GATE.opened.wait()': 'blocked-group',
+    'node.state.event.wait()': 'blocked-group',
+    'job = JOBS.get()': 'blocked-group',
+    'job = JOBS.get(block=True)': 'blocked-group',
+    'job = LAST.get()': 'blocked-group',
+    'with CAME: CAME.wait()': 'blocked-group',
+    'with CAME: CAME.wait_for(lambda: node.state.items)': 'blocked-group',
+    'FREE.acquire()': 'blocked-group',
+    'print(ANSWER.result())': 'blocked-group',
+    't = Thread(target=GO.wait); t.start(); t.join()': 'blocked-group',
+    'while not node.state.ready: time.sleep(0.1)': 'blocked-group',
+    'while not node.state.ready: pass': 'blocked-group',
+    'while node.state.ready is False: time.sleep(0.1)': 'blocked-group',
+    'while True:\n    if node.state.ready: break\n    time.sleep(0.1)': 'blocked-group',
+    'wait_until(lambda: node.state.ready)': 'blocked-group',
+    'while not READY: time.sleep(0.1)': 'blocked-group',
+    'with LOCK: add(node)': 'blocked-group',
+    'with LOCK:\n    with LOCK: pass': 'blocked-group',
+    'LOCK.acquire(); add(node); LOCK.release()': 'blocked-group',
+    'time.sleep(60)': 'long-sleep',
+    'if node.state.ready: time.sleep(2 * 30)': 'long-sleep',
+    'end = time.monotonic() + 30\nwhile time.monotonic() < end: pass': 'long-sleep',
+    'begun = time.time()\nwhile time.time() - begun < 30: time.sleep(1)': 'long-sleep',
+    'end = node.now().nanoseconds + 30 * 10**9\nwhile node.now().nanoseconds < end: pass': 'long-sleep',
+}
+RIGHT = [
+    'GO.wait(0.5)',
+    'GO.wait(timeout=node.state.items)',
+    'if GO.is_set(): GO.wait()',
+    'LATER.wait()',
+    'BY_HAND.wait()',
+    'GO.set(); GO.wait()',
+    'if not JOBS.empty(): job = JOBS.get()',
+    'job = JOBS.get(timeout=1)',
+    'job = JOBS.get(False)',
+    'job = JOBS.get_nowait()',
+    'JOBS.put(1); job = JOBS.get()',
+    'Thread(target=GO.wait).start()',
+    'Thread(target=lambda: JOBS.get()).start()',
+    't = Thread(target=GO.wait); t.start(); t.join(1.0)',
+    'with CAME: CAME.wait(1.0)',
+    'FREE.acquire(blocking=False)',
+    'print(ANSWER.result(1.0))',
+    'print(ANSWER.done() and ANSWER.result())',
+    'while not node.state.ready and node.now().nanoseconds < 9: time.sleep(0.1)',
+    'while not node.state.ready:\n    if GO.wait(1): return\n',
+    'tries = 0\nwhile not node.state.ready and tries < 9: tries += 1',
+    'while not node.state.ready: node.state.ready = True',
+    'while not node.state.items: node.state.items.append(1)',
+    'for _ in range(9):\n    if node.state.ready: break\n    time.sleep(0.1)',
+    'with AGAIN:\n    with AGAIN: pass',
+    'with LOCK: pass\nadd(node)',
+    'with LOCK: Thread(target=add, args=(node,)).start()',
+    'if LOCK.acquire(blocking=False): LOCK.release()',
+    'LOCK.acquire(); LOCK.release(); add(node)',
+    'time.sleep(0.5)',
+    'Thread(target=lambda: time.sleep(60)).start()',
+    'end = time.monotonic() + 0.5\nwhile time.monotonic() < end: pass',
+    'end = time.monotonic() + 30\nwhile time.monotonic() < end:\n    if GO.wait(1): return',
+]
+
+
+def check_body(check, body, system=SYSTEM):
+    code = f'{HEAD}\n\ndef tick(node):\n{indent(body, "    ")}\n'
+    return check(system, code, installed=False)
+
+
+@pytest.mark.parametrize(('body', 'rule'), WRONG.items(), ids=WRONG)
+def test_a_behaviour_that_keeps_its_group_is_found(check, body, rule):
+    assert {found for _, found in check_body(check, body)} == {rule}
+
+
+@pytest.mark.parametrize('body', RIGHT)
+def test_a_wait_that_ends_is_none(check, body):
+    assert check_body(check, body) == []
+
+
+@pytest.mark.parametrize('body', [each for each in WRONG if 'LOCK' not in each])
+def test_in_a_group_of_its_own_a_behaviour_may_wait(check, body):
+    alone = SYSTEM.replace('parts:tick', 'parts:tick, group: other').replace(
+        'period: 1', 'period: 99'
+    )
+    assert check_body(check, body, alone) == []
+
+
+@pytest.mark.parametrize('wait', ['GO.wait()', 'while not node.state.ready: time.sleep(0.1)'])
+def test_on_start_waits_for_nothing_that_runs_after_it(check, wait):
+    nodes = SYSTEM.replace('    timers:\n      tick: {period: 1, behaviour: parts:tick}\n', '')
+    nodes += '    on_start: parts:tick\n'
+    assert [rule for _, rule in check_body(check, wait, nodes)] == ['blocked-group']
+
+
+def test_behaviours_of_other_nodes_run_during_an_on_start_that_waited(check):
+    first, rest = SYSTEM.split('    timers:')
+    del rest
+    nodes = f"""{first}
+  late:
+    on_start: parts:tick
+"""
+    assert len(check_body(check, 'GO.wait()', nodes)) == 1
+    assert check_body(check, 'GO.wait()', f'{nodes}    wait_for: {{topic: go}}\n') == []
+
+
+def test_of_two_who_meet_at_a_barrier_neither_may_wait_for_the_other(check):
+    code = """
+        import threading
+
+        BOTH = threading.Barrier(2)
+
+        def go(node, message):
+            BOTH.wait()
+
+        def tick(node):
+            BOTH.wait()
+    """
+    nodes = SYSTEM.replace('state', 'description').replace(
+        '{ready: false, items: [], event: null}', 'x'
+    )
+    assert check(nodes, code, installed=False) == [(7, 'blocked-group'), (10, 'blocked-group')]
+
+
+def test_another_node_sets_what_a_node_waits_for(check):
+    other = SYSTEM.replace(
+        '    timers:', '  other:\n    state: {ready: false, items: [], event: null}\n    timers:'
+    )
+    assert check_body(check, 'GO.wait()', other) == []
+
+
+def test_a_wait_for_two_names_of_which_each_may_come_is_left_alone(check):
+    assert check_body(check, 'while not (node.state.ready or READY): time.sleep(0.1)') == []
+
+
+@pytest.mark.parametrize('value', ['60', 'null'])
+def test_who_says_that_a_behaviour_may_take_long_is_believed(check, value):
+    nodes = SYSTEM.replace('period: 1', f'warn_after: {value}, period: 1')
+    assert check_body(check, 'time.sleep(30)', nodes) == []
