@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError, UsageError
@@ -18,7 +18,7 @@ from composer.runtime.health.system_state import Outcome
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from composer.planning.snapshot import Snapshot
 
@@ -116,36 +116,42 @@ class Client:
             return systems[0]
         raise self._explain(name, [each.name for each in systems])
 
-    def ask(
-        self, system: RunningSystem, command: str, timeout_sec: float, node: str | None = None
-    ) -> Outcome:
+    def ask(self, system: RunningSystem, command: str, timeout_sec: float) -> Outcome:
         """Give a system a command, and return its answer.
-
-        Args:
-            node: The full name of the node that it is about, for `restart`.
 
         Raises:
             ComposerError: It did not answer in time, or ended before it did.
         """
-        from rcl_interfaces.msg import Parameter as ParameterMessage
-        from rcl_interfaces.msg import ParameterType, ParameterValue
-        from rcl_interfaces.srv import SetParametersAtomically
+        with self.asking(system, command) as ask:
+            return ask(timeout_sec)
+
+    @contextmanager
+    def asking(self, system: RunningSystem, command: str) -> Iterator[Callable[[float], Outcome]]:
+        """Yield what does as `ask`, given the longest time, as often as it is called."""
         from std_srvs.srv import Trigger
 
-        request: Any = Trigger.Request()
-        service: Any = Trigger
-        if node is not None:
-            service = SetParametersAtomically
-            value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=node)
-            request = service.Request(parameters=[ParameterMessage(name='node', value=value)])
-        client = self._node.create_client(service, f'{system.node}/{command}')
-        try:
-            response = self._call(client, request, system, timeout_sec)
-        finally:
-            self._node.destroy_client(client)
-        if node is not None:
-            return Outcome(response.result.successful, response.result.reason)
-        return Outcome(response.success, response.message)
+        with self._client(Trigger, f'{system.node}/{command}') as client:
+
+            def ask(timeout_sec: float) -> Outcome:
+                response = self._call(client, Trigger.Request(), system, timeout_sec)
+                return Outcome(response.success, response.message)
+
+            yield ask
+
+    def restart(self, system: RunningSystem, node: str, timeout_sec: float) -> Outcome:
+        """Let a system build a node anew; see `ask`.
+
+        Args:
+            node: The full name of the node.
+        """
+        from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+        from rcl_interfaces.srv import SetParametersAtomically
+
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=node)
+        request = SetParametersAtomically.Request(parameters=[Parameter(name='node', value=value)])
+        with self._client(SetParametersAtomically, f'{system.node}/{protocol.RESTART}') as client:
+            result = self._call(client, request, system, timeout_sec).result
+            return Outcome(result.successful, result.reason)
 
     def wait_until_gone(self, system: RunningSystem, timeout_sec: float) -> bool:
         """Wait until a system has left the graph, and its process has ended if it is local."""
@@ -156,6 +162,14 @@ class Client:
             ),
             timeout_sec,
         )
+
+    @contextmanager
+    def _client(self, service: Any, name: str) -> Iterator[Any]:
+        client = self._node.create_client(service, name)
+        try:
+            yield client
+        finally:
+            self._node.destroy_client(client)
 
     def _call(self, client: Any, request: Any, system: RunningSystem, timeout_sec: float) -> Any:
         deadline = time.monotonic() + timeout_sec

@@ -30,7 +30,7 @@ def restart(node: str, timeout_sec: float) -> int:
     """Build a node of a system anew; return the exit code."""
     with Client() as client:
         system, full_name = _find_node(client.find_all(), node)
-        return _tell(system, client.ask(system, protocol.RESTART, timeout_sec, full_name))
+        return _tell(system, client.restart(system, full_name, timeout_sec))
 
 
 def down(name: str | None, timeout_sec: float) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
+
 _LONGEST_SEC = 60.0
 
 _system = click.argument('system', required=False)
@@ -33,6 +35,30 @@ def ps_command(format_name: str) -> int:
     from composer.cli.running.ps import list_running
 
     return list_running(format_name=format_name)
+
+
+@click.command('top')
+@_system
+@click.option('--once', is_flag=True, help='Print the table once.')
+@_format
+@click.option(
+    '--sort',
+    type=click.Choice(list(SORT_NAMES)),
+    default=DEFAULT_SORT,
+    show_default=True,
+    help='The column to sort by.',
+)
+@click.option('--filter', 'text', default='', metavar='TEXT', help='Only entities with this text.')
+def top_command(system: str | None, format_name: str, sort: str, text: str, *, once: bool) -> int:
+    """Show the health of each entity of SYSTEM in the last period.
+
+    Calls in a second, callback times, the share of a processor, messages that wait in the queue;
+    and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
+    runs, it need not be named. Where the output is no terminal, and as JSON, it is printed once.
+    """
+    from composer.cli.running.top import top
+
+    return top(system, View(sort=sort, text=text), once=once, format_name=format_name)
 
 
 @click.command('reload')
@@ -89,4 +115,4 @@ def logs_command(system: str | None, *, follows: bool) -> int:
     return show_logs(system, follows=follows)
 
 
-COMMANDS = (ps_command, logs_command, reload_command, restart_command, down_command)
+COMMANDS = (ps_command, top_command, logs_command, reload_command, restart_command, down_command)

@@ -48,6 +48,7 @@ def top_answer(state: SystemState, diagnostics: DiagnosticsPublisher | None) -> 
             'name': state.name,
             'period': latest.number,
             'period_sec': diagnostics.period_sec,
+            'has_cpu': latest.has_cpu,
             'entities': [
                 _describe_entity(key, report, has_cpu=latest.has_cpu)
                 for key, report in latest.by_entity.items()

@@ -1,0 +1,123 @@
+"""`composer top`: the health of each entity of a running system, as a table that changes."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from composer.cli.running.client import STATUS_SEC, Client, read_answer
+from composer.cli.running.top_table import render_entities, select_entities
+from composer.errors import ComposerError, ExitCode
+from composer.runtime.control import protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.cli.running.client import RunningSystem
+    from composer.cli.running.top_table import View
+    from composer.runtime.health.system_state import Outcome
+
+_POLL_SEC = 0.1
+# What calls cost the processor is known after the second period that somebody looks.
+_MOST_PERIODS = 3
+
+
+def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
+    """Show the health of each entity; return the exit code.
+
+    Args:
+        name: Of the system; `None` for the only one.
+        view: What to show first.
+        once: Whether to print it once. So it is where the output is no terminal.
+        format_name: `text` or `json`; JSON is printed once.
+
+    Raises:
+        ComposerError: There is no such system, it measures nothing, or it ended.
+    """
+    is_terminal = sys.stdout.isatty() and sys.stdin.isatty()
+    with Client() as client:
+        system = client.find(name)
+        with client.asking(system, protocol.TOP) as ask:
+            if once or format_name == 'json' or not is_terminal:
+                document = _wait_for_all(ask)
+                _print(document, view, format_name)
+                return ExitCode.DONE
+            return _watch(system, ask, view)
+
+
+def _print(document: dict[str, Any], view: View, format_name: str) -> None:
+    entities = select_entities(document['entities'], view)
+    if format_name == 'json':
+        click.echo(json.dumps({**document, 'entities': entities}, indent=2))
+    else:
+        click.echo('\n'.join(render_entities(entities)))
+
+
+def _read(outcome: Outcome) -> dict[str, Any]:
+    if not outcome.succeeded:
+        raise ComposerError(outcome.text)
+    return read_answer(outcome.text)
+
+
+def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:
+    """Return the health in the first period in which all of it was measured."""
+    document = _read(ask(STATUS_SEC))
+    deadline = time.monotonic() + STATUS_SEC + _MOST_PERIODS * document['period_sec']
+    while not document['has_cpu'] and time.monotonic() < deadline:
+        time.sleep(_POLL_SEC)
+        document = _read(ask(STATUS_SEC))
+    return document
+
+
+def _watch(system: RunningSystem, ask: Callable[[float], Outcome], view: View) -> int:
+    from composer.cli.running.top_screen import show_screen
+
+    poller = Poller(ask)
+    poller.start()
+    try:
+        show_screen(system.name, poller, view)
+    finally:
+        poller.stop()
+    if poller.error is not None:
+        raise poller.error
+    return ExitCode.DONE
+
+
+class Poller:
+    """A thread that asks again and again, so the screen does not wait for answers.
+
+    Attributes:
+        document: The last answer; `None` before the first.
+        error: Why there are no more answers.
+    """
+
+    def __init__(self, ask: Callable[[float], Outcome]) -> None:
+        self.document: dict[str, Any] | None = None
+        self.error: ComposerError | None = None
+        self._ask = ask
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self) -> None:
+        """Begin to ask."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ask no more."""
+        self._ended.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        pause_sec = _POLL_SEC
+        while not self._ended.wait(pause_sec):
+            try:
+                self.document = _read(self._ask(STATUS_SEC))
+            except ComposerError as error:
+                self.error = error
+                return
+            pause_sec = max(_POLL_SEC, self.document['period_sec'] / 2)

@@ -1,0 +1,155 @@
+"""`composer top`: its table, and its screen in a real terminal."""
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.cli.main import run
+from composer.cli.running.top_table import View, render_entities, select_entities
+from tests.running import ROOT
+
+SYSTEM = """
+version: 1
+nodes:
+  arm:
+    timers:
+      busy: {rate: 10, behaviour: parts:work, group: first}
+      idle: {rate: 10, behaviour: parts:rest, group: second}
+  ear:
+    namespace: robot
+    subscriptions:
+      numbers: {type: std_msgs/msg/Int32, external: true, behaviour: parts:hear}
+"""
+CODE = """
+import time
+
+def work(node):
+    end = time.thread_time() + 0.02
+    while time.thread_time() < end:
+        pass
+
+def rest(node):
+    time.sleep(0.02)
+
+def hear(node, message):
+    pass
+"""
+
+
+def entity(node, name, **figures):
+    known = dict.fromkeys(('mean_ms', 'p99_ms', 'max_ms', 'cpu'))
+    counts = dict.fromkeys(('rate_hz', 'queued', 'dropped', 'late', 'skipped', 'errors'), 0)
+    return {'node': node, 'kind': 'timer', 'name': name, 'key': '', **known, **counts, **figures}
+
+
+ENTITIES = [
+    entity('/b', 'slow', cpu=0.01, mean_ms=20.0, p99_ms=21.0, max_ms=22.5, late=2, skipped=1),
+    entity('/a', 'fast', cpu=0.5, rate_hz=1000.0, errors=7),
+    entity('/a', 'new'),
+]
+
+
+@pytest.mark.parametrize(
+    ('view', 'names'),
+    [
+        (View(), ['fast', 'slow', 'new']),
+        (View(is_reversed=True), ['slow', 'fast', 'new']),
+        (View(sort='entity'), ['fast', 'new', 'slow']),
+        (View(sort='entity', is_reversed=True), ['slow', 'new', 'fast']),
+        (View(sort='late'), ['slow', 'fast', 'new']),
+        (View(text='/A: '), ['fast', 'new']),
+        (View(text='nothing'), []),
+    ],
+)
+def test_entities_are_sorted_and_filtered(view, names):
+    assert [each['name'] for each in select_entities(ENTITIES, view)] == names
+
+
+def test_figures_stand_to_the_right():
+    assert '\n'.join(render_entities(ENTITIES)) == (
+        'ENTITY          RATE/S  MEAN MS  P99 MS  MAX MS    CPU  QUEUE  DROPPED  LATE  ERRORS\n'
+        '/b: timer slow     0.0   20.000  21.000  22.500   1.0%      0        0     3       0\n'
+        '/a: timer fast  1000.0        -       -       -  50.0%      0        0     0       7\n'
+        '/a: timer new      0.0        -       -       -      -      0        0     0       0'
+    )
+
+
+@pytest.mark.ros
+def test_what_calls_cost_is_measured_while_somebody_looks(compose, capsys):
+    compose(SYSTEM + 'diagnostics: {period: 0.5}\n', CODE).wait_until_ready()
+    assert run(['top', '--once', '--format', 'json']) == 0
+    document = json.loads(capsys.readouterr()[0])
+    assert document['has_cpu']
+    found = {each['name']: each for each in document['entities']}
+    assert found.keys() == {'busy', 'idle', 'numbers'}
+    assert found['idle']['mean_ms'] >= 20.0
+    assert found['busy']['cpu'] > 3 * found['idle']['cpu']
+    assert found['numbers']['calls'] == 0
+
+
+@pytest.mark.ros
+def test_a_system_that_measures_nothing_is_told_of(compose, capsys):
+    compose(SYSTEM + 'diagnostics: false\n', CODE).wait_until_ready()
+    assert run(['top', 'system']) == 1
+    assert capsys.readouterr()[1] == (
+        "error: the system measures nothing: its file says 'diagnostics: false'\n"
+    )
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    """Run a command in a terminal of 100 by 12; return what types keys, and what it shows."""
+    if shutil.which('tmux') is None:
+        pytest.skip('tmux is not installed')
+
+    def tmux(*words):
+        command = ['tmux', '-S', str(tmp_path / 'tmux'), '-f', '/dev/null', *words]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    yield tmux
+    subprocess.run(['tmux', '-S', str(tmp_path / 'tmux'), 'kill-server'], check=False)
+
+
+@pytest.mark.ros
+def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
+    child = compose(SYSTEM + 'diagnostics: {period: 0.2}\n', CODE)
+    child.wait_until_ready()
+    path = f'PYTHONPATH={ROOT}:{os.environ.get("PYTHONPATH", "")}'
+    domain = f'ROS_DOMAIN_ID={compose.domain_id}'
+    command = shlex.join(['env', path, domain, sys.executable, '-m', 'composer', 'top'])
+    shell = f'{command}; echo exit code $?; read'
+    terminal('new-session', '-d', '-x', '100', '-y', '12', shell)
+
+    def shows(*parts):
+        def is_shown():
+            screen = terminal('capture-pane', '-p')
+            return all(part in screen for part in parts) and screen
+
+        return wait_for(is_shown, f'{parts} on the screen')
+
+    assert '/arm: timer busy' in shows('system: 3 of 3 entities, by cpu', '%').splitlines()[2]
+    terminal('send-keys', 'Right', 'r')
+    shows('by queue, reversed')
+    terminal('send-keys', '/', 'e', 'a', 'r', 'Enter')
+    screen = shows('system: 1 of 3 entities', 'filter: ear', '/robot/ear: subscription numbers')
+    assert 'busy' not in screen
+    terminal('send-keys', 'Escape')
+    shows('3 of 3')
+    terminal('resize-window', '-x', '50', '-y', '5')
+
+    def is_small():
+        lines = terminal('capture-pane', '-p').splitlines()
+        return len(lines) == 5 and 'ERRORS' not in lines[1] and lines[4].startswith('q quit')
+
+    wait_for(is_small, 'a small one')
+    terminal('send-keys', 'q')
+    shows('exit code 0')
+    assert child.stop() == 0
