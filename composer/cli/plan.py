@@ -56,7 +56,8 @@ def plan(
     contexts = []
     hidden: dict[str, str] = {}
     for path in paths:
-        contexts.append(_read([path, *layers], words, set_values))
+        is_new = path is paths[-1]
+        contexts.append(_read([path, *layers], words, set_values, checks=is_new))
         hidden |= confidential.hidden_values()
     confidential.hide_again(hidden)
     if any(each is None for each in contexts):
@@ -86,11 +87,11 @@ def _compare_with_running(context: CheckContext) -> Plan:
 
 
 def _read(
-    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
+    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], *, checks: bool
 ) -> CheckContext | None:
     """Return the context of a system; without one, its errors have been printed."""
     system = load_given(paths, words, set_values)
     context = create_context(system, InterfaceCatalogue())
-    findings = check_in_context(system, context)
+    findings = check_in_context(system, context) if checks else system.diagnostics
     show_findings(findings)
     return None if has_errors(findings) else context

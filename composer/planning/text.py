@@ -73,11 +73,14 @@ def _describe(operation: Operation) -> Iterator[str]:
 
 
 def _describe_places(change: Change) -> str:
+    """Return where the values stand: both, if there are two."""
     old, new = (each and each.place for each in (change.old_span, change.new_span))
-    if change.is_code or old == new or old is None or new is None:
-        place = new or old
-        return f' ({place})' if place else ''
-    return f' ({old} → {new})'
+    if not change.is_code and change.new is None:
+        new = None
+    elif change.is_code or change.old is None or old == new:
+        old = None
+    places = ' → '.join(filter(None, (old, new)))
+    return f' ({places})' if places else ''
 
 
 def _show(value: Any) -> str:

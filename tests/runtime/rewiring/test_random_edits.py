@@ -16,6 +16,7 @@ pytest.importorskip('rclpy')
 from composer.cli.common.system_reader import SystemReader, import_reading
 from composer.cli.reload import Reloader
 from composer.entity_kinds import ENTITY_KINDS
+from composer.planning.differences import compare
 from composer.planning.plan import Action
 from composer.planning.snapshot import take_snapshot
 from composer.processes.guardian_client import GuardianClient
@@ -150,8 +151,11 @@ class Game:
         done = self._project.edit()
         before = describe(self.system)
         kept = identities(self.system)
-        plan = self._reloader.reload(self.system)
-        if plan is None:
+        old = self.system.snapshot
+        outcome = self._reloader.reload(self.system)
+        plan = compare(old, self.system.snapshot)
+        if not outcome.succeeded:
+            assert not plan
             check_equal(before, describe(self.system), done)
             self._project.go_back()
             return done, None
