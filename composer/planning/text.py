@@ -79,7 +79,7 @@ def _describe_places(change: Change) -> str:
         new = None
     elif change.is_code or change.old is None or old == new:
         old = None
-    places = ' → '.join(filter(None, (old, new)))
+    places = ' → '.join(each for each in (old, new) if each)
     return f' ({places})' if places else ''
 
 
