@@ -376,8 +376,9 @@ def plan_command(
     *,
     tells_difference: bool,
 ) -> int:
-    """Show what turns the system of OLD, or the running one of its name, into that of NEW.
+    """Show what turns OLD, or the running system, into NEW.
 
+    Without OLD, the system that runs is asked which has the name of NEW.
     There is a line for each operation: + added, ~ changed in place, ± recreated, - removed; with
     old and new values, why something must be recreated, and what is lost.
     """

@@ -45,6 +45,7 @@ class GuardianClient:
         self.owns_process = owns_process
         self.mark = secrets.randbits(_MARK_BITS) if owns_process else 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+        self._inode = os.fstat(self.descriptor).st_ino
         switch = _create_switch()
         _print_stacks_at_signal()
         try:
@@ -82,8 +83,11 @@ class GuardianClient:
             os.close(self.descriptor)
 
     def _send(self, byte: int) -> bool:
-        # A behaviour may have closed it; then the guardian stops the system.
+        # A behaviour may have closed it; then the guardian stops the system. Its number may be that
+        # of something else by now.
         try:
+            if os.fstat(self.descriptor).st_ino != self._inode:
+                return False
             os.write(self.descriptor, bytes([byte]))
         except OSError as error:
             return error.errno != errno.EBADF

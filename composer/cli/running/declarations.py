@@ -106,9 +106,10 @@ def down_command(system: str | None, timeout_sec: float) -> int:
 @_system
 @click.option('--follow', '-f', 'follows', is_flag=True, help='Go on until the system ends.')
 def logs_command(system: str | None, *, follows: bool) -> int:
-    """Print what SYSTEM has said, if it runs on this host and writes to a file.
+    """Print what SYSTEM on this host has said.
 
-    That is what 'composer up --detach' does. Of one that has ended, the last log is printed.
+    It must write to a file, as 'composer up --detach' does. Of one that has ended, the last log is
+    printed.
     """
     from composer.cli.running.log_files import show_logs
 

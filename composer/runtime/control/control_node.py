@@ -188,9 +188,14 @@ class ControlNode:
         if self._commands is None or self._node is None:
             return
         self._create_services(self._node, self._commands)
-        self._executor = SystemExecutor(self._context, None, log=system_logger.error)
+        self._executor = SystemExecutor(self._context, None, log=self._log)
         self._executor.add_node(self._node)
         self._executor.start()
+
+    def _log(self, text: str) -> None:
+        # A command may still run at the stop, and nobody gets its answer.
+        if not self._ended.is_set():
+            system_logger.error(text)
 
     def _create_services(self, node: RosNode, commands: Commands) -> None:
         from rcl_interfaces.srv import SetParametersAtomically
@@ -209,7 +214,8 @@ class ControlNode:
 
         def restart(request: Any, response: Any) -> Any:
             names = {each.name: each.value.string_value for each in request.parameters}
-            outcome = _attempt(lambda: self._restart(names.get('node', '')))
+            name = names.get('node', '')
+            outcome = _attempt(lambda: self._when_up(lambda: self._restart(name)))
             response.result.successful, response.result.reason = outcome.succeeded, outcome.text
             return response
 
@@ -221,15 +227,18 @@ class ControlNode:
         serve(protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries)
         serve(protocol.DOWN, self._stop_system, queries)
         serve(protocol.PLAN, lambda: commands.plan(system), changes)
-        serve(protocol.RELOAD, lambda: commands.reload(system), changes)
+        serve(protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes)
         node.create_service(
             SetParametersAtomically, f'~/{protocol.RESTART}', restart, callback_group=changes
         )
         Rivals(node, queries, state.who(), state.begun, self._give_way)
 
+    def _when_up(self, answer: Callable[[], Outcome]) -> Outcome:
+        if self._system.state.is_up:
+            return answer()
+        return Outcome(succeeded=False, text='the system is still starting')
+
     def _restart(self, name: str) -> Outcome:
-        if not self._system.state.is_up:
-            return Outcome(succeeded=False, text='the system is still starting')
         if name not in self._system.list_nodes():
             return Outcome(succeeded=False, text=f"the system has no node '{name}'")
         return self._system.restart_node(name)

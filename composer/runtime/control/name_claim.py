@@ -65,9 +65,10 @@ class NameClaim:
         self._socket = claim
         _claims.add(claim)
         answer = json.dumps(about).encode()
-        threading.Thread(
+        self._thread = threading.Thread(
             target=_answer, args=(claim, answer), name='composer-name', daemon=True
-        ).start()
+        )
+        self._thread.start()
         return None
 
     def release(self) -> None:
@@ -77,6 +78,7 @@ class NameClaim:
             with suppress(OSError):
                 self._socket.shutdown(socket.SHUT_RDWR)
             self._socket.close()
+            self._thread.join(_ANSWER_SEC)
 
 
 def list_claims(domain_id: int) -> list[dict[str, Any]]:
