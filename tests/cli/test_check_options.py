@@ -235,11 +235,7 @@ import functools
 
 print('imported')
 
-def logged(function):
-    @functools.wraps(function)
-    def run(*args, **kwargs):
-        return function(*args, **kwargs)
-    return run
+logged = eval('lambda f: functools.wraps(f)(lambda *args, **given: f(*args, **given))')
 
 @logged
 def start(node, speed): ...

@@ -463,7 +463,7 @@ def enormous_max_nodes(folder):
 
 @case('missing-include', 'unreadable-file', 'unknown-interfaces', 'bad-name')
 def null_characters_in_paths(folder):
-    text = 'interfaces: {"a\\0": "b\\0"}\ninclude: {x: {file: "a\\0b"}}\n'
+    text = 'interfaces: {"a": "b\\0"}\ninclude: {x: {file: "a\\0b"}}\n'
     text += 'nodes: {n: {namespace: "a\\0", parameter_files: ["p\\0"]}}\n'
     write(folder, HEAD + text)
 

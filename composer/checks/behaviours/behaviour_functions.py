@@ -207,7 +207,7 @@ def _check_signature(
     given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
-            given.remove(keyword)
+            given.discard(keyword)
             given.add(find_nearest(keyword, free) or '')
             yield context.at_key(
                 (*behaviour.path[:-1], 'with', keyword),

@@ -149,40 +149,60 @@ def _as_written(name: str, full: str, namespace: str) -> str:
 def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check remapping rules: one of an include applies to all that is in it."""
     positions = context.system.positions
-    # Nobody knows what processes have.
-    matching = {
-        positions.key((*process.path, 'remap', source))
-        for process in context.spec.processes.values()
-        for source, _ in process.remap
-    }
-    found: dict[Span, Diagnostic] = {}
+    matching = _rules_of_processes(context)
+    # As `composer show` writes a rule of an include: into each of its nodes.
+    matching_rules: set[tuple[str, str]] = set()
+    found: dict[Span, tuple[tuple[str, str], Diagnostic]] = {}
     for node in _all_nodes(context):
         if not node.remap:
             continue
         names, actions = _names_of(node), _actions_of(node)
         is_known = not _may_have_more(context, node)
-        for source, _ in node.remap:
+        for rule in node.remap:
+            source = rule[0]
             path = (*node.path, 'remap', source)
             span = positions.key(path)
-            scheme, _, bare = source.rpartition('://')
-            is_scheme = scheme in ('', 'rostopic', 'rosservice')
-            if source.startswith('__') or not is_scheme or find_topic_name_problem(bare):
+            bare = source.rpartition('://')[2]
+            if not _is_rule(source):
                 continue  # which is a finding of its own
             name = expand_name(bare, node.name, node.namespace)
             if name in names or (name in actions and remaps_actions() is not False):
                 matching.add(span)
+                matching_rules.add(rule)
             elif name in actions:
-                found[span] = _explain_action(context, path, actions[name], name)
-            elif near := find_typo(name, names):
-                meant = _as_written(bare, near, node.namespace)
-                found[span] = _explain_rule(context, path, node, name, did_you_mean(meant))
-            elif not is_known or _is_of_ros(context, name):
-                matching.add(span)
+                found[span] = rule, _explain_action(context, path, actions[name], name)
+            elif find_typo(name, names) or (is_known and not _is_of_ros(context, name)):
+                help_text = did_you_mean(_find_meant(bare, name, names, node.namespace))
+                found[span] = rule, _explain_rule(context, path, node, name, help_text)
             else:
-                written = [_as_written(bare, each, node.namespace) for each in names]
-                nearest = _at_the_top(bare, names) or find_nearest(bare, written)
-                found[span] = _explain_rule(context, path, node, name, did_you_mean(nearest))
-    yield from (finding for span, finding in found.items() if span not in matching)
+                matching.add(span)
+    for span, (rule, finding) in found.items():
+        if span not in matching and rule not in matching_rules:
+            yield finding
+
+
+def _find_meant(bare: str, name: str, names: set[str], namespace: str) -> str | None:
+    """Return the name that a rule may mean, as the rule would write it."""
+    if near := find_typo(name, names):
+        return _as_written(bare, near, namespace)
+    written = [_as_written(bare, each, namespace) for each in names]
+    return _at_the_top(bare, names) or find_nearest(bare, written)
+
+
+def _is_rule(source: str) -> bool:
+    """Return whether a rule is one of a topic or service, and says which."""
+    scheme, _, bare = source.rpartition('://')
+    is_scheme = scheme in ('', 'rostopic', 'rosservice')
+    return is_scheme and not (source.startswith('__') or find_topic_name_problem(bare))
+
+
+def _rules_of_processes(context: CheckContext) -> set[Span]:
+    """Return the places of the rules of processes: nobody knows what these have."""
+    return {
+        context.system.positions.key((*process.path, 'remap', source))
+        for process in context.spec.processes.values()
+        for source, _ in process.remap
+    }
 
 
 def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:

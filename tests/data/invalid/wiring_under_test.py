@@ -86,4 +86,4 @@ def read(node):
 
 
 def pass_on(node):
-    threading.Thread(target=tell, args=[node]).start()
+    threading.current_thread().node = node
