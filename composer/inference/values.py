@@ -204,10 +204,11 @@ class Mapping:
 
     def any_value(self) -> Value:
         """Return what any of its entries may hold."""
-        if self.is_lost or self.has_unknown:
+        if self.is_lost:
             return UNKNOWN
         values = [value for value, _ in self.entries.values()]
-        return join([*values, *([self.others] if self.others else [])] or [UNKNOWN])
+        values += [self.others] if self.others else []
+        return join([*values, UNKNOWN] if self.has_unknown or not values else values)
 
     def set(self, key: object, value: Value, place: Place, depth: int) -> None:
         """Store a value; one that is stored on a condition is one of two."""

@@ -187,10 +187,12 @@ class Generator:
         module, _, name = bound['behaviour'].partition(':')
         body = [f'node.parameters.{each}' for each in node['parameters']]
         body += [f'node.publish({each!r}, {{}})' for each in node.get('publishers', ())]
-        body += [
-            f'task = node.call_async({each!r}, {{}})' for each in node.get('service_clients', ())
-        ]
-        body += [f'node.send_goal({each!r}, {{}})' for each in node.get('action_clients', ())]
+        asks = [f'node.call({each!r}, {{}})' for each in node.get('service_clients', ())]
+        asks += [f'node.send_goal({each!r}, {{}})' for each in node.get('action_clients', ())]
+        if asks:
+            # Other nodes may start later: here it would wait for them in vain.
+            body += ['def ask():', *(f'    {each}' for each in asks)]
+            body += ['import threading', 'threading.Thread(target=ask).start()']
         self.modules[module][name].body = body
         node['on_start'] = self.chance.choice((bound, bound['behaviour']))
         if not node['parameters']:

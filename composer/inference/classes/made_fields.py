@@ -110,7 +110,10 @@ class MadeFields(Part):
         missing = [
             name
             for name, field in fields.items()
-            if field.kind in ('', 'InitVar') and field.default is None and name not in given
+            if field.kind in ('', 'InitVar')
+            and field.default is None
+            and name not in given
+            and (self.is_tuple(of) or 'dataclasses.dataclass' in self._decorators(field.of))
         ]
         if missing:
             text = f"'{of.definition.name}' is called with other arguments than it takes: "

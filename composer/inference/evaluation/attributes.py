@@ -141,7 +141,8 @@ class Attributes(Part):
                 return constant(in_python(owner.type).rpartition('/')[2].rpartition('.')[2])
             if isinstance(owner, NodeValue | PartOfNode):
                 self._evaluator.escape(owner)
-            return UNKNOWN
+            # Who asks for a type's module asks which type it is.
+            return CHOSEN if isinstance(owner, MessageClass) else UNKNOWN
         match owner:
             case NodeValue():
                 return self._read_node(name)

@@ -235,7 +235,7 @@ class NodeCalls(Part):
         self._evaluator.calls.escape_all(arguments)
         if name == 'setdefault' and isinstance(given, Sequence):
             # Of what is in it, other calls have a say.
-            return Sequence([], given.kind, is_open=True)
+            return Sequence([], given.kind, is_lost=True)
         return UNKNOWN
 
     def read_parameters(self, owner: PartOfNode, name: str, arguments: Arguments) -> Value:

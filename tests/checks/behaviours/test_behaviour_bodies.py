@@ -266,6 +266,13 @@ WRONG = {
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    'if type(m).__module__ == node.parameters.mode: print(m.velocity)',
+    "if m.__class__.__module__.startswith('geometry'): print(m.velocity)",
+    "if 'Twist' in str(type(m)): print(m.velocity)",
+    'if node.parameters.mode in str(type(m)): print(m.velocity)',
+    'if node.parameters.mode in m.get_fields_and_field_types(): print(m.velocity)',
+    'if node.parameters.mode == type(m).__name__.lower(): print(m.velocity)',
+    "kept = node.own_state.setdefault('kept', []); kept.append(m); print(kept[0].velocity)",
     'try: print(m.pose.pose.position)\nexcept AttributeError: print(m.pose.position, m.position)',
     "kept = node.own_state.setdefault('kept', [0]); node.publish('scan', {'ranges': kept})",
     "node.call('enable', [c for c in 'ab' if c in m.child_frame_id] == [])",

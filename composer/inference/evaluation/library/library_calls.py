@@ -118,7 +118,9 @@ class LibraryCalls(Part):
             if not name.startswith('builtins.is'):
                 self._escape_functions(arguments)
             result = KNOWN_RESULTS[name]
-            chosen = chosen_by(arguments)
+            # Who asks for a type's name asks which type it is.
+            is_type = any(isinstance(each.value, MessageClass) for each in arguments.all())
+            chosen = BY_PARAMETER if is_type else chosen_by(arguments)
             if isinstance(result, Scalar) and chosen:
                 if result.kind in (int, float):
                     chosen = chosen_with(*(argument.value for argument in arguments.all()))
