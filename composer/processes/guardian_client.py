@@ -83,8 +83,8 @@ class GuardianClient:
             os.close(self.descriptor)
 
     def _send(self, byte: int) -> bool:
-        # A behaviour may have closed it; then the guardian stops the system. Its number may be that
-        # of something else by now.
+        # A behaviour may have closed it; then the guardian stops the system. Its number may be
+        # that of something else by now.
         try:
             if os.fstat(self.descriptor).st_ino != self._inode:
                 return False
