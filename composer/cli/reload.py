@@ -56,11 +56,13 @@ class Reloader:
         self._files = _list_files(reader, context)
         self._seen = _stamps(self._files)
         self._lock = threading.Lock()
+        self._aborts_goals = threading.Event()
 
     def reload(self, system: System) -> Outcome:
         """Read the files, and rewire the system; after errors it is as it was.
 
-        What was done is logged, and errors are printed.
+        What was done is logged, and errors are printed. Goals in flight of actions that go are
+        waited for.
         """
         from composer.runtime.health.system_state import Outcome
         from composer.runtime.logs import system_logger
@@ -87,6 +89,14 @@ class Reloader:
                 system_logger.info(text)
             system.state.note_reload(Outcome(succeeded=True, text=text))
             return Outcome(succeeded=True, text=_with_findings(findings, text))
+
+    def reload_now(self, system: System) -> Outcome:
+        """Do as `reload`, but abort goals; also those that another reload waits for."""
+        self._aborts_goals.set()
+        try:
+            return self.reload(system)
+        finally:
+            self._aborts_goals.clear()
 
     def plan(self, system: System) -> Outcome:
         """Read the files, and tell what `reload` would do."""
@@ -118,7 +128,7 @@ class Reloader:
             reading = import_reading(context, snapshot, report)
             if reading is None:
                 raise ComposerError(_RUNS_ON)
-            plan = system.rewire(reading)
+            plan = system.rewire(reading, self._aborts_goals.is_set)
         self._note_files(_list_files(self._reader, context))
         return plan
 

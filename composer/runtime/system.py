@@ -31,7 +31,7 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
@@ -194,11 +194,11 @@ class System:
         """What it runs as, as its files say it."""
         return self._reading.snapshot
 
-    def rewire(self, new: Reading, *, aborts_goals: bool = False) -> Plan:
+    def rewire(self, new: Reading, aborts_goals: Callable[[], bool]) -> Plan:
         """Become the system of `new`; return what was done.
 
         Args:
-            aborts_goals: Whether goals of actions that go are aborted, not waited for.
+            aborts_goals: Returns whether goals of actions that go are aborted, not waited for.
 
         Raises:
             ComposerError: That failed, and the system is as it was.
@@ -214,7 +214,7 @@ class System:
             self._reading,
             new,
         )
-        rewiring.wait_for_goals(plan, aborts=aborts_goals)
+        rewiring.wait_for_goals(plan, aborts_goals)
         with self._restarter.lock:
             if self.stop_requested or not plan:
                 return plan

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import time
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
-from composer.errors import ComposerError, UsageError
+from composer.errors import ComposerError, RosNotFoundError, UsageError
 from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
 from composer.runtime.control import protocol
@@ -49,12 +50,15 @@ class Client:
     """A node beside those of the systems, while it is entered.
 
     Raises:
-        RosNotFoundError: There is no rclpy.
+        RosNotFoundError: There is no rclpy, or no std_srvs.
         StartError: ROS cannot start.
     """
 
     def __init__(self) -> None:
         check_ros()
+        if importlib.util.find_spec('std_srvs') is None:
+            message = 'systems are asked by the services of std_srvs, which is not installed'
+            raise RosNotFoundError(message)
         check_shell({})
         check_middleware(os.environ)
         self._exit = ExitStack()

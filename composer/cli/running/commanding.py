@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from composer.runtime.health.system_state import Outcome
 
 
-def reload(name: str | None, timeout_sec: float) -> int:
+def reload(name: str | None, timeout_sec: float, *, aborts_goals: bool) -> int:
     """Let a system read its files again; return the exit code."""
+    command = protocol.RELOAD_NOW if aborts_goals else protocol.RELOAD
     with Client() as client:
         system = client.find(name)
-        return _tell(system, client.ask(system, protocol.RELOAD, timeout_sec))
+        return _tell(system, client.ask(system, command, timeout_sec))
 
 
 def restart(node: str, timeout_sec: float) -> int:

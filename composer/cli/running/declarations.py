@@ -64,7 +64,13 @@ def top_command(system: str | None, format_name: str, sort: str, text: str, *, o
 @click.command('reload')
 @_system
 @_timeout
-def reload_command(system: str | None, timeout_sec: float) -> int:
+@click.option(
+    '--now',
+    'aborts_goals',
+    is_flag=True,
+    help='Abort goals in flight of actions that go, which it waits for otherwise.',
+)
+def reload_command(system: str | None, timeout_sec: float, *, aborts_goals: bool) -> int:
     """Let SYSTEM read its files again, and become what they say.
 
     SYSTEM is its name, that of its file without the ending; if only one runs, it need not be
@@ -72,7 +78,7 @@ def reload_command(system: str | None, timeout_sec: float) -> int:
     """
     from composer.cli.running.commanding import reload
 
-    return reload(system, timeout_sec)
+    return reload(system, timeout_sec, aborts_goals=aborts_goals)
 
 
 @click.command('restart')

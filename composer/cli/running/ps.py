@@ -11,6 +11,7 @@ import click
 from composer.cli.running.client import Client
 from composer.cli.running.tables import format_duration, render_table
 from composer.errors import ExitCode
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from composer.cli.running.client import RunningSystem
@@ -65,8 +66,6 @@ def _row(system: RunningSystem) -> tuple[str, ...]:
 
 def _notes(system: RunningSystem) -> list[str]:
     """Return what is wrong with a system, in lines below the table."""
-    from composer.terminal import escape
-
     status = system.status
     if status is None:
         return []
@@ -75,4 +74,4 @@ def _notes(system: RunningSystem) -> list[str]:
         'last reload': status['last_error'],
     }
     texts = {key: escape(' '.join(text.split())) for key, text in told.items() if text}
-    return [f'{system.name}: {key}: {text[:_LONGEST_NOTE]}' for key, text in texts.items()]
+    return [f'{escape(system.name)}: {key}: {text[:_LONGEST_NOTE]}' for key, text in texts.items()]

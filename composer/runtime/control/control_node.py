@@ -70,6 +70,9 @@ class Commands(Protocol):
     def reload(self, system: Any) -> Outcome:
         """Read the files, and let the system become what they say."""
 
+    def reload_now(self, system: Any) -> Outcome:
+        """Do as `reload`, but abort goals that it would wait for, or that it waits for."""
+
     def plan(self, system: Any) -> Outcome:
         """Read the files, and tell what `reload` would do."""
 
@@ -228,6 +231,12 @@ class ControlNode:
         serve(protocol.DOWN, self._stop_system, queries)
         serve(protocol.PLAN, lambda: commands.plan(system), changes)
         serve(protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes)
+        # Beside a reload that waits for a goal.
+        serve(
+            protocol.RELOAD_NOW,
+            lambda: self._when_up(lambda: commands.reload_now(system)),
+            queries,
+        )
         node.create_service(
             SetParametersAtomically, f'~/{protocol.RESTART}', restart, callback_group=changes
         )

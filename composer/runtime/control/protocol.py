@@ -17,6 +17,7 @@ _PREFIX = '_composer_'
 # parameter `node`. None takes a path or code.
 STATUS: Final = 'status'
 RELOAD: Final = 'reload'
+RELOAD_NOW: Final = 'reload_now'
 PLAN: Final = 'plan'
 RESTART: Final = 'restart'
 DOWN: Final = 'down'

@@ -73,19 +73,22 @@ class Rewiring:
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
-    def wait_for_goals(self, plan: Plan, *, aborts: bool) -> None:
+    def wait_for_goals(self, plan: Plan, aborts: Callable[[], bool]) -> None:
         """Wait until no goal is in flight of an action that goes; it accepts no more.
 
         Args:
-            aborts: Whether the goals are aborted.
+            aborts: Returns whether the goals are aborted; asked again and again.
         """
         servers = list(self._going_actions(plan))
         for server in servers:
-            server.retire(is_retired=True, aborts=aborts)
+            server.retire(is_retired=True)
             self._undo.append(partial(server.retire, is_retired=False))
         was_told = False
         while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
-            if not was_told:
+            if aborts():
+                for server in servers:
+                    server.retire(is_retired=True, aborts=True)
+            elif not was_told:
                 was_told = True
                 system_logger.info('reload: waiting for the goals in flight of actions that go…')
             sleep(_POLL_SEC)

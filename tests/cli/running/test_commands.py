@@ -154,3 +154,54 @@ def test_a_system_that_cannot_answer_is_told_of(compose, composer, monkeypatch):
         os.kill(child.pid, signal.SIGCONT)
     assert code == 1
     assert errors.endswith(f'process {child.pid} runs a system, and does not answer\n')
+
+
+SLOW_ACTION = """
+version: 1
+nodes:
+  counter:
+    actions:
+      count: {type: test_msgs/action/Fibonacci, behaviour: parts:count}
+"""
+SLOW_CODE = """
+import time
+
+def count(node, goal):
+    node.logger.info('counting')
+    while True:
+        time.sleep(0.05)
+        yield {'sequence': [0]}
+"""
+
+
+def test_a_goal_in_flight_is_waited_for_until_somebody_does_not_want_to(
+    compose, composer, peer, wait_for
+):
+    pytest.importorskip('test_msgs')
+    from action_msgs.msg import GoalStatus
+    from rclpy.action import ActionClient
+    from std_srvs.srv import Trigger
+    from test_msgs.action import Fibonacci
+
+    child = compose(SLOW_ACTION, SLOW_CODE)
+    child.wait_until_ready()
+    client = peer.run(ActionClient, peer.node, Fibonacci, '/count')
+    assert client.wait_for_server(20.0)
+    peer.meet_action_server('/count')
+    sent = peer.run(client.send_goal_async, Fibonacci.Goal())
+    child.wait_for_line('counting')
+    wait_for(sent.done, 'its acceptance')
+    ended = peer.run(sent.result().get_result_async)
+    path = compose.folder / 'system.yaml'
+    path.write_text(SLOW_ACTION.replace('count:', 'enumerate:'))
+    reload = peer.run(peer.node.create_client, Trigger, '/_composer_system/reload')
+    assert reload.wait_for_service(20.0)
+    waiting = peer.run(reload.call_async, Trigger.Request())
+    child.wait_for_line('waiting for the goals in flight')
+    assert not ended.done()
+    assert composer('reload', '--now')[0] == 0
+    wait_for(lambda: ended.done() and waiting.done(), 'the end of both')
+    assert ended.result().status == GoalStatus.STATUS_ABORTED
+    assert waiting.result().success
+    peer.run(client.destroy)
+    assert child.stop() == 0
