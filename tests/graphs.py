@@ -3,8 +3,6 @@
 from tests.running import Peer
 
 INFRASTRUCTURE = ('/rosout', '/parameter_events', '/diagnostics')
-# An end may be found before the name of its node.
-UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 OWN_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 
 
@@ -33,7 +31,8 @@ class Graph:
                 *node.get_publishers_info_by_topic(topic),
                 *node.get_subscriptions_info_by_topic(topic),
             ):
-                if info.node_name == UNKNOWN_NAME:
+                # Of hidden nodes, and of such whose names are not found yet.
+                if info.node_name.startswith('_'):
                     continue
                 profile = info.qos_profile
                 policies = (profile.reliability, profile.durability, profile.liveliness)

@@ -102,8 +102,9 @@ def locks_of(child):
 
 @pytest.mark.ros
 def test_a_start_removes_what_a_killed_system_left(compose):
-    killed, living = compose(SYSTEM), compose(SYSTEM)
-    for child in (killed, living):
+    children = [compose.run(compose.write(SYSTEM, name=name)) for name in ('killed', 'living')]
+    killed, living = children
+    for child in children:
         child.wait_until_ready()
     [left], [kept] = locks_of(killed), locks_of(living)
     killed.send(signal.SIGKILL)
