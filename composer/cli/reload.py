@@ -129,6 +129,9 @@ class Reloader:
             if reading is None:
                 raise ComposerError(_RUNS_ON)
             plan = system.rewire(reading, self._aborts_goals.is_set)
+            if system.stop_requested:
+                message = 'the system stops'
+                raise ComposerError(message)
         self._note_files(_list_files(self._reader, context))
         return plan
 
