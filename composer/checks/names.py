@@ -64,7 +64,16 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
         if problem and path not in reported:
             reported.add(path)
             say = context.at_key if path == node.path else context.at_value
-            yield say(path, _RULE, f"'{node.namespace}': {problem}")
+            related = [*_find_outer_namespace(context, path)]
+            yield say(path, _RULE, f"'{node.namespace}': {problem}", related=related)
+
+
+def _find_outer_namespace(context: CheckContext, path: DataPath) -> Iterator[Related]:
+    """Yield where the namespace is written that the one at a path lies in, if it is."""
+    positions, outer = context.system.positions, ('defaults', 'namespace')
+    is_inner = path in context.system.notes and positions.value(path) != positions.value(outer)
+    if is_inner and outer in positions.values and path[:2] not in context.system.chains:
+        yield context.related_value(outer, 'it lies in this one')
 
 
 def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
