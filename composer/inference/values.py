@@ -268,6 +268,7 @@ class Function:
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
         of: The `Class` that defines it, if it is a method.
+        defaults: What those of an inner function were when it was made, by their expressions.
     """
 
     module: ModuleSource
@@ -276,6 +277,7 @@ class Function:
     owner: Value | None = None
     is_read: bool = False
     of: Any = None
+    defaults: dict[ast.expr, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)

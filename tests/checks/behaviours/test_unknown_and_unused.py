@@ -61,6 +61,26 @@ def test_an_abbreviated_name_that_has_a_default_is_a_finding(check):
     assert check(text, run(older, "node.publish('out', 'hello')")) == []
 
 
+@pytest.mark.parametrize(
+    'lines',
+    [
+        ('for f in [lambda n=n: node.publish(n, "hi") for n in NAMES]: f()',),
+        ('f = {n: (lambda n=n: node.publish(n, "hi")) for n in NAMES}', 'f[node.state.n]()'),
+        ('for n in NAMES:', '    def f(*, n=n): node.publish(n, "hi")', '    f()'),
+    ],
+)
+def test_a_function_of_each_round_uses_the_name_of_its_own(check, lines):
+    text = """
+  a:
+    state: {n: up}
+    publishers:
+      up: {type: std_msgs/msg/String, external: true}
+      down: {type: std_msgs/msg/String, external: true}
+    on_start: parts:run
+"""
+    assert check(text, 'NAMES = ("up", "down")\n' + run(*lines)) == []
+
+
 def test_a_parameter_may_be_declared_with_rclpy(check):
     lines = ["node.ros.declare_parameter('mode', 0)", 'print(node.parameters.mode)']
     assert check(NODE, run(USES_ALL, *lines)) == []
