@@ -15,9 +15,10 @@ from composer.names import (
     find_topic_name_problem,
     with_article,
 )
+from composer.spelling import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
@@ -42,7 +43,9 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         problem = find_node_name_problem(node.name)
         if problem:
-            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {problem}")
+            message = f"'{node.name}' cannot name a node: {problem}"
+            help_text = _suggest_underscores(node.name, find_node_name_problem)
+            yield context.at_key(node.path, _RULE, message, help=help_text)
         else:
             yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
@@ -65,7 +68,15 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
             reported.add(path)
             say = context.at_key if path == node.path else context.at_value
             related = [*_find_outer_namespace(context, path)]
-            yield say(path, _RULE, f"'{node.namespace}': {problem}", related=related)
+            help_text = _suggest_underscores(node.namespace, find_namespace_problem)
+            message = f"'{node.namespace}': {problem}"
+            yield say(path, _RULE, message, help=help_text, related=related)
+
+
+def _suggest_underscores(name: str, find_problem: Callable[[str], str | None]) -> str | None:
+    """Return the help for a name that only has hyphens or spaces in it."""
+    meant = name.replace('-', '_').replace(' ', '_')
+    return did_you_mean(None if find_problem(meant) else meant)
 
 
 def _find_outer_namespace(context: CheckContext, path: DataPath) -> Iterator[Related]:
