@@ -30,6 +30,7 @@ from composer.inference.values import (
     Value,
     alternatives,
     is_none,
+    join,
 )
 from composer.interfaces.field_errors import (
     FieldError,
@@ -106,6 +107,15 @@ class Payloads(Part):
         fit = _Fit('', self._evaluator.run.types)
         found = fit.any_of(value, lambda each: fit.field(item_type, each, place, ()))
         self._settle(found, fit, place)
+
+    def check_keywords(self, function: Value, value: Value, place: Place) -> None:
+        """Check one of several mappings that a message is made with: `Twist(**TABLE[key])`."""
+        several = [each for each in alternatives(value) if isinstance(each, Mapping)]
+        if isinstance(function, MessageClass):
+            self.check(function.type, join(several), place)
+        else:
+            # It may be meant for this.
+            self._fitting.update(map(id, several))
 
     def _settle(self, found: list[Misfit], fit: _Fit, place: Place) -> None:
         if self._evaluator.run.is_silent:
