@@ -307,6 +307,7 @@ class Instance:
         is_open: Whether something unknown may have stored attributes in it.
         is_unmade: Whether nobody has seen how it was made.
         is_member: Whether it is a member of an enumeration.
+        is_no_value: Whether it is one that no field holds: only its `value` may be.
     """
 
     of: Class
@@ -317,6 +318,7 @@ class Instance:
     is_open: bool = False
     is_unmade: bool = False
     is_member: bool = False
+    is_no_value: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Note what an attribute may be."""

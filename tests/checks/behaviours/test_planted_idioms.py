@@ -1189,6 +1189,15 @@ PLANTED = {
                     node.publish(name, value)
                 send()
         """,
+    'a member of a plain enumeration': """
+        from enum import Enum, IntEnum
+        class Mode(Enum):
+            SLOW = 3
+        class Level(IntEnum):
+            SLOW = 3
+        def hear(node, m):
+            node.publish('level', <Mode|Level>.SLOW)
+        """,
 }
 # What looks wrong, and is not.
 RIGHT = {
