@@ -16,6 +16,7 @@ from composer.inference.values import (
     Constant,
     External,
     Function,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -335,9 +336,11 @@ def _may_hold(kind: str, given: type) -> bool:
 
 
 def _is_no_value(value: Value) -> bool:
-    """Return whether a value is a function or the like, which may have been meant to be called."""
+    """Return whether a value is a function or the like, or a member of a plain enumeration."""
     if isinstance(value, External):
         return value.name in KNOWN_RESULTS
+    if isinstance(value, Instance):
+        return value.is_no_value
     return isinstance(value, Function | Class | MessageClass | Partial | ProjectModule | NodeValue)
 
 
@@ -352,6 +355,8 @@ def _shown(value: Value) -> str:
             return 'a class'
         case ProjectModule():
             return 'a module'
+        case Instance():
+            return f"a member of {value.of.definition.name}, and not its 'value'"
         case NodeValue():
             return 'the node'
         case Constant():

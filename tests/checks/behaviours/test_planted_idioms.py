@@ -1170,6 +1170,34 @@ PLANTED = {
         def hear(node, m):
             Sub(node).go()
         """,
+    'lambdas of a comprehension that keep their items': """
+        def hear(node, m):
+            table = {
+                name: (lambda name=name, value=value: node.publish(name, value))
+                for name, value in [('<comand|command>', {}), ('level', 1)]
+            }
+            for send in table.values():
+                send()
+        """,
+    'functions of a loop that keep their items': """
+        def hear(node, m):
+            for name, value in [
+                ('level', 1),
+                ('<comand|command>', {}),
+            ]:
+                def send(*, name=name):
+                    node.publish(name, value)
+                send()
+        """,
+    'a member of a plain enumeration': """
+        from enum import Enum, IntEnum
+        class Mode(Enum):
+            SLOW = 3
+        class Level(IntEnum):
+            SLOW = 3
+        def hear(node, m):
+            node.publish('level', <Mode|Level>.SLOW)
+        """,
 }
 # What looks wrong, and is not.
 RIGHT = {
