@@ -186,7 +186,6 @@ class Functions(Part):
         at = (
             bool(run.doubts),
             run.is_sure,
-            bool(run.limits),
             bool(run.decided),
             bool(run.guards),
             run.is_silent,
