@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.confidential import conceal
 from composer.diagnostics import Related
 from composer.language.specs import NodeSpec
 from composer.names import (
@@ -75,6 +76,8 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _suggest_underscores(name: str, find_problem: Callable[[str], str | None]) -> str | None:
     """Return the help for a name that only has hyphens or spaces in it."""
+    if conceal(f"'{name}'") != f"'{name}'":
+        return None  # It would show what is hidden, in other words.
     meant = name.replace('-', '_').replace(' ', '_')
     return did_you_mean(None if find_problem(meant) else meant)
 
