@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.confidential import conceal
 from composer.diagnostics import Related
 from composer.language.specs import NodeSpec
 from composer.names import (
@@ -15,9 +16,10 @@ from composer.names import (
     find_topic_name_problem,
     with_article,
 )
+from composer.spelling import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
@@ -42,7 +44,9 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     for node in context.spec.nodes.values():
         problem = find_node_name_problem(node.name)
         if problem:
-            yield context.at_key(node.path, _RULE, f"'{node.name}' cannot name a node: {problem}")
+            message = f"'{node.name}' cannot name a node: {problem}"
+            help_text = _suggest_underscores(node.name, find_node_name_problem)
+            yield context.at_key(node.path, _RULE, message, help=help_text)
         else:
             yield from _check_own_services(context, node)
         yield from _check_ros_names(context, node)
@@ -64,7 +68,26 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
         if problem and path not in reported:
             reported.add(path)
             say = context.at_key if path == node.path else context.at_value
-            yield say(path, _RULE, f"'{node.namespace}': {problem}")
+            related = [*_find_outer_namespace(context, path)]
+            help_text = _suggest_underscores(node.namespace, find_namespace_problem)
+            message = f"'{node.namespace}': {problem}"
+            yield say(path, _RULE, message, help=help_text, related=related)
+
+
+def _suggest_underscores(name: str, find_problem: Callable[[str], str | None]) -> str | None:
+    """Return the help for a name that only has hyphens or spaces in it."""
+    if conceal(f"'{name}'") != f"'{name}'":
+        return None  # It would show what is hidden, in other words.
+    meant = name.replace('-', '_').replace(' ', '_')
+    return did_you_mean(None if find_problem(meant) else meant)
+
+
+def _find_outer_namespace(context: CheckContext, path: DataPath) -> Iterator[Related]:
+    """Yield where the namespace is written that the one at a path lies in, if it is."""
+    positions, outer = context.system.positions, ('defaults', 'namespace')
+    is_inner = path in context.system.notes and positions.value(path) != positions.value(outer)
+    if is_inner and outer in positions.values and path[:2] not in context.system.chains:
+        yield context.related_value(outer, 'it lies in this one')
 
 
 def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:

@@ -18,8 +18,8 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
-from composer.ros_parameters.node_patterns import PatternIndex
-from composer.spelling import count_edits, find_nearest, suggest
+from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
+from composer.spelling import count_edits, did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -203,11 +203,14 @@ class _Takers:
             entry.key_span,
             'undeclared-parameter',
             f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
-            help=suggest(
-                entry.name,
-                self._declaring,
-                'declared are',
-                "declare it under 'parameters:' of the node",
+            help=did_you_mean(
+                find_nearest(entry.name, {*self._declaring, *OF_EVERY_NODE}),
+                suggest(
+                    entry.name,
+                    self._declaring,
+                    'declared are',
+                    "declare it under 'parameters:' of the node",
+                ),
             ),
         )
 
@@ -295,12 +298,14 @@ def _is_expected(user: _User, path: str, entry: ParameterEntry, winner: Paramete
     later = user.files[user.files.index(path) + 1 :]
     if winner.value_span.source.name in later:
         return True
-    return winner.pattern != entry.pattern and ('*' in entry.pattern or '*' not in winner.pattern)
+    if winner.pattern == entry.pattern:
+        return False
+    return '*' not in winner.pattern or not covers_pattern(winner.pattern, entry.pattern)
 
 
 def _help_for_overridden(entry: ParameterEntry, winner: ParameterEntry) -> str:
     if entry.pattern != winner.pattern:
-        return 'the last name that matches a node wins: write wildcards above'
+        return f"the last name that matches a node wins: write '{winner.pattern}' above"
     if entry.type != winner.type:
         return 'of two types ROS takes one, whichever comes first: give both the same type'
     return 'remove one of them'

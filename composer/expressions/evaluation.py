@@ -109,6 +109,8 @@ class Evaluator:
     def call(self, node: nodes.Call) -> Any:
         """Call a function or a method."""
         function = self.value(node.node)
+        if isinstance(function, StrictUndefined):
+            str(function)  # raises what is undefined
         positional, named = self.arguments(node)
         for argument in (*positional, *named.values()):
             if isinstance(argument, StrictUndefined):

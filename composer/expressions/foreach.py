@@ -6,6 +6,7 @@ and in all below it; an entry that is left out is still held against the schema.
 
 from __future__ import annotations
 
+import re
 import sys
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -91,16 +92,17 @@ class _Expansion:
         for written, entry in data.items():
             if not _is_conditional(entry):
                 self._count += 1
-                self._add(self._evaluator, written, entry, is_left_out=False, is_repeated=False)
+                self._add(self._evaluator, written, entry, is_left_out=False)
                 continue
             path = (self._section, written)
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
-            is_repeated = _FOREACH in entry
             if entry.get(_FOREACH) == {}:
                 self._report((*path, _FOREACH), f'{_FOREACH} has no variables')
                 self._document.dropped.add(path)
                 continue
             before = len(self._document.diagnostics)
+            foreach = entry.get(_FOREACH)
+            variables = foreach if isinstance(foreach, dict) else None
             scopes = self._list_scopes(entry.get(_FOREACH, {}), (*path, _FOREACH))
             self._values += len(scopes) * count_values(body)
             if self._values > MAX_VALUES:
@@ -108,7 +110,7 @@ class _Expansion:
                 raise _TooManyError
             for evaluator in scopes:
                 holds = self._holds(evaluator, entry.get(_WHEN, True), (*path, _WHEN))
-                self._add(evaluator, written, body, is_left_out=not holds, is_repeated=is_repeated)
+                self._add(evaluator, written, body, variables, is_left_out=not holds)
                 before = -1
             if len(self._document.diagnostics) > before >= 0:
                 # It is missing because of an error, not because there are no values.
@@ -120,9 +122,9 @@ class _Expansion:
         evaluator: TemplateEvaluator,
         written: str,
         body: Any,
+        variables: Collection[str] | None = None,
         *,
         is_left_out: bool,
-        is_repeated: bool,
     ) -> None:
         written_path = (self._section, written)
         key = evaluator.evaluate_key(written_path)
@@ -133,7 +135,7 @@ class _Expansion:
             elif is_left_out:
                 return
             else:
-                self._report_duplicate(key, written_path, is_repeated=is_repeated)
+                self._report_duplicate(key, written_path, variables)
                 return
         if key != written:
             self._graft(path, written)
@@ -204,8 +206,10 @@ class _Expansion:
         span = self._evaluator.positions.value(path)
         self._document.diagnostics.append(diagnostic_at(span, rule, message))
 
-    def _report_duplicate(self, key: str, path: DataPath, *, is_repeated: bool) -> None:
-        if not is_repeated:
+    def _report_duplicate(
+        self, key: str, path: DataPath, variables: Collection[str] | None
+    ) -> None:
+        if variables is None:
             self._evaluator.report_duplicate(key, path, (self._section, key))
             return
         self._document.diagnostics.append(
@@ -213,7 +217,7 @@ class _Expansion:
                 self._evaluator.positions.key(path),
                 'duplicate-key',
                 f"foreach makes more than one '{key}'",
-                help=f'use its variables in the name, as in "{key}_{{{{ i }}}}"',
+                help=_help_for_duplicate(str(path[-1]), variables),
             )
         )
 
@@ -231,6 +235,14 @@ class _Expansion:
                 help="raise 'max_nodes' at the top of the file if that is intended",
             )
         )
+
+
+def _help_for_duplicate(written: str, variables: Collection[str]) -> str:
+    missing = [name for name in variables if not re.search(rf'\b{name}\b', written)]
+    if not missing:
+        return "a variable's list should have each value once"
+    more = ''.join(f'_{{{{ {name} }}}}' for name in missing)
+    return f'use its variables in the name, as in "{written}{more}"'
 
 
 def _is_conditional(entry: Any) -> bool:

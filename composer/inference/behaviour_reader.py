@@ -220,15 +220,34 @@ def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> Non
     )
     callee.is_read = True
     if not evaluator.functions.fits(callee, arguments):
-        if isinstance(callee.definition, ast.Lambda):
-            shown = ast.unparse(callee.definition)
-            run.report('bad-signature', place, f'{shown} is called as {binding.call}')
+        _explain_call(run, module, binding, callee)
         run.reading.open_all()
         return
     scope = evaluator.functions.enter(callee, arguments, waits=True)
     check_results(evaluator, callee, scope, wire, binding)
     evaluator.payloads.report_unfit()
     evaluator.classes.mention_held()
+
+
+def _explain_call(run: Run, module: ModuleSource, binding: Binding, callee: Function) -> None:
+    """Report a call that does not fit, of what its name alone does not tell."""
+    name = binding.behaviour.function
+    source = module.functions.get(name)
+    if source is not None and source.signature is not None:
+        # It has a finding at the name.
+        return
+    if module.is_open or run.modules.is_patched(name):
+        # It may be another one by then.
+        return
+    place = Place(callee.module, callee.definition)
+    if isinstance(callee.definition, ast.Lambda):
+        shown = ast.unparse(callee.definition)
+    else:
+        shown = f'{callee.definition.name}({ast.unparse(callee.definition.args)})'
+        for statement, _ in run.modules.top(module).statements.get(name, ()):
+            if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value:
+                place = Place(module, statement.value)
+    run.report('bad-signature', place, f'{shown} is called as {binding.call}')
 
 
 def _function_of(evaluator: Evaluator, value: Value) -> tuple[Function, Arguments] | None:

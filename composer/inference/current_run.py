@@ -43,8 +43,6 @@ class Run:
     Attributes:
         doubts: The number of conditions around the place that only the file decides.
         state_doubts: Those of them that hang on the state only.
-        limits: The number of those around it that the file has a part in: what is read there is
-            reached, but a name that the node lacks may be one of its parts that is switched off.
         decided: The number of conditions around it of the file, whatever it says.
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
@@ -69,7 +67,6 @@ class Run:
         self.reading = Reading()
         self.doubts = 0
         self.state_doubts = 0
-        self.limits = 0
         self.decided = 0
         self.guards = 0
         self.broad_guards = 0
@@ -111,16 +108,16 @@ class Run:
     @property
     def is_certain(self) -> bool:
         """Whether what is used at the place has to be there."""
-        return not (self.doubts or self.limits or self.broad_guards)
+        return not (self.doubts or self.broad_guards)
 
     @property
-    def standing(self) -> tuple[int, int, int, int]:
+    def standing(self) -> tuple[int, int, int]:
         """The counts that a statement may raise for those that follow it."""
-        return self.doubts, self.state_doubts, self.limits, self.decided
+        return self.doubts, self.state_doubts, self.decided
 
     @standing.setter
-    def standing(self, counts: tuple[int, int, int, int]) -> None:
-        self.doubts, self.state_doubts, self.limits, self.decided = counts
+    def standing(self, counts: tuple[int, int, int]) -> None:
+        self.doubts, self.state_doubts, self.decided = counts
 
     @contextmanager
     def condition(
@@ -144,9 +141,7 @@ class Run:
 
     def doubt(self, chosen: int, count: int = 1) -> None:
         """Note conditions, by how the file decides on them."""
-        if chosen == BY_RUN:
-            self.limits += count
-        else:
+        if chosen != BY_RUN:
             self.doubts += count
             self.state_doubts += count if chosen == BY_STATE else 0
 
@@ -175,7 +170,7 @@ class Run:
         """Read the top of a module meanwhile, on no condition of the place that needs it."""
         before = self.standing, self.guards, self.conditions
         flags = self.is_silent, self.is_at_top
-        self.standing, self.guards = (0, 0, 0, 0), int(is_guard)
+        self.standing, self.guards = (0, 0, 0), int(is_guard)
         self.conditions, self.is_silent, self.is_at_top = 0, False, True
         try:
             yield

@@ -268,6 +268,7 @@ class Function:
         owner: What its first parameter is bound to, if it is a method.
         is_read: Whether a call of it has been followed.
         of: The `Class` that defines it, if it is a method.
+        defaults: What those of an inner function were when it was made, by their expressions.
     """
 
     module: ModuleSource
@@ -276,6 +277,7 @@ class Function:
     owner: Value | None = None
     is_read: bool = False
     of: Any = None
+    defaults: dict[ast.expr, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -305,6 +307,7 @@ class Instance:
         is_open: Whether something unknown may have stored attributes in it.
         is_unmade: Whether nobody has seen how it was made.
         is_member: Whether it is a member of an enumeration.
+        is_no_value: Whether it is one that no field holds: only its `value` may be.
     """
 
     of: Class
@@ -315,6 +318,7 @@ class Instance:
     is_open: bool = False
     is_unmade: bool = False
     is_member: bool = False
+    is_no_value: bool = False
 
     def set(self, name: str, value: Value) -> None:
         """Note what an attribute may be."""

@@ -79,6 +79,24 @@ def matches_pattern(pattern: str, full_name: str) -> bool:
     return len(names) in reached
 
 
+def covers_pattern(wider: str, pattern: str) -> bool:
+    """Return whether each node that takes the parameters below `pattern` takes those of `wider`.
+
+    As parts of a name, `*` is matched by wildcards only; `**` stands for no part, and for more
+    than `wider` has.
+    """
+    parts = _split(pattern)
+    many = [_ONE] * (len(_split(wider)) + 1)
+    return all(
+        matches_pattern(wider, '/'.join(each for part in parts for each in _fill(part, fill)))
+        for fill in ([], many)
+    )
+
+
+def _fill(part: str, fill: list[str]) -> list[str]:
+    return fill if part == _ANY else [part]
+
+
 def _split(name: str) -> list[str]:
     return name.removeprefix('/').split('/')
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 from composer.records import record
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from jsonschema.exceptions import ValidationError
 
+    from composer.diagnostics import Span
     from composer.yaml_text.positions import DataPath, SourceMap
 
 _TYPE_WORDS = {
@@ -42,6 +43,7 @@ class Violation:
         at_key: Whether the key is wrong, rather than its value.
         drop: The path of the smallest mapping entry to drop before reading on.
         meant: For an unknown key, the nearest known one.
+        conflicting: For keys that exclude each other, their paths; each may be the wrong one.
         stand_in: For a missing key, the key and a value to read the rest of its mapping with.
     """
 
@@ -53,11 +55,30 @@ class Violation:
     help: str | None = None
     meant: str | None = None
     stand_in: tuple[str, Any] | None = None
+    conflicting: tuple[DataPath, ...] = ()
 
     def diagnostic(self, positions: SourceMap) -> Diagnostic:
         """Return the finding for it."""
+        if self.conflicting:
+            return self._conflict(positions)
         span = positions.key(self.path) if self.at_key else positions.value(self.path)
         return diagnostic_at(span, self.rule, self.message, help=self.help)
+
+    def _conflict(self, positions: SourceMap) -> Diagnostic:
+        """Return the finding at the last key that is not merged into the mapping."""
+        mapping = positions.value(self.path[:-1])
+        spans = [positions.key(each) for each in self.conflicting]
+        merged = [each for each in spans if _is_before(each, mapping)]
+        own = [each for each in spans if each not in merged]
+        related = [Related('merged in from here', each) for each in merged]
+        at = own[-1] if own else mapping
+        return diagnostic_at(at, self.rule, self.message, help=self.help, related=related)
+
+
+def _is_before(span: Span, other: Span) -> bool:
+    """Return whether a place is above another of its file, as an anchor is above its alias."""
+    is_above = (span.line, span.column) < (other.line, other.column)
+    return span.source is other.source and is_above
 
 
 def path_of(error: ValidationError) -> DataPath:
@@ -83,7 +104,8 @@ def missing_key(error: ValidationError, key: str, message: str) -> Violation:
 def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
     """Return the violation for keys that cannot be used together."""
     path = path_of(error)
-    last = max(keys, key=list(error.instance).index)
+    written = sorted(keys, key=list(error.instance).index)
+    last = written[-1]
     listed = ' and '.join(f"'{key}'" for key in keys)
     return Violation(
         'conflicting-keys',
@@ -92,6 +114,7 @@ def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:
         (*path, last),
         at_key=True,
         help='keep one of them',
+        conflicting=tuple((*path, key) for key in written),
     )
 
 

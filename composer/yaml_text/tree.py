@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
@@ -14,6 +15,13 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+# A key and its value without a space between them, which YAML reads as one text.
+_GLUED = re.compile(r'[ -]*(?P<key>[\w.~/-]+):(?P<value>[^\s:#][^:#]*?)\s*(?:#.*)?')
+# What the parser says one line too late.
+_AFTER_GLUED = (
+    'mapping values are not allowed in this context',
+    "could not find expected ':'",
+)
 _QUOTES = ("'", '"')
 
 # libyaml's parser is ten times faster; wheels of PyYAML bring it, source builds may not.
@@ -261,6 +269,8 @@ def _quote_problem(begun: Any, source: SourceFile) -> Diagnostic:
 def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnostic:
     mark = error.problem_mark or error.context_mark
     span = Span(source, mark.line + 1, mark.column + 1) if mark else Span(source, 1, 1, 0)
+    if (glued := _find_glued_key(error, span)) is not None:
+        return glued
     problem = error.problem or error.context or 'it cannot be parsed'
     begun = error.context_mark
     context = f' {error.context}' if error.context and error.problem else ''
@@ -270,6 +280,25 @@ def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnost
         related = (Related('it begins here', Span(source, begun.line + 1, begun.column + 1)),)
     message = f'this is not YAML: {problem}{context}'
     return diagnostic_at(span, 'yaml-syntax', message, help=_syntax_help(span), related=related)
+
+
+def _find_glued_key(error: yaml.MarkedYAMLError, span: Span) -> Diagnostic | None:
+    """Return the finding for a `key:value` above, which makes the next line part of its text."""
+    if error.problem not in _AFTER_GLUED:
+        return None
+    number = span.line - 1
+    while number and not span.source.line(number).split('#')[0].strip():
+        number -= 1
+    found = _GLUED.fullmatch(span.source.line(number))
+    if found is None:
+        return None
+    key, value = found['key'], found['value']
+    return diagnostic_at(
+        Span(span.source, number, found.start('key') + 1, len(f'{key}:{value}')),
+        'yaml-syntax',
+        f"this is not YAML: '{key}:' needs a space before its value",
+        help=f"write '{key}: {value}'",
+    )
 
 
 def _syntax_help(span: Span) -> str | None:

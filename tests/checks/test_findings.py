@@ -97,6 +97,15 @@ def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
     ]
 
 
+def test_a_bad_namespace_of_the_defaults_is_shown_with_what_lies_in_it(tmp_path):
+    file = tmp_path / 'system.yaml'
+    file.write_text('version: 1\ndefaults: {namespace: /a-b}\nnodes: {n: {namespace: c}}\n')
+    ((_, said),) = check_files([file])
+    findings = [each for each in said if each.rule == 'bad-name']
+    assert [each.span.line for each in findings] == [3]
+    assert [each.span.line for each in findings[0].related] == [2]
+
+
 def test_an_argument_whose_expression_fails_is_not_missed_again(tmp_path):
     (tmp_path / 'taking.py').write_text('def send(node, order): ...\n')
     path = tmp_path / 'system.yaml'

@@ -112,6 +112,19 @@ def test_a_value_that_a_later_file_replaces_is_not_held_against_the_declaration(
     assert check(nodes, p=texts[0], q=texts[1]) == []
 
 
+@pytest.mark.parametrize(
+    ('name', 'help_text'),
+    [
+        ('sped', "did you mean 'speed'?"),
+        ('use_sim_tme', "did you mean 'use_sim_time'?"),
+        ('horizon', 'declared are: count, gains, mode, names, octets, speed'),
+    ],
+)
+def test_an_undeclared_parameter_comes_with_the_nearest(check, name, help_text):
+    (line,) = check(ARM, p=f'/**: {{ros__parameters: {{{name}: true}}}}')
+    assert line.endswith(f'and ROS ignores it → {help_text}')
+
+
 def test_a_file_that_several_nodes_use_is_spoken_of_once(check):
     nodes = """
       "arm_{{ i }}":
@@ -163,9 +176,27 @@ def test_a_value_that_never_counts_is_a_warning(check):
     ]
     assert said(head + '/**: {ros__parameters: {mode: slow}}\n') == [
         "p.yaml:3:5 overridden-parameter: 'mode' never has this value: p.yaml:4 overrides it "
-        '→ the last name that matches a node wins: write wildcards above'
+        "→ the last name that matches a node wins: write '/**' above"
     ]
     assert said('/**: {ros__parameters: {mode: slow}}\n' + head) == []
+
+
+@pytest.mark.parametrize(
+    ('upper', 'lower', 'is_lost'),
+    [
+        ('/*/arm', '/**', True),
+        ('/robot/*', '/*/*', True),
+        ('/**/arm', '/**', True),
+        ('/**', '/*/*', False),
+        ('/**/arm', '/*/arm', False),
+        ('/*/arm', '/robot/*', False),
+        ('/robot/*', '/robot/arm', False),
+    ],
+)
+def test_a_wider_name_below_takes_what_stands_above(check, upper, lower, is_lost):
+    text = ''.join(f'{name}: {{ros__parameters: {{mode: slow}}}}\n' for name in (upper, lower))
+    found = [line.split(': ')[0] for line in check(ARM, p=text)]
+    assert found == [f'p.yaml:1:{len(upper) + 22} overridden-parameter'] * is_lost
 
 
 def test_a_later_file_that_loses_by_its_type_is_a_warning(check):

@@ -13,6 +13,8 @@ LEAKS = {
     'filter': 'nodes: {a: {log_level: "{{ env(\'PW\') | upper | reverse }}"}}',
     'text': 'nodes: {a: {publishers: {p: "my_{{ env(\'PW\') }}/msg/X"}}}',
     'key': 'nodes: {"{{ env(\'PW\') }}": {}}',
+    'namespace': 'nodes: {a: {namespace: "{{ env(\'PW\') }}"}}',
+    'topic': 'nodes: {a: {publishers: {p: {type: std_msgs/msg/String, topic: "{{ env(\'PW\') }}"}}}}',
     'foreach': 'nodes: {"n{{ i }}": {foreach: {i: "{{ env(\'PW\') | list }}"}, log_level: "{{ i }}"}}',
     'include': 'include: {i: {file: part.yaml, args: {who: "{{ env(\'PW\') }}"}}}',
     'raised': "nodes: {a: {description: \"{{ {}[env('PW')] }}{{ env('PW').index('zzz') }}\"}}",

@@ -107,11 +107,23 @@ def test_a_condition_that_is_no_boolean_is_said():
     assert messages(system) == [('bad-when', 'when must be true or false, not 1')]
 
 
-def test_one_name_for_all_repetitions_is_said_with_the_way_out():
-    system = load('nodes: {n: {foreach: {i: [1, 2]}}}')
-    (finding,) = system.diagnostics
-    assert finding.message == "foreach makes more than one 'n'"
-    assert finding.help == 'use its variables in the name, as in "n_{{ i }}"'
+@pytest.mark.parametrize(
+    ('name', 'foreach', 'made', 'help_text'),
+    [
+        ('n', '{i: [1, 2]}', 'n', 'use its variables in the name, as in "n_{{ i }}"'),
+        (
+            'n_{{ row }}',
+            '{row: [1], kind: [a, b]}',
+            'n_1',
+            'use its variables in the name, as in "n_{{ row }}_{{ kind }}"',
+        ),
+        ('n{{ i }}', '{i: [1, 1]}', 'n1', "a variable's list should have each value once"),
+    ],
+)
+def test_one_name_for_all_repetitions_is_said_with_the_way_out(name, foreach, made, help_text):
+    (finding,) = load(f'nodes: {{"{name}": {{foreach: {foreach}}}}}').diagnostics
+    assert finding.message == f"foreach makes more than one '{made}'"
+    assert finding.help == help_text
 
 
 def test_more_entries_than_anybody_wants_need_to_be_asked_for():

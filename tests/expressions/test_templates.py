@@ -127,6 +127,8 @@ def test_a_filled_key_that_is_there_already_is_a_duplicate():
         ('x: "one\n        {{ nmae }}"', 'nmae', '8:12'),
         ('"{{ nmae }}": 1', 'nmae', '7:11'),
         ('x: [1, "{{ nmae }}"]', 'nmae', '7:18'),
+        ('x: "{{ rage(count) }}"', 'rage', '7:14'),
+        ("x: \"{{ evn('CITY', 'Ulm') }}\"", 'evn', '7:14'),
     ],
 )
 def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
@@ -137,9 +139,11 @@ def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
 
 
 def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
-    helps = [each.help for each in load('{x: "{{ nmae }}", y: "{{ zzz }}"}').diagnostics]
+    text = '{x: "{{ nmae }}", z: "{{ rnge(2) }}", y: "{{ zzz }}"}'
+    helps = [each.help for each in load(text).diagnostics]
     assert helps == [
         "did you mean 'name'?",
+        "did you mean 'range'?",
         'in scope are: count, env, find, here, loud, name, range, rate',
     ]
     (finding,) = load_system_text('version: 1\nnodes: {}\ndescription: "{{ a }}"').diagnostics

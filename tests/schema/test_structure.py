@@ -306,6 +306,27 @@ def test_a_finding_in_a_merged_mapping_is_placed_where_it_is_written():
     assert findings(text) == [('wrong-type', "expected a number, got 'slow'", '2:24', None)]
 
 
+@pytest.mark.parametrize(
+    ('timer', 'place'),
+    [
+        ('{<<: *slow, rate: 1}', '5:15'),
+        ('{rate: 1, <<: *slow}', '5:4'),
+        ('{<<: [*slow, *fast]}', '5:3'),
+    ],
+)
+def test_a_conflict_with_a_merged_key_is_placed_where_it_is_merged_in(timer, place):
+    text = f"""{HEAD}x-slow: &slow {{period: 2, behaviour: a:b}}
+x-fast: &fast {{rate: 2}}
+nodes: {{rover: {{timers: {{tick:
+  {timer}}}}}}}
+"""
+    (finding,) = load_system_text(text).diagnostics
+    assert finding.rule == 'conflicting-keys'
+    assert f'{finding.span.line}:{finding.span.column}' == place
+    assert finding.related[0].message == 'merged in from here'
+    assert finding.related[0].span.line == 2
+
+
 def test_long_values_are_shown_short():
     ((_, message, _),) = node_findings(f'{{use_sim_time: {"x" * 500}}}')
     assert message == f"expected true or false, got '{'x' * 38}…"

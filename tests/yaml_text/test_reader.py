@@ -263,6 +263,9 @@ def test_an_unreadable_text_gets_one_clear_line(text, line):
     [
         ('a:\n\tb: 1\n', 2, 1, 'indent YAML with spaces, not tabs'),
         ('a: b: c\n', 1, 5, "put a value that contains ': ' in quotes"),
+        ('a:1.5\nb: 3\n', 1, 1, "write 'a: 1.5'"),
+        ('t:\n  a: 1\n  b:2.0  # s\n\n  c: 3\n', 3, 3, "write 'b: 2.0'"),
+        ('t:\n  - b:x.y\n    c: 3\n', 2, 5, "write 'b: x.y'"),
         ('a: [1, 2\nb: 3\n', 2, 2, None),
         ('a: {b: 1\n', 2, 1, None),
         ('a: "b\n', 1, 4, None),

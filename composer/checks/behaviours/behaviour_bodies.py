@@ -57,6 +57,8 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
 def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
     for binding, reading in readings:
         for each in reading.problems:
+            if each.rule == 'bad-signature' and _has_lost_arguments(context, binding):
+                continue
             if is_shipped(context, binding.behaviour.module):
                 if is_called_wrongly(context, binding):
                     continue
@@ -74,6 +76,12 @@ def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Dia
                     bound_at(context, binding),
                 ],
             )
+
+
+def _has_lost_arguments(context: CheckContext, binding: Binding) -> bool:
+    """Return whether arguments of a behaviour have errors that were reported already."""
+    owner = binding.behaviour.path[:-1]
+    return any(path[: len(owner)] == owner for path in context.system.dropped)
 
 
 def _publishing_behaviours(context: CheckContext) -> set[str]:

@@ -13,10 +13,11 @@ from jinja2.exceptions import SecurityError
 
 from composer.expressions.evaluation import Evaluator
 from composer.expressions.sandbox import Method
+from composer.inference.message_types import MessageTypes
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.records import record
-from composer.spelling import suggest
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -119,6 +120,7 @@ class SampleEvaluator(Evaluator):
         self.findings: list[ExpressionFinding] = []
         self._types = types
         self._catalogue = catalogue
+        self._messages = MessageTypes(catalogue)
         self._known: dict[int, Any] = {}
         self._guarded: set[int] = set()
 
@@ -224,16 +226,21 @@ class SampleEvaluator(Evaluator):
         return UNKNOWN
 
     def _find_attribute(self, node: nodes.Getattr, owner: Any) -> Any:
-        # Descriptions of installed packages lack constants, which have names in capitals.
-        is_open = owner is UNKNOWN or isinstance(owner, _Numbers | Method) or node.attr.isupper()
+        is_open = owner is UNKNOWN or isinstance(owner, _Numbers | Method)
         found = UNKNOWN if is_open else self.sandbox.attribute(owner, node.attr)
         if not isinstance(found, Undefined) or id(node) in self._guarded:
             return found
         if isinstance(owner, SampleMessage):
             description = describe_sample(owner)
+            is_constant = node.attr.isupper()
+            if is_constant and self._messages.may_have_constant(description.name, node.attr):
+                return UNKNOWN
             fields = [field.name for field in description.fields]
             error = unknown_field(description.name, node.attr, fields)
-            self._report(str(error), node.attr, rule='unknown-field', help_text=error.help)
+            known = {*fields, *self._messages.constants(description.name)}
+            near = find_nearest(node.attr, known) if is_constant else None
+            help_text = did_you_mean(near, error.help)
+            self._report(str(error), node.attr, rule='unknown-field', help_text=help_text)
         else:
             message = f"{self.noun_of(node.node)} has no field '{node.attr}'"
             self._report(message, node.attr, rule='unknown-field')

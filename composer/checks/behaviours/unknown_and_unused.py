@@ -81,15 +81,19 @@ def _check_names(
         is_open = any(reading.reaches_ros for _, reading in uses[name])
         used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
+            known = declared[binding.behaviour.name]
+            sought = {each.name for each in reading.uses if each.is_change and each.has_default}
             for use in reading.uses:
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
-                is_needed = use.is_certain and not (use.has_default or use.is_change)
-                if not is_needed and not _is_typo(
-                    node, use, declared[binding.behaviour.name], used
-                ):
+                is_needed = use.is_certain and not use.has_default
+                if use.is_change:
+                    # ROS only passes on what is declared.
+                    is_elsewhere = use.name in sought or (use.kind, use.name) in known
+                    is_needed &= not (is_elsewhere or _is_of_ros(use.kind, use.name))
+                if not is_needed and not _is_typo(node, use, known, used):
                     continue
                 finding = _explain_name(context, node, binding, use)
                 key = (use.place, finding.rule)

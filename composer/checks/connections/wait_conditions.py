@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import full_name
@@ -94,10 +95,17 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
                 trail.remove(path)
                 pending.pop()
             elif target in trail:
-                names = [str(each[-1]) for each in trail[trail.index(target) :]]
+                cycle = trail[trail.index(target) :]
+                names = [str(each[-1]) for each in cycle]
                 way = ' → '.join([*names, names[0]])
                 message = f'{way}: these wait for each other, and none of them ever starts'
-                yield context.at_value(condition.path, 'wait-cycle', message)
+                related = [
+                    context.related_value(each.path, f"'{waiter[-1]}' waits here")
+                    for waiter, awaited in pairwise(cycle)
+                    for each, path in edges[waiter]
+                    if path == awaited
+                ]
+                yield context.at_value(condition.path, 'wait-cycle', message, related=related)
             elif target not in done:
                 pending.append((target, iter(edges.get(target, ()))))
 

@@ -22,6 +22,9 @@ from composer.inference.values import (
 )
 
 _ENUMERATIONS = {'enum.Enum', 'enum.IntEnum', 'enum.StrEnum', 'enum.Flag', 'enum.IntFlag'}
+# Those whose members are nothing else.
+_PLAIN = {'enum.Enum', 'enum.Flag', 'abc.ABC', 'builtins.object'}
+_CONVERSIONS = ('__index__', '__int__', '__float__', '__iter__', '__array__')
 # Those whose members are texts and numbers themselves.
 _MIXINS = {'enum.StrEnum', 'enum.IntEnum', 'builtins.str', 'builtins.int', 'builtins.float'}
 
@@ -62,8 +65,20 @@ class Enumerations(Part):
         key = (id(of.definition), name)
         if key not in self._members:
             held = {'value': value, 'name': constant(name)}
-            self._members[key] = Instance(of, held, is_shared=True, is_member=True)
+            self._members[key] = Instance(
+                of,
+                held,
+                is_shared=True,
+                is_member=True,
+                is_no_value=self._is_plain(of),
+            )
         return self._members[key]
+
+    def _is_plain(self, of: Class) -> bool:
+        """Return whether members are neither numbers nor texts, and are not taken as such."""
+        bodies = self._evaluator.classes.bodies
+        is_known = UNKNOWN not in bodies.line_of(of) and bodies.externals(of) <= _PLAIN
+        return is_known and all(bodies.find(of, name) is None for name in _CONVERSIONS)
 
     def read(self, member: Constant, name: str) -> Value | None:
         """Return what a member has that is a text or a number; `None` for what these have."""

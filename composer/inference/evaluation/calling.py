@@ -58,7 +58,7 @@ class Calls(Part):
     def call(self, node: ast.Call, scope: Scope, *, is_awaited: bool = False) -> Value:
         """Return what a call may return."""
         function = self._evaluator.evaluate(node.func, scope)
-        arguments = self._arguments(node, scope)
+        arguments = self._arguments(node, scope, function)
         place = Place(scope.module, node)
         self._note_keys(function, arguments)
         if function == External('builtins.super'):
@@ -117,7 +117,7 @@ class Calls(Part):
         for argument in arguments.positional if is_lookup else ():
             self._evaluator.run.decide(argument.value)
 
-    def _arguments(self, node: ast.Call, scope: Scope) -> Arguments:
+    def _arguments(self, node: ast.Call, scope: Scope, function: Value) -> Arguments:
         positional: list[Argument] = []
         named: list[tuple[str, Argument]] = []
         is_open = False
@@ -151,6 +151,8 @@ class Calls(Part):
                 ]
             else:
                 is_open = True
+                place = Place(scope.module, keyword.value)
+                self._evaluator.payloads.check_keywords(function, value, place)
                 self._evaluator.escape(value)
         return Arguments(tuple(positional), tuple(named), is_open)
 

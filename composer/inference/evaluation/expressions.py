@@ -11,7 +11,7 @@ from composer.inference.evaluation.library.known_values import (
     NotKnownError,
     leaves_of,
 )
-from composer.inference.evaluation.operators import combine, compare, negate
+from composer.inference.evaluation.operators import combine, compare, negate, refuses_time
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
 from composer.inference.scopes import Names, Scope, join_names
@@ -167,6 +167,7 @@ class Expressions(Part):
         value = self._evaluator.awaited(chain[-1].left, scope)
         for each in reversed(chain):
             right = self._evaluator.awaited(each.right, scope)
+            self._refuse_time(each.op, value, right, Place(scope.module, each))
             if isinstance(value, Mapping) and isinstance(right, Mapping):
                 value = self._merge(value, right)
             elif any(isinstance(one, Instance) for one in (value, right)):
@@ -174,6 +175,14 @@ class Expressions(Part):
             else:
                 value = combine(each.op, value, right)
         return value
+
+    def _refuse_time(
+        self, sign: ast.operator | ast.cmpop, left: Value, right: Value, place: Place
+    ) -> None:
+        if refuses_time(sign, left, right):
+            text = 'a time of rclpy is combined only with durations and other times'
+            help_text = 'write .nanoseconds, or rclpy.time.Time.from_msg(stamp)'
+            self._evaluator.run.report('bad-call', place, text, help_text)
 
     def _call_operator(self, sign: ast.operator, left: Value, right: Value) -> Value:
         """Return what the method of an object makes of an operator: `__add__`."""
@@ -206,6 +215,7 @@ class Expressions(Part):
         chosen = 0
         for sign, operand in zip(node.ops, node.comparators, strict=True):
             right = self.evaluate(operand, scope)
+            self._refuse_time(sign, left, right, Place(scope.module, node))
             if isinstance(sign, ast.In | ast.NotIn):
                 self._evaluator.attributes.note_containment(
                     left, right, Place(scope.module, node.left)

@@ -81,10 +81,11 @@ class Functions(Part):
         is_top = scope.function is None and scope.outer is None
         around = None if is_top else scope
         function = Function(scope.module, node, scope.outer if scope.is_body else around)
-        for default in (*node.args.defaults, *node.args.kw_defaults):
-            if default is not None:
-                self._evaluator.evaluate(default, scope)
+        expressions = [each for each in (*node.args.defaults, *node.args.kw_defaults) if each]
+        defaults = {each: self._evaluator.evaluate(each, scope) for each in expressions}
         if not is_top and not scope.is_body:
+            # In each round of a loop, they may be others.
+            function.defaults = defaults
             self._evaluator.home_of(scope).inner.append(function)
         return function
 
@@ -185,7 +186,6 @@ class Functions(Part):
         at = (
             bool(run.doubts),
             run.is_sure,
-            bool(run.limits),
             bool(run.decided),
             bool(run.guards),
             run.is_silent,
@@ -196,7 +196,8 @@ class Functions(Part):
         owner: object = function.owner
         if isinstance(owner, Instance):
             owner = (id(owner), owner.version)
-        return (id(function.definition), id(function.outer), owner, names, at, *values)
+        made = (id(function.definition), id(function.outer), *function.defaults.values())
+        return (made, owner, names, at, *values)
 
     def enter(self, function: Function, arguments: Arguments, *, waits: bool) -> Scope:
         """Follow the body of a function; return its scope at its end."""
@@ -267,9 +268,7 @@ class Functions(Part):
             if name in named:
                 scope.set(name, named.pop(name).value)
             elif name in defaults and not arguments.is_open:
-                outer = function.outer or Scope(function.module)
-                with self._evaluator.run.silence():
-                    scope.set(name, self._evaluator.evaluate(defaults[name], outer))
+                scope.set(name, self._default(function, defaults[name]))
             else:
                 scope.set(name, UNKNOWN)
         if parameters.vararg:
@@ -283,6 +282,14 @@ class Functions(Part):
                 parameters.kwarg.arg,
                 Mapping(entries, arguments.is_open, self._evaluator.run.conditions),
             )
+
+    def _default(self, function: Function, expression: ast.expr) -> Value:
+        if expression in function.defaults:
+            return function.defaults[expression]
+        with self._evaluator.run.silence():
+            outer = function.outer or Scope(function.module)
+            value: Value = self._evaluator.evaluate(expression, outer)
+        return value
 
 
 def result_of(kind: FunctionKind, scope: Scope) -> Value:

@@ -85,6 +85,26 @@ def combine(sign: ast.operator, left: Value, right: Value) -> Value:
     return join(_combine(sign, *pair) for pair in pairs)
 
 
+def refuses_time(sign: ast.operator | ast.cmpop, left: Value, right: Value) -> bool:
+    """Return whether an operator refuses a time of rclpy with what it meets."""
+    if isinstance(sign, ast.Eq | ast.NotEq | ast.Is | ast.IsNot | ast.In | ast.NotIn):
+        return False
+    pairs = [(one, other) for one in alternatives(left) for other in alternatives(right)]
+    return all(_refuse_time(sign, *pair) for pair in pairs)
+
+
+def _refuse_time(sign: ast.operator | ast.cmpop, left: Value, right: Value) -> bool:
+    time = PartOfNode('time')
+    if left == right == time:
+        return isinstance(sign, ast.Add)
+    if time not in (left, right):
+        return False
+    other = right if left == time else left
+    if isinstance(other, Message):
+        return True
+    return isinstance(other, Constant | Scalar) and other.kind in _NUMBERS
+
+
 def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     chosen = chosen_with(left, right)
     if isinstance(left, Constant) and isinstance(right, Constant):

@@ -16,6 +16,7 @@ from composer.inference.values import (
     Constant,
     External,
     Function,
+    Instance,
     Mapping,
     Message,
     MessageClass,
@@ -29,6 +30,7 @@ from composer.inference.values import (
     Value,
     alternatives,
     is_none,
+    join,
 )
 from composer.interfaces.field_errors import (
     FieldError,
@@ -105,6 +107,15 @@ class Payloads(Part):
         fit = _Fit('', self._evaluator.run.types)
         found = fit.any_of(value, lambda each: fit.field(item_type, each, place, ()))
         self._settle(found, fit, place)
+
+    def check_keywords(self, function: Value, value: Value, place: Place) -> None:
+        """Check one of several mappings that a message is made with: `Twist(**TABLE[key])`."""
+        several = [each for each in alternatives(value) if isinstance(each, Mapping)]
+        if isinstance(function, MessageClass):
+            self.check(function.type, join(several), place)
+        else:
+            # It may be meant for this.
+            self._fitting.update(map(id, several))
 
     def _settle(self, found: list[Misfit], fit: _Fit, place: Place) -> None:
         if self._evaluator.run.is_silent:
@@ -335,9 +346,11 @@ def _may_hold(kind: str, given: type) -> bool:
 
 
 def _is_no_value(value: Value) -> bool:
-    """Return whether a value is a function or the like, which may have been meant to be called."""
+    """Return whether a value is a function or the like, or a member of a plain enumeration."""
     if isinstance(value, External):
         return value.name in KNOWN_RESULTS
+    if isinstance(value, Instance):
+        return value.is_no_value
     return isinstance(value, Function | Class | MessageClass | Partial | ProjectModule | NodeValue)
 
 
@@ -352,6 +365,8 @@ def _shown(value: Value) -> str:
             return 'a class'
         case ProjectModule():
             return 'a module'
+        case Instance():
+            return f"a member of {value.of.definition.name}, and not its 'value'"
         case NodeValue():
             return 'the node'
         case Constant():

@@ -110,6 +110,7 @@ def odometry(node):
 WRONG = {
     # names, however they are reached
     "if m.pose: node.publish('comand', {})": 'unknown-publisher',
+    "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})": 'unknown-publisher',
     "ok = m.pose and node.publish('comand', {})": 'unknown-publisher',
     "n = node; n.publish('comand', {})": 'unknown-publisher',
     "send = node.publish; send('comand', {})": 'unknown-publisher',
@@ -286,7 +287,6 @@ RIGHT = [
     "if node.parameters.mode == 'fast': node.state.distance = 3\nif node.state.distance == 3: print(m.velocity)",
     "node.parameters.mode == 'fast' and m.pose.pose.position.x > 2 and print(m.velocity)",
     'if node.parameters.speed * 2 > 3: print(m.velocity)',
-    "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})",
     "for n, on in (('command', True), ('other', False)): node.publish(n, {}) if on else None",
     "for n in ('command', 'other'):\n    if m.child_frame_id == n: node.publish(n, {})",
     "for n in ('command', 'other'):\n    if n == 'other': continue\n    node.publish(n, {})",

@@ -1170,6 +1170,69 @@ PLANTED = {
         def hear(node, m):
             Sub(node).go()
         """,
+    'lambdas of a comprehension that keep their items': """
+        def hear(node, m):
+            table = {
+                name: (lambda name=name, value=value: node.publish(name, value))
+                for name, value in [('<comand|command>', {}), ('level', 1)]
+            }
+            for send in table.values():
+                send()
+        """,
+    'functions of a loop that keep their items': """
+        def hear(node, m):
+            for name, value in [
+                ('level', 1),
+                ('<comand|command>', {}),
+            ]:
+                def send(*, name=name):
+                    node.publish(name, value)
+                send()
+        """,
+    'a member of a plain enumeration': """
+        from enum import Enum, IntEnum
+        class Mode(Enum):
+            SLOW = 3
+        class Level(IntEnum):
+            SLOW = 3
+        def hear(node, m):
+            node.publish('level', <Mode|Level>.SLOW)
+        """,
+    'a table of fields that a message is made with': """
+        from geometry_msgs.msg import Twist, Vector3
+        KEYS = {
+            'w': {'linear': Vector3(x=0.3)},
+            'a': {'<angle|angular>': Vector3(z=0.8)},
+        }
+        MADE = {'w': (Twist, {'linear': Vector3()}), 'a': (Vector3, {'x': 1.0})}
+        def hear(node, m):
+            fields = KEYS.get(m.child_frame_id)
+            if fields is not None:
+                node.publish('command', Twist(**fields))
+            kind, values = MADE[m.child_frame_id]
+            print(kind(**values))
+        """,
+    'a time without a stamp': """
+        from rclpy.time import Time
+        def hear(node, m):
+            stamp = m.header.stamp
+            then = Time.from_msg(stamp)
+            print(node.now() - <stamp|then>)
+        """,
+    'a time that is compared with a number': """
+        def hear(node, m):
+            now, seconds = node.now(), 5
+            if <now|seconds> > 3.0:
+                print(now == seconds, now - now)
+        """,
+    'a time without a number': """
+        from rclpy.duration import Duration
+        def hear(node, m):
+            second, one = Duration(seconds=1), 1.0
+            last = node.own_state.get('last', 0)
+            node.own_state['last'] = node.now()
+            print(node.now() + <one|second>, last and node.now() - last)
+        """,
 }
 # What looks wrong, and is not.
 RIGHT = {

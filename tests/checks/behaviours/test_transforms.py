@@ -72,6 +72,20 @@ def findings(fields, heard='nav_msgs/msg/Odometry'):
             "did you mean 'position'? its fields are position, orientation",
         ),
         (
+            'twist.linear.x: pose.pose.position.X * 2',
+            'unknown-field',
+            'X',
+            "geometry_msgs/msg/Point has no field 'X'",
+            "did you mean 'x'?",
+        ),
+        (
+            'twist.linear.x: message.SOME_CONSTANT',
+            'unknown-field',
+            'SOME_CONSTANT',
+            "nav_msgs/msg/Odometry has no field 'SOME_CONSTANT'",
+            'its fields are header, child_frame_id, pose, twist',
+        ),
+        (
             'twist.linear.x: "[pose.covariance[0] | rond(2), 1] | max"',
             'bad-expression',
             'rond',
@@ -188,7 +202,6 @@ def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
         'twist.linear.x: nothing | default(0)',
         'twist.linear.x: 1 if nothing is defined else 2',
         'header.frame_id: child_frame_id.upper()',
-        'twist.linear.x: message.SOME_CONSTANT',
         'twist.linear.x: header.stamp.sec + 0.5',
         'twist.linear.x: header.stamp.sec / 2',
         'twist.linear.x: "{1: 2.0}[1]"',
@@ -213,6 +226,19 @@ def test_what_cannot_work_is_a_finding(fields, rule, part, message, help_text):
 )
 def test_what_may_work_has_no_finding(fields):
     assert findings(fields) == []
+
+
+@pytest.mark.parametrize(
+    ('name', 'help_text'),
+    [
+        ('STATUS_FIX', None),
+        ('STATUS_FXI', "did you mean 'STATUS_FIX'?"),
+        ('SERVICE', "did you mean 'service'?"),
+    ],
+)
+def test_constants_are_known_by_their_names(name, help_text):
+    found = findings(f'header.stamp.sec: message.{name}', 'sensor_msgs/msg/NavSatStatus')
+    assert [each[3] for each in found] == [help_text] * (help_text is not None)
 
 
 def test_fields_of_items_of_arrays_are_known():

@@ -61,6 +61,45 @@ def test_an_abbreviated_name_that_has_a_default_is_a_finding(check):
     assert check(text, run(older, "node.publish('out', 'hello')")) == []
 
 
+@pytest.mark.parametrize(
+    'lines',
+    [
+        ('for f in [lambda n=n: node.publish(n, "hi") for n in NAMES]: f()',),
+        ('f = {n: (lambda n=n: node.publish(n, "hi")) for n in NAMES}', 'f[node.state.n]()'),
+        ('for n in NAMES:', '    def f(*, n=n): node.publish(n, "hi")', '    f()'),
+    ],
+)
+def test_a_function_of_each_round_uses_the_name_of_its_own(check, lines):
+    text = """
+  a:
+    state: {n: up}
+    publishers:
+      up: {type: std_msgs/msg/String, external: true}
+      down: {type: std_msgs/msg/String, external: true}
+    on_start: parts:run
+"""
+    assert check(text, 'NAMES = ("up", "down")\n' + run(*lines)) == []
+
+
+@pytest.mark.parametrize(
+    ('lines', 'is_found'),
+    [
+        (["print(changes['limit'])"], True),
+        (["if 'speed' in changes:", "    print(changes['limit'])"], True),
+        (["print(changes['speed'])"], False),
+        (["print(changes['use_sim_time'])"], False),
+        (["print(changes['qos_overrides./out.publisher.depth'])"], False),
+        (["if 'limit' in changes:", "    print(changes['limit'])"], False),
+        (["if node.name == 'b':", "    print(changes['limit'])"], False),
+        (["node.ros.declare_parameter('limit', 1)", "print(changes['limit'])"], False),
+    ],
+)
+def test_a_change_is_of_a_parameter_that_is_declared(check, lines, is_found):
+    text = f'{NODE}    on_parameters: parts:decide\n'
+    code = run(USES_ALL) + run(*lines, head='def decide(node, changes):')
+    assert check(text, code) == ([(3 + len(lines), 'unknown-parameter')] if is_found else [])
+
+
 def test_a_parameter_may_be_declared_with_rclpy(check):
     lines = ["node.ros.declare_parameter('mode', 0)", 'print(node.parameters.mode)']
     assert check(NODE, run(USES_ALL, *lines)) == []

@@ -53,7 +53,7 @@ def decide(node, changes):
 
 
 @functools.cache
-def decorated(number, of, parameters):
+def decorated(node):
     return None
 
 

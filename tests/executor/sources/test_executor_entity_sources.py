@@ -362,11 +362,14 @@ def test_a_response_waits_for_a_message_that_came_after_the_last_look(
 ) -> None:
     heard: list[str] = []
     client = node.create_client(Trigger, 'greet')
-    node.create_subscription(Int32, 'count', lambda _: heard.append('message'), 10)
+    subscription = node.create_subscription(Int32, 'count', lambda _: heard.append('message'), 10)
     publisher = node.create_publisher(Int32, 'count', 10)
     node.create_service(Trigger, 'greet', lambda _, r: r)
     executor.spin_once(timeout_sec=0)
     assert client.wait_for_service(DEADLINE_SEC)
+    # A message to an end that does not know the other yet is sent again, which is later.
+    wait_for(publisher.get_subscription_count)
+    wait_for(subscription.get_publisher_count)
     future = client.call_async(Trigger.Request())
     future.add_done_callback(lambda _: heard.append('response'))
     executor.spin_once(timeout_sec=DEADLINE_SEC)

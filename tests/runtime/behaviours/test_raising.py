@@ -258,8 +258,8 @@ def test_what_composer_raises_on_purpose_shows_the_line_of_the_behaviour_last(co
     """
     code = """
         def fail(node):
-            name = 'wrods'
-            node.publish(name[:], 'hello')
+            name = 'wrods'  # composer: ignore[unknown-publisher]
+            node.publish(name, 'hello')
     """
     child = compose(text, code)
     line = child.wait_for_line('raised UndeclaredError')
@@ -269,7 +269,7 @@ def test_what_composer_raises_on_purpose_shows_the_line_of_the_behaviour_last(co
     assert child.lines[begin + 1 : begin + 6] == [
         '  Traceback (most recent call last):',
         f'    File "{compose.folder}/parts.py", line 4, in fail',
-        "      node.publish(name[:], 'hello')",
+        "      node.publish(name, 'hello')",
         "  composer.runtime.nodes.behaviour_node.UndeclaredError: node 'bad' declares no publisher 'wrods'",
         "  help: did you mean 'words'?",
     ]
