@@ -390,7 +390,10 @@ def test_a_goal_is_refused_while_another_runs(shared_connect):
 
 def test_a_new_goal_takes_the_place_of_the_one_that_runs(child, shared_connect, wait_for):
     client = shared_connect('preempt')
-    first = client.begin(71)
+    began = []
+    first = client.begin(71, began)
+    # What has not begun has nothing to clean up.
+    wait_for(lambda: began, 'feedback of the first')
     heard = []
     second = client.begin(72, heard)
 
