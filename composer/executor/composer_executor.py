@@ -15,6 +15,7 @@ from rclpy.task import Future, Task
 
 from composer.executor.after_fork import RefusedSpinner
 from composer.executor.deadlines import DelayedCall
+from composer.executor.sources.inbox import Inbox
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
 from composer.executor.tasks import ExecutorTask, ImmediateCallback, ScheduledTask
@@ -134,6 +135,14 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.registry.drop(node)
         self._spinner.scheduler.retry_suspended()
         self.wake()
+
+    def open_inbox(self, node: Any, subscription: Any, depth: int | None) -> Inbox:
+        """Return a new queue by which messages get to a subscription without the middleware.
+
+        Args:
+            depth: How many messages it holds; `None` for any number.
+        """
+        return self._spinner.registry.open_inbox(node, subscription, depth)
 
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Have `observer` told of what comes to a subscription or a timer of `node`.

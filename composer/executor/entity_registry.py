@@ -19,6 +19,7 @@ from composer.executor.sources.entity_sources import (
     TimerSource,
 )
 from composer.executor.sources.event_source import EventSource, ExecutorParts
+from composer.executor.sources.inbox import Inbox
 from composer.executor.sources.qos_events import is_checked_seldom
 from composer.executor.sources.waitable_sources import (
     ActionSource,
@@ -56,6 +57,7 @@ class EntityRegistry:
         self._lock = threading.RLock()
         self._nodes: dict[Any, _NodeEntities] = {}
         self._observers: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+        self._inboxes: WeakKeyDictionary[Any, Inbox] = WeakKeyDictionary()
         self._rest_until = 0.0
         self.is_stale = False
 
@@ -102,6 +104,16 @@ class EntityRegistry:
             if source is not None:
                 source.observer = observer
                 source.on_events(UNKNOWN_COUNT)
+
+    def open_inbox(self, node: Any, subscription: Any, depth: int | None) -> Inbox:
+        """Return a new inbox of a subscription of `node`."""
+        with self._lock:
+            inbox = self._inboxes[subscription] = Inbox(depth)
+            entities = self._nodes.get(node)
+            source = None if entities is None else entities.sources.get(subscription)
+            if isinstance(source, SubscriptionSource):
+                _connect(inbox, source)
+            return inbox
 
     def drop_all(self) -> None:
         """Stop listening to everything."""
@@ -151,6 +163,8 @@ class EntityRegistry:
                 with suppress(InvalidHandle):
                     source = source_class(entity, node, self._parts)
                     source.observer = self._observers.get(entity)
+                    if isinstance(source, SubscriptionSource) and entity in self._inboxes:
+                        _connect(self._inboxes[entity], source)
                     self._open(source)
                     seen.sources[entity] = source
         if half_made:
@@ -167,6 +181,12 @@ class EntityRegistry:
         if _is_waited_for(source):
             self._wait_set_thread.remove(source)
         source.close()
+
+
+def _connect(inbox: Inbox, source: SubscriptionSource) -> None:
+    source.inbox, inbox.source = inbox, source
+    if inbox.messages:
+        source.on_events(UNKNOWN_COUNT)
 
 
 def _class_for(waitable: Any) -> type[EventSource]:

@@ -193,6 +193,17 @@ class Scheduler:
                 self._ready.append(source)
         self._wake()
 
+    def deliver(self, source: QueuedSource, inbox: Any, message: Any) -> None:
+        """Add a message to the inbox of `source`."""
+        with self.lock:
+            source.revision += 1
+            if inbox.add(message) and source.pending < UNKNOWN_COUNT:
+                source.pending += 1
+            if source.alive and not source.queued:
+                source.queued = True
+                self._ready.append(source)
+        self._wake()
+
     def set_ready(self, source: QueuedSource) -> None:
         """Make `source` run once, however often this is called before it does."""
         with self.lock:

@@ -19,6 +19,7 @@ from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
+from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
@@ -130,6 +131,7 @@ class System:
             without_parameter_services=spec.without_parameter_services,
             stop_timeout_sec=spec.shutdown_timeout_sec,
             health=None if spec.diagnostics_period_sec is None else HealthRegistry(),
+            topics=LocalTopics(self._executor),
         )
 
     @property

@@ -14,7 +14,8 @@ from composer.executor import c_bindings
 from composer.executor.after_fork import end_child
 from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT
-from composer.executor.sources.event_source import NOTHING, EventSource
+from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
+from composer.executor.sources.inbox import Inbox
 
 _MIN_RESET_NS = 1_000_000
 
@@ -165,7 +166,17 @@ class SubscriptionSource(EventSource):
     rank = 1
     ask = staticmethod(Readiness.has_messages)
     watch_entity = staticmethod(c_bindings.watch_subscription)
-    __slots__ = ()
+    __slots__ = ('inbox',)
+
+    def __init__(self, entity: Any, node: Any, parts: ExecutorParts) -> None:
+        super().__init__(entity, node, parts)
+        self.inbox: Inbox | None = None
+
+    def close(self) -> None:
+        """See the base class."""
+        if self.inbox is not None:
+            self.inbox.source = None
+        super().close()
 
     def on_events(self, count: int) -> None:
         """See the base class."""
@@ -178,6 +189,16 @@ class SubscriptionSource(EventSource):
     def run(self) -> Any:
         """See the base class."""
         entity = self.entity
+        inbox = self.inbox
+        if inbox is not None and inbox.messages:
+            callback = entity.callback
+            try:
+                # In no variable: the callback may pass it on.
+                taken = [inbox.messages.popleft()]
+            except IndexError:
+                return NOTHING  # Another thread took it, or it was pushed out.
+            result = callback(taken.pop())
+            return result if result is not None and self._is_async(callback) else None
         revision = self.revision
         observer = self.observer
         arrived = None if observer is None else observer.begin_take()

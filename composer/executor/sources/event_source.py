@@ -121,10 +121,10 @@ class EventSource:
         A malformed request, or a response to another client, is taken as if there was nothing:
         what was announced may be behind it.
         """
-        if self.pending and not self._has_data():
+        if self.pending and not self.has_data():
             self.parts.scheduler.set_empty(self, revision)
 
-    def _has_data(self) -> bool:
+    def has_data(self) -> bool:
         """Ask the middleware whether there is something to take."""
         try:
             with self.entity.handle:

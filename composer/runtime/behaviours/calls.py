@@ -115,6 +115,8 @@ class BehaviourCall:
                 if may_begin is not None and not may_begin():
                     return FAILED
                 result = function(*arguments)
+                # A message that is passed on belongs to nobody then.
+                arguments = ()
                 if forked_children.in_child:
                     end_child()
                 return deliver(result)

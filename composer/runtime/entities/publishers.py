@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from sys import getrefcount
 from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
 from composer.runtime.health.unmatched import TopicEndpoint
+from composer.runtime.messages.ownership import UNHELD_ARGUMENT
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
@@ -22,7 +24,7 @@ class Publisher:
         publish: Publishes a payload on it.
     """
 
-    __slots__ = ('_endpoint', '_node', '_ros', 'publish')
+    __slots__ = ('_endpoint', '_local', '_node', '_ros', 'publish')
 
     def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
         message_class = import_interface(spec.type)
@@ -36,10 +38,13 @@ class Publisher:
             event_callbacks=self._endpoint.publisher_events(),
         )
         node.endpoints.append(self._endpoint)
-        send, convert = self._ros.publish, converter_for(message_class).convert
+        self._local = node.system.topics.add_publisher(self._ros)
+        send, convert = self._local.publish, converter_for(message_class).convert
 
-        def publish(payload: Payload) -> None:
-            send(convert(payload))
+        def publish(payload: Payload, unheld: int = UNHELD_ARGUMENT) -> None:
+            message = convert(payload)
+            is_held = message is payload and getrefcount(payload) > unheld
+            send(message, is_held=is_held)
 
         self.publish: Publish = publish
 
@@ -49,4 +54,5 @@ class Publisher:
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.endpoints.remove(self._endpoint)
+        self._node.system.topics.remove_publisher(self._local)
         self._node.ros.destroy_publisher(self._ros)

@@ -35,6 +35,7 @@ class Subscription:
         )
         node.endpoints.append(self._endpoint)
         node.count_missed(self._owner, self._ros)
+        self._local = node.system.topics.add_subscription(node.ros, self._ros)
 
     def change(self, spec: SubscriptionSpec) -> None:
         """See `LiveEntity`."""
@@ -43,6 +44,7 @@ class Subscription:
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.endpoints.remove(self._endpoint)
+        self._node.system.topics.remove_subscription(self._local)
         self._node.ros.destroy_subscription(self._ros)
 
     def _create_callback(self, spec: SubscriptionSpec) -> Callable[..., Any]:

@@ -34,6 +34,7 @@ from composer.runtime.nodes.callback_groups import (
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
+from composer.runtime.messages.ownership import UNHELD_RESULT
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
@@ -280,7 +281,7 @@ class LiveNode:
         def publish_result(payload: Any) -> None:
             if payload is not None:
                 # Looked up each time: an edit may put another one in its place.
-                publishers[publisher].publish(payload)
+                publishers[publisher].publish(payload, UNHELD_RESULT)
 
         return publish_result
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import OnError, QosSpec
     from composer.runtime.health.statistics import HealthRegistry
+    from composer.runtime.messages.local_delivery import LocalTopics
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
     from composer.yaml_text.positions import SourceMap
@@ -57,6 +58,7 @@ class SystemHandle:
         without_parameter_services: The full names of the nodes that have none.
         stop_timeout_sec: What running behaviours get to end.
         health: The health of the system's entities; `None` measures nothing.
+        topics: Hands messages over between its nodes.
     """
 
     context: Context
@@ -72,3 +74,4 @@ class SystemHandle:
     without_parameter_services: frozenset[str]
     stop_timeout_sec: float
     health: HealthRegistry | None
+    topics: LocalTopics

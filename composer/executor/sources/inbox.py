@@ -1,0 +1,58 @@
+"""Messages that are handed to a subscription within the process."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from composer.executor.sources.entity_sources import SubscriptionSource
+
+
+class Inbox:
+    """The queue of a subscription for messages that do not come through the middleware.
+
+    They are executed before those of the middleware. It holds as many as the middleware would: a
+    newer message pushes out the oldest.
+
+    Args:
+        depth: How many messages it holds; `None` for any number.
+
+    Attributes:
+        messages: The oldest first.
+        source: What takes them, while an executor listens to the subscription.
+        overruns: How many were pushed out.
+    """
+
+    __slots__ = ('depth', 'messages', 'overruns', 'source')
+
+    def __init__(self, depth: int | None) -> None:
+        self.depth = depth
+        self.messages: deque[Any] = deque()
+        self.source: SubscriptionSource | None = None
+        self.overruns = 0
+
+    def put(self, message: Any) -> None:
+        """Hand over a message, which is the subscription's from now on."""
+        source = self.source
+        if source is not None:
+            source.parts.scheduler.deliver(source, self, message)
+            return
+        self.add(message)
+        if self.source is not None:  # It came meanwhile.
+            self.source.parts.scheduler.add_events(self.source, 1)
+
+    def add(self, message: Any) -> bool:
+        """Add a message; return whether the queue is longer now."""
+        messages = self.messages
+        messages.append(message)
+        if self.depth is None or len(messages) <= self.depth:
+            return True
+        self.overruns += 1
+        messages.popleft()
+        return False
+
+    def is_drained(self) -> bool:
+        """Tell whether the middleware has nothing more for the subscription."""
+        source = self.source
+        return source is None or not source.has_data()
