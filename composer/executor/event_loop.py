@@ -20,6 +20,7 @@ from composer.executor.tasks import (
 from composer.executor.worker_threads import TAKEOVER_SEC, Worker, WorkerThreads
 
 _RETRY_SEC = 0.001
+_MOST_BEFORE_A_LOOK = 32
 _LINGER_SEC = 0.05
 
 
@@ -114,6 +115,7 @@ class EventLoop:
         registry, execute = self._registry, self._runner.execute
         left = len(scheduler) or 1
         tasks_follow = True
+        more = _MOST_BEFORE_A_LOOK
         while left:
             if registry.is_stale:
                 self._refresh()
@@ -139,6 +141,10 @@ class EventLoop:
                 # As in rclpy, tasks run before what has come since they were created.
                 left = scheduler.count_tasks()
                 tasks_follow = False
+            if not left and more:
+                # What callbacks have handed to others, before the next look at the middleware.
+                left = min(len(scheduler), more)
+                more -= left
         return True
 
     def _finish_session(self, me: Worker, *, has_run: bool) -> None:

@@ -34,8 +34,8 @@ class Subscription:
             event_callbacks=self._endpoint.subscription_events(),
         )
         node.endpoints.append(self._endpoint)
-        node.count_missed(self._owner, self._ros)
         self._local = node.system.topics.add_subscription(node.ros, self._ros)
+        node.count_missed(self._owner, self._ros, self._local.inbox)
 
     def change(self, spec: SubscriptionSpec) -> None:
         """See `LiveEntity`."""

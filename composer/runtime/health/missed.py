@@ -6,6 +6,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
+from composer.executor.sources.inbox import Inbox
 from composer.records import record
 
 _LATE_SHARE = 0.1
@@ -57,11 +58,17 @@ class MissedNothing:
         return 0
 
 
-def count_missed(executor: Any, node: Any, entity: Any) -> MissedNothing:
-    """Begin to count what an entity of `node` misses in `executor`; returns what tells it."""
+def count_missed(
+    executor: Any, node: Any, entity: Any, inbox: Inbox | None = None
+) -> MissedNothing:
+    """Begin to count what an entity of `node` misses in `executor`; returns what tells it.
+
+    Args:
+        inbox: The queue of a subscription for what does not come through the middleware.
+    """
     counter: MissedNothing
     if isinstance(entity, Subscription):
-        counter = QueueOverruns(entity.qos_profile)
+        counter = QueueOverruns(entity.qos_profile, inbox)
     elif isinstance(entity, Timer):
         counter = MissedTicks()
     else:
@@ -102,7 +109,8 @@ class QueueOverruns(MissedNothing):
     another thread, as in reentrant groups, does not count as an overrun.
     """
 
-    def __init__(self, profile: QoSProfile) -> None:
+    def __init__(self, profile: QoSProfile, inbox: Inbox | None = None) -> None:
+        self._inbox = inbox
         # Of a queue without an end, nothing is known before it runs empty.
         self._depth = profile.depth if profile.history == HistoryPolicy.KEEP_LAST else 0
         self._arrived = 0
@@ -115,12 +123,14 @@ class QueueOverruns(MissedNothing):
         if self._depth:
             # A queue that never runs empty: the middleware holds no more than its depth.
             self._note_overruns(self._arrived - self._taken - self._depth)
-        return MissedCounts(overruns=self._overruns)
+        local = 0 if self._inbox is None else self._inbox.overruns
+        return MissedCounts(overruns=self._overruns + local)
 
     def queued(self) -> int:
         """Return how many messages wait to be taken, as far as that is known."""
         waiting = self._arrived - self._taken - self._overruns if self._is_counting else 0
-        return max(0, min(waiting, self._depth or waiting))
+        local = 0 if self._inbox is None else len(self._inbox.messages)
+        return local + max(0, min(waiting, self._depth or waiting))
 
     def on_announced(self, count: int | None) -> None:
         """Note that `count` messages came; None: nobody knows how many."""
