@@ -193,8 +193,8 @@ class Rewiring:
         self._begin(targets('nodes', *_COMING), targets('processes', *_COMING))
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
-            self._undo.append(partial(setattr, process, 'spec', process.spec))
-            process.spec = self._new.spec.processes[name]
+            self._undo.append(partial(process.change, process.spec))
+            process.change(self._new.spec.processes[name])
         for full_name, node in removed.items():
             if full_name in nodes:
                 self._finish.append(partial(self._restarter.remove, full_name))
