@@ -277,9 +277,10 @@ class LiveNode:
         publishers: dict[str, Any] = self.entities['publishers']
 
         def publish_result(payload: Any) -> None:
-            if payload is not None:
-                # Looked up each time: an edit may put another one in its place.
-                publishers[publisher].publish(payload)
+            # Looked up each time: an edit may put another one in its place, or remove it while a
+            # behaviour runs for long.
+            if payload is not None and (end := publishers.get(publisher)) is not None:
+                end.publish(payload)
 
         return publish_result
 
