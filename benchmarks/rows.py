@@ -185,12 +185,14 @@ def _check() -> list[Row]:
         return Row(f'composer check of {what}', ours, None, alone, '<=', target)
 
     once, twice = (_side('check', 'one', size, 'seconds') for size in (1000, 2000))
+    plan, of_new = (_side('check', 'plan', 1000, f'{each}_seconds') for each in ('plan', 'check'))
     return [
         row('a small file, s', 'shipped', 2, 'seconds', 0.25),
         row('100 files of 10 nodes, s', 'many', 10, 'seconds', 2.5),
         row('1,000 nodes, 5,000 entities, s', 'one', 1000, 'seconds', 1),
         row('1,000 nodes, 5,000 entities, MB', 'one', 1000, 'megabytes', 200),
         Row('composer check of twice as large, s', twice, once, times, '<=', 2.2),
+        Row('composer plan of 1,000 nodes, s, against check', plan, of_new, times, '<=', 1.5),
     ]
 
 

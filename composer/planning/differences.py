@@ -8,6 +8,7 @@ recreated. All else changes in place.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
@@ -63,6 +64,12 @@ _LOST = {
     'service_clients': 'responses that calls wait for',
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
+}
+_ENTITIES = {
+    kind.section: _PARAMETERS
+    if kind.section == 'parameters'
+    else _Rules(kind.noun, _LOST[kind.section], _FIXED)
+    for kind in ENTITY_KINDS
 }
 _NODES = _Rules(
     'node',
@@ -156,10 +163,10 @@ class _Comparison:
     def _compare_entities(
         self, kind: EntityKind, old: NodeSpec, new: NodeSpec
     ) -> Iterator[Operation]:
-        rules = _PARAMETERS
-        if kind.section != 'parameters':
-            rules = _Rules(kind.noun, _LOST[kind.section], _FIXED)
+        rules = _ENTITIES[kind.section]
         before, after = getattr(old, kind.section), getattr(new, kind.section)
+        if not (before or after):
+            return
         for name in dict.fromkeys([*before, *after]):
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
@@ -192,9 +199,8 @@ class _Comparison:
             span, lost = self._old.positions.key(old.path), (rules.lost,)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), node, span, lost=lost)
         elif old is not new:
-            names = [each.name for each in fields(new) if each.name not in _NOT_COMPARED]
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
-            changes = [*compare_fields(*readings, names), *further]
+            changes = [*compare_fields(*readings, _compared_fields(type(new))), *further]
             if changes:
                 span = self._new.positions.key(new.path)
                 yield _modification(rules, target, _name(new), node, span, changes)
@@ -202,6 +208,12 @@ class _Comparison:
     @staticmethod
     def _reading(snapshot: Snapshot) -> Reading:
         return Reading(snapshot, snapshot.spec, ())
+
+
+@cache
+def _compared_fields(kind: Any) -> tuple[str, ...]:
+    """Return the fields of a class of records that are compared."""
+    return tuple(each.name for each in fields(kind) if each.name not in _NOT_COMPARED)
 
 
 def _modification(
