@@ -196,6 +196,34 @@ def _check() -> list[Row]:
     ]
 
 
+def _save_to_callback() -> list[Row]:
+    def row(what: str, side: str, target: float) -> Row:
+        ours = _side('save_to_callback', side, 50, 'p95_ms')
+        what = f'50 nodes, ms from the save of {what} to its callback, p95'
+        return Row(what, ours, None, alone, '<=', target)
+
+    return [row('an entity', 'entity', 150), row('a module', 'module', 300)]
+
+
+def _reloads() -> list[Row]:
+    def side(key: str) -> Side:
+        return _side('reloads', 'composer', 1000, key)
+
+    def left(what: str, key: str, target: float) -> Row:
+        return Row(f'1,000 reloads, {what}', side(key), None, alone, '<=', target)
+
+    what = '1,000 reloads, longest gap in ms of a stream at 1 kHz, more than alone'
+    return [
+        left('messages lost', 'lost', 0),
+        Row(what, side('gap_ms'), side('alone_gap_ms'), more, '<=', 10),
+        left('MB grown', 'mb_grown', 5),
+        *(
+            left(f'{each} grown', f'{each}_grown', 0)
+            for each in ('threads', 'descriptors', 'sockets', 'endpoints')
+        ),
+    ]
+
+
 def _soak() -> list[Row]:
     def row(what: str, key: str, target: float) -> Row:
         ours = _side('soak', 'composer', 1000, key)
@@ -213,5 +241,7 @@ ROWS: list[Row] = [
     *_start_stop(),
     *_at_rest_and_under_load(),
     *_check(),
+    *_save_to_callback(),
+    *_reloads(),
     *_soak(),
 ]

@@ -7,13 +7,14 @@ recreated. All else changes in place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.plan import Action, Change, Operation, Plan
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -32,7 +33,7 @@ _NOT_COMPARED = {
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Rules:
     """How things of one kind change.
 
@@ -200,7 +201,7 @@ class _Comparison:
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), node, span, lost=lost)
         elif old is not new:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
-            changes = [*compare_fields(*readings, _compared_fields(type(new))), *further]
+            changes = [*compare_fields(*readings, _compared_fields(new.__class__)), *further]
             if changes:
                 span = self._new.positions.key(new.path)
                 yield _modification(rules, target, _name(new), node, span, changes)
