@@ -7,12 +7,15 @@ recreated. All else changes in place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
+from composer.language.specs import ParameterSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.plan import Action, Change, Operation, Plan
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -31,7 +34,7 @@ _NOT_COMPARED = {
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Rules:
     """How things of one kind change.
 
@@ -63,6 +66,12 @@ _LOST = {
     'service_clients': 'responses that calls wait for',
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
+}
+_ENTITIES = {
+    kind.section: _PARAMETERS
+    if kind.section == 'parameters'
+    else _Rules(kind.noun, _LOST[kind.section], _FIXED)
+    for kind in ENTITY_KINDS
 }
 _NODES = _Rules(
     'node',
@@ -155,10 +164,10 @@ class _Comparison:
     def _compare_entities(
         self, kind: EntityKind, old: NodeSpec, new: NodeSpec
     ) -> Iterator[Operation]:
-        rules = _PARAMETERS
-        if kind.section != 'parameters':
-            rules = _Rules(kind.noun, _LOST[kind.section], _FIXED)
+        rules = _ENTITIES[kind.section]
         before, after = getattr(old, kind.section), getattr(new, kind.section)
+        if not (before or after):
+            return
         for name in dict.fromkeys([*before, *after]):
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
@@ -191,13 +200,11 @@ class _Comparison:
             span, lost = self._old.positions.key(old.path), (rules.lost,)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
         elif old is not new:
-            skipped = _NOT_COMPARED if rules is _PARAMETERS else {*_NOT_COMPARED, 'description'}
-            names = [each.name for each in fields(new) if each.name not in skipped]
             readings = (
                 Reading(self._old, old, old.path, nodes[0]),
                 Reading(self._new, new, new.path, nodes[1]),
             )
-            changes = [*compare_fields(*readings, names), *further]
+            changes = [*compare_fields(*readings, _compared_fields(new.__class__)), *further]
             if changes:
                 span = self._new.positions.key(new.path)
                 yield _modification(rules, target, _name(new), span, changes)
@@ -205,6 +212,14 @@ class _Comparison:
     @staticmethod
     def _reading(snapshot: Snapshot) -> Reading:
         return Reading(snapshot, snapshot.spec, ())
+
+
+@cache
+def _compared_fields(kind: Any) -> tuple[str, ...]:
+    """Return the fields of a class of records that are compared."""
+    # ROS knows the description of a parameter; nobody asks for the others.
+    skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
+    return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 
 def _modification(
