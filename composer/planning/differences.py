@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.planning.changes import Reading, compare_entries, compare_fields
+from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ class _Comparison:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
             further += compare_entries(*readings, 'state', old.state, new.state)
         own = list(self._compare(_NODES, (full_name, 'nodes', ''), '', old, new, further))
-        yield from own
+        yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
             return
         for kind in ENTITY_KINDS:
@@ -163,7 +164,9 @@ class _Comparison:
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
             entity = (before.get(name), after.get(name))
-            yield from self._compare(rules, target, new.key, *entity, further)
+            for operation in self._compare(rules, target, new.key, *entity, further):
+                is_new = operation.action is Action.ADD
+                yield operation if is_new else with_notes(operation, old, self._old)
 
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""
