@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,7 @@ def begin(files: Iterable[Path]) -> None:
     """Forget all values, and take the projects of these files, and that of this folder, as own."""
     _origins.clear()
     _roots.clear()
+    may_show_lines.cache_clear()
     for path in (Path('file'), *files):
         # A name may be no path at all, or the working folder may be gone.
         with suppress(OSError, ValueError):
@@ -51,6 +53,7 @@ def list_lineage(folder: Path) -> list[Path]:
     return lineage[: roots[0] + 1] if roots else [folder]
 
 
+@cache
 def may_show_lines(name: str) -> bool:
     """Return whether lines of a file may be shown: it is in the project, or in a ROS package."""
     if not _roots or not os.path.lexists(name):

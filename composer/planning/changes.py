@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.language.qos import resolve_qos
 from composer.language.specs import BehaviourSpec, ConditionSpec, QosSpec
 from composer.planning.plan import Change
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from composer.planning.snapshot import Snapshot
     from composer.yaml_text.positions import DataPath
 
+_SCALARS = frozenset((str, int, bool, type(None)))
 # Fields that the file has under other keys; where there are several, it has one of them.
 _KEYS = {
     'period_sec': ('period', 'rate'),
@@ -32,7 +33,7 @@ _KEYS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reading:
     """A record, and the snapshot that it is part of."""
 
@@ -53,14 +54,16 @@ def compare_fields(old: Reading, new: Reading, names: Iterable[str]) -> Iterator
     """Yield what differs in these fields of two records."""
     for name in names:
         before, after = getattr(old.record, name), getattr(new.record, name)
+        # Most fields are of these types and as before.
+        if type(before) in _SCALARS and type(before) is type(after) and before == after:
+            continue
         if isinstance(before, BehaviourSpec) or isinstance(after, BehaviourSpec):
             yield from _compare_behaviours(old, new, name)
         elif isinstance(before, QosSpec):
-            resolved = (
-                resolve_qos(before, old.snapshot.spec.qos),
-                resolve_qos(after, new.snapshot.spec.qos),
-            )
-            yield from compare_entries(old, new, name, *resolved)
+            profiles = old.snapshot.spec.qos, new.snapshot.spec.qos
+            if before != after or profiles[0] != profiles[1]:
+                resolved = map(resolve_qos, (before, after), profiles)
+                yield from compare_entries(old, new, name, *resolved)
         elif isinstance(before, dict):
             yield from compare_entries(old, new, name, before, after)
         elif _differ(plain := _plain(before), plain_after := _plain(after)):
@@ -71,6 +74,8 @@ def compare_entries(
     old: Reading, new: Reading, name: str, before: Mapping[str, Any], after: Mapping[str, Any]
 ) -> Iterator[Change]:
     """Yield what differs between two mappings under a key."""
+    if not (before or after):
+        return
     for key in dict.fromkeys([*before, *after]):
         if (key in before) != (key in after) or _differ(before[key], after[key]):
             yield _change(old, new, f'{name}.{key}', before.get(key), after.get(key))

@@ -7,13 +7,15 @@ recreated. All else changes in place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -32,7 +34,7 @@ _NOT_COMPARED = {
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Rules:
     """How things of one kind change.
 
@@ -64,6 +66,12 @@ _LOST = {
     'service_clients': 'responses that calls wait for',
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
+}
+_ENTITIES = {
+    kind.section: _PARAMETERS
+    if kind.section == 'parameters'
+    else _Rules(kind.noun, _LOST[kind.section], _FIXED)
+    for kind in ENTITY_KINDS
 }
 _NODES = _Rules(
     'node',
@@ -156,10 +164,10 @@ class _Comparison:
     def _compare_entities(
         self, kind: EntityKind, old: NodeSpec, new: NodeSpec
     ) -> Iterator[Operation]:
-        rules = _PARAMETERS
-        if kind.section != 'parameters':
-            rules = _Rules(kind.noun, _LOST[kind.section], _FIXED)
+        rules = _ENTITIES[kind.section]
         before, after = getattr(old, kind.section), getattr(new, kind.section)
+        if not (before or after):
+            return
         for name in dict.fromkeys([*before, *after]):
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
@@ -194,9 +202,8 @@ class _Comparison:
             span, lost = self._old.positions.key(old.path), (rules.lost,)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), node, span, lost=lost)
         elif old is not new:
-            names = [each.name for each in fields(new) if each.name not in _NOT_COMPARED]
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
-            changes = [*compare_fields(*readings, names), *further]
+            changes = [*compare_fields(*readings, _compared_fields(new.__class__)), *further]
             if changes:
                 span = self._new.positions.key(new.path)
                 yield _modification(rules, target, _name(new), node, span, changes)
@@ -204,6 +211,12 @@ class _Comparison:
     @staticmethod
     def _reading(snapshot: Snapshot) -> Reading:
         return Reading(snapshot, snapshot.spec, ())
+
+
+@cache
+def _compared_fields(kind: Any) -> tuple[str, ...]:
+    """Return the fields of a class of records that are compared."""
+    return tuple(each.name for each in fields(kind) if each.name not in _NOT_COMPARED)
 
 
 def _modification(

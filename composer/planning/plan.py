@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -24,7 +25,7 @@ class Action(Enum):
     REMOVE = '-'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Change:
     """One value that differs.
 
@@ -50,7 +51,7 @@ class Change:
         return self.key.partition('.')[0]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Operation:
     """What is done to one part of a system.
 
@@ -78,7 +79,7 @@ class Operation:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Plan:
     """All operations: on the system, its processes, and its nodes with their entities."""
 
