@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from composer.language.qos import resolve_qos
@@ -10,7 +11,7 @@ from composer.planning.plan import Change
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator
 
     from composer.diagnostics import Span
     from composer.planning.snapshot import Snapshot
@@ -64,7 +65,7 @@ def compare_fields(old: Reading, new: Reading, names: Iterable[str]) -> Iterator
             if before != after or profiles[0] != profiles[1]:
                 resolved = map(resolve_qos, (before, after), profiles)
                 yield from compare_entries(old, new, name, *resolved)
-        elif isinstance(before, dict):
+        elif isinstance(before, Mapping):
             yield from compare_entries(old, new, name, before, after)
         elif _differ(plain := _plain(before), plain_after := _plain(after)):
             yield _change(old, new, name, plain, plain_after)

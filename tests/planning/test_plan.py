@@ -142,12 +142,18 @@ EDITS = [
     ),
     (
         'version: 1',
-        'version: 1\nexecutor: {threads: 2}',
+        'version: 1\nenvironment: {ROS_DOMAIN_ID: 7}',
         None,
         [
-            "± system 'system': executor.threads = 2 (2); the executor takes this when it starts; "
-            'lost: all that is not in the files'
+            "± system 'system': environment.ROS_DOMAIN_ID = 7 (2); "
+            'ROS reads this when it starts; lost: all that is not in the files'
         ],
+    ),
+    (
+        'version: 1',
+        'version: 1\nexecutor: {threads: 2}',
+        None,
+        ["~ system 'system': executor.threads = 2 (2)"],
     ),
     ('version: 1', '# nothing\nversion: 1', None, []),
 ]
