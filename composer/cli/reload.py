@@ -118,7 +118,9 @@ class Reloader:
         Args:
             failure: Why the system is not reloaded, if it is not.
         """
-        warnings, self._warnings = self._warnings, _warnings_in(findings)
+        told = self._warnings
+        # Errors hide some.
+        self._warnings = _warnings_in(findings) | (told if failure else set())
         errors = [each for each in findings if has_errors([each])]
         # Without errors in the files something was tried, and failed again.
         failure = _with_findings(errors, failure) if errors else failure
@@ -127,7 +129,7 @@ class Reloader:
         show_findings(
             each
             for each in findings
-            if (is_new if has_errors([each]) else _key_of(each) not in warnings)
+            if (is_new if has_errors([each]) else _key_of(each) not in told)
         )
         return is_new
 
