@@ -77,7 +77,7 @@ class TopNames:
     def changed(self) -> frozenset[str]:
         """Names that functions store, and those whose values are changed somewhere."""
         found = set(self.stored_again)
-        for node in (each for statement in self._body for each in ast.walk(statement)):
+        for node in self._nodes:
             match node:
                 case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
                     if method in CHANGING:
@@ -88,7 +88,7 @@ class TopNames:
     def stored_again(self) -> frozenset[str]:
         """Names that functions store, and those of which items are stored."""
         found: set[str] = set()
-        for node in (each for statement in self._body for each in ast.walk(statement)):
+        for node in self._nodes:
             match node:
                 case ast.Global(names=names):
                     found |= set(names)
@@ -97,6 +97,10 @@ class TopNames:
                 case ast.AugAssign(target=ast.Name(id=name)):
                     found.add(name)
         return frozenset(found)
+
+    @cached_property
+    def _nodes(self) -> list[ast.AST]:
+        return [each for statement in self._body for each in ast.walk(statement)]
 
 
 def _own(statement: ast.AST) -> Iterator[ast.AST]:

@@ -135,15 +135,14 @@ def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
     is_package = module.path is not None and module.path.name == '__init__.py'
     package = name.split('.') if is_package else name.split('.')[:-1]
     yield from ('.'.join(package[:depth]) for depth in range(1, len(package) + 1))
-    for statement in module.body:
-        for node in ast.walk(statement):
-            if isinstance(node, ast.Import):
-                yield from (alias.name for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                base = package[: len(package) - node.level + 1] if node.level else []
-                parts = [*base, *(node.module.split('.') if node.module else ())]
-                yield '.'.join(parts)
-                yield from ('.'.join([*parts, alias.name]) for alias in node.names)
+    for node in module.import_statements:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+            continue
+        base = package[: len(package) - node.level + 1] if node.level else []
+        parts = [*base, *(node.module.split('.') if node.module else ())]
+        yield '.'.join(parts)
+        yield from ('.'.join([*parts, alias.name]) for alias in node.names)
 
 
 def _read_overrides(nodes: Iterable[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:

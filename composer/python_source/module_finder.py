@@ -68,6 +68,7 @@ class ModuleFinder:
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
+        self._located: dict[str, _Location] = {}
         self._listed: dict[Path, list[str]] = {}
         self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
@@ -128,6 +129,11 @@ class ModuleFinder:
         return module
 
     def _locate(self, name: str) -> _Location:
+        if name not in self._located:
+            self._located[name] = self._locate_anew(name)
+        return self._located[name]
+
+    def _locate_anew(self, name: str) -> _Location:
         folders = self._roots
         done: list[str] = []
         file: Path | None = None

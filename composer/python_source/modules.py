@@ -122,6 +122,12 @@ class ModuleSource:
         name = str(path.relative_to(here) if path.is_relative_to(here) else path)
         return SourceFile(name, self.lines)
 
+    @cached_property
+    def import_statements(self) -> list[ast.Import | ast.ImportFrom]:
+        """All statements that import something, also in functions."""
+        nodes = (node for statement in self.body for node in ast.walk(statement))
+        return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
     def place_of(self, line: int) -> Span:
         """Return the span of a line."""
         text = self.source.line(line)

@@ -202,8 +202,7 @@ class LiveNode:
         def failed(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            if health is not None:
-                health.note_error(error)
+            health.note_error(error)
             self.errors.report(f'{owner} ({self.place(path)})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
@@ -213,7 +212,7 @@ class LiveNode:
             self.running,
             deliver=deliver,
             failed=failed,
-            add_time=None if health is None else health.times.add,
+            add_time=health.times.add,
             may_begin=may_begin,
         )
 
@@ -278,18 +277,17 @@ class LiveNode:
         publishers: dict[str, Any] = self.entities['publishers']
 
         def publish_result(payload: Any) -> None:
-            if payload is not None:
-                # Looked up each time: an edit may put another one in its place.
-                publishers[publisher].publish(payload)
+            # Looked up each time: an edit may put another one in its place, or remove it while a
+            # behaviour runs for long.
+            if payload is not None and (end := publishers.get(publisher)) is not None:
+                end.publish(payload)
 
         return publish_result
 
     def count_missed(self, owner: Owner, entity: Any) -> None:
         """Count in the health of an entity what its ROS entity has missed."""
-        health = self._health(owner)
-        if health is not None:
-            counter = count_missed(self.system.executor, self.ros, entity)
-            health.follow(counter, counter.queued)
+        counter = count_missed(self.system.executor, self.ros, entity)
+        self._health(owner).follow(counter, counter.queued)
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""
@@ -324,13 +322,11 @@ class LiveNode:
         for known in (self.limits, self._views):
             for owner in filter(owns, list(known)):
                 del known[owner]
-        if self.system.health is not None:
-            self.system.health.forget(self.full_name, owns)
+        self.system.health.forget(self.full_name, owns)
 
     def forget_all(self) -> None:
         """Forget the health of all its entities: it is gone for good."""
-        if self.system.health is not None:
-            self.system.health.forget(self.spec.full_name, lambda _owner: True)
+        self.system.health.forget(self.spec.full_name, lambda _owner: True)
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
@@ -345,10 +341,9 @@ class LiveNode:
         release(self.ros)
         self.ros.destroy_node()
 
-    def _health(self, owner: Owner) -> EntityHealth | None:
-        """Return the health of an entity, `None` if it is not measured."""
-        board = self.system.health
-        return None if board is None else board.entity(self.full_name, owner)
+    def _health(self, owner: Owner) -> EntityHealth:
+        """Return the health of an entity."""
+        return self.system.health.entity(self.full_name, owner)
 
     def _limit(self, owner: Owner, path: DataPath, options: BehaviourOptions) -> None:
         warn = EscapingLogger(self.ros.get_logger()).warning
