@@ -56,8 +56,7 @@ class ParameterChange:
             if node.ros.has_parameter(name):
                 parameters.undeclare(name)
             parameters.declare(before)
-            if value is not None:
-                parameters.set(before, value)
+            self._change(before, value)
             if was_set:
                 parameters.set_live.add(name)
 
@@ -67,24 +66,23 @@ class ParameterChange:
                 if after is not None:
                     parameters.declare(after)
             else:
-                self._change(after, value, was_set=was_set)
+                given = node.ros.find_override(name)
+                self._change(after, value if was_set else after.value if given is None else given)
         except ComposerError:
             put_back()
             raise
         return put_back
 
-    def _change(self, spec: ParameterSpec, value: Any, *, was_set: bool) -> None:
-        """Change the descriptor of a parameter, and its value if nobody has set it."""
+    def _change(self, spec: ParameterSpec, value: Any) -> None:
+        """Change the descriptor of a parameter, and its value; `None` leaves that as it is."""
         ros, parameters = self._node.ros, self._node.parameters
         assert parameters is not None  # noqa: S101 - see above
-        given = ros.find_override(spec.name)
-        new = spec.value if given is None else given
-        # The old limits may not fit the new value.
+        # The old limits may not fit the new value, and nobody sets what is read-only.
         loosen_parameter(ros, spec.name)
         parameters.specs[spec.name] = spec
         # `1` and `1.0` are equal, and not the same.
-        if not was_set and new is not None and repr(new) != repr(value):
-            parameters.set(spec, new)
+        if value is not None and repr(value) != repr(ros.get_parameter(spec.name).value):
+            parameters.set(spec, value)
         descriptor = create_descriptor(spec)
         descriptor.type = type_of(spec).value
         reason = find_refusal(spec, ros.get_parameter(spec.name).value)
