@@ -386,6 +386,8 @@ def plan_command(
     from composer.cli.plan import plan
 
     paths, arguments = split_words(words)
+    if arguments[:1] == ['-']:
+        paths.append(Path(arguments.pop(0)))
     return plan(
         paths,
         arguments,

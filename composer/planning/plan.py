@@ -59,7 +59,6 @@ class Operation:
         noun: What it is: `node`, `timer`, `process`, `system`, …
         target: Which one it is.
         name: Its key in the file.
-        node: The key of its node in the file; empty if it belongs to none.
         span: Where it is written: in the new files, unless it is removed.
         changes: The values that differ.
         reason: Why it must be recreated; empty if it need not be.
@@ -71,7 +70,6 @@ class Operation:
     noun: str
     target: Target
     name: str
-    node: str
     span: Span
     changes: tuple[Change, ...] = ()
     reason: str = ''

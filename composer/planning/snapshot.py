@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
+from composer.python_source.modules import ModuleSource
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import MergedFiles
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
-    from composer.python_source.modules import ModuleSource
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
     from composer.yaml_text.positions import SourceMap
 
@@ -109,6 +109,9 @@ class _Sources:
     def text(self, name: str) -> str:
         """Return the source of a module."""
         module = self._finder.find(name)
+        if isinstance(module, ModuleSource) and module.syntax_error and not module.lines:
+            # It cannot be read, and an import of it has to fail.
+            return f'raise ImportError({module.syntax_error!r})\n'
         return '' if isinstance(module, MissingModule) else '\n'.join(module.lines) + '\n'
 
     def _imports(self, name: str) -> tuple[str, ...]:

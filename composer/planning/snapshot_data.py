@@ -12,7 +12,7 @@ from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from composer.confidential import conceal
+from composer.confidential import conceal, conceal_data
 from composer.diagnostics import SourceFile, Span
 from composer.errors import ComposerError
 from composer.language import specs
@@ -114,7 +114,7 @@ def _encode(value: Any, key: str = '') -> Any:
     if isinstance(value, str):
         return _absolute(value) if key in _PATHS else conceal(value)
     if value is None or isinstance(value, bool | int | float):
-        return value
+        return conceal_data(value)
     if is_dataclass(value):
         names = [each.name for each in fields(value)]
         return [

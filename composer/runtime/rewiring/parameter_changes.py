@@ -73,8 +73,17 @@ class ParameterChange:
         told = changes.get('value') or changes.get('default')
         # The old limits may not fit the new value.
         loosen_parameter(ros, spec.name)
-        if told is not None and value == told.old:
-            self._set(spec, told.new)
+        if told is not None:
+            # Without a value in a parameter file, it is the default.
+            old, new = (
+                each if each is not None else record.value
+                for each, record in (
+                    (told.old, self._before.parameters[spec.name]),
+                    (told.new, spec),
+                )
+            )
+            if value == old:
+                self._set(spec, new)
         descriptor = create_descriptor(spec)
         descriptor.type = _type_of(spec).value
         try:

@@ -313,7 +313,7 @@ class Rewiring:
         if 'log_level' in keys:
             self._undo.append(partial(set_level, old))
             set_level(node.spec)
-        if keys & {'on_parameters', 'with', 'on_error', 'warn_after'} and node.parameters:
+        if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
             self._undo.append(partial(node.parameters.ask, old.on_parameters))
             node.parameters.ask(node.spec.on_parameters)
         if keys & {'on_error', 'warn_after'}:
