@@ -79,13 +79,16 @@ class ModuleFinder:
             self._found[name] = self._find(name)
         return self._found[name]
 
-    def read_files(self) -> list[Path]:
-        """Return the files of the modules of the project that have been read."""
-        return [
-            module.path
-            for name, module in self._found.items()
-            if isinstance(module, ModuleSource) and module.path and self.is_of_project(name)
-        ]
+    def list_files(self) -> list[Path]:
+        """Return the files of the modules of the project that were searched, found or not."""
+        files: list[Path] = []
+        for name, module in self._found.items():
+            if isinstance(module, MissingModule):
+                paths = [folder.joinpath(*name.split('.')) for folder in self._project]
+                files += [*paths, *(each.with_name(f'{each.name}.py') for each in paths)]
+            elif module.path and self.is_of_project(name):
+                files.append(module.path)
+        return files
 
     def has(self, name: str) -> bool:
         """Return whether there is a module or package of this name."""
