@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
-from composer.cli.running import answers
+from composer.cli.running import answer_forms
 from composer.errors import ComposerError, RosNotFoundError, UsageError
 from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
@@ -291,7 +291,7 @@ def ask_snapshot(name: str) -> Snapshot:
     """
     with Client() as client:
         outcome = client.ask(client.find(name), protocol.SNAPSHOT, _SNAPSHOT_SEC)
-    return decode_snapshot(answers.read_answer(outcome.text))
+    return decode_snapshot(answer_forms.read_answer(outcome.text))
 
 
 def _read_status(node: str, text: str | None) -> RunningSystem:
@@ -300,7 +300,7 @@ def _read_status(node: str, text: str | None) -> RunningSystem:
     if text is None:
         return RunningSystem(name, node, None, 'no answer')
     try:
-        status = answers.read_answer(text, answers.STATUS)
+        status = answer_forms.read_answer(text, answer_forms.STATUS)
     except ComposerError:
         return RunningSystem(name, node, None, 'unknown answer')
     if protocol.node_name(status['name']) != _last(node):
