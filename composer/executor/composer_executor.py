@@ -140,13 +140,15 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._spinner.scheduler.retry_suspended()
         self.wake()
 
-    def open_inbox(self, node: Any, subscription: Any, depth: int | None) -> Inbox:
-        """Return a new queue by which messages get to a subscription without the middleware.
+    def open_inbox(self, node: Any, entity: Any, depth: int | None) -> Inbox:
+        """Return a new queue by which something gets to an entity without the middleware.
 
         Args:
-            depth: How many messages it holds; `None` for any number.
+            entity: A subscription, which gets messages; or a service, which gets objects with the
+                request as `message`, and `respond(response)`.
+            depth: How many it holds; `None` for any number.
         """
-        return self._spinner.registry.open_inbox(node, subscription, depth)
+        return self._spinner.registry.open_inbox(node, entity, depth)
 
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Have `observer` told of what comes to a subscription or a timer of `node`.

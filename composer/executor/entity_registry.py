@@ -105,13 +105,13 @@ class EntityRegistry:
                 source.observer = observer
                 source.on_events(UNKNOWN_COUNT)
 
-    def open_inbox(self, node: Any, subscription: Any, depth: int | None) -> Inbox:
-        """Return a new inbox of a subscription of `node`."""
+    def open_inbox(self, node: Any, entity: Any, depth: int | None) -> Inbox:
+        """Return a new inbox of a subscription or a service of `node`."""
         with self._lock:
-            inbox = self._inboxes[subscription] = Inbox(depth)
+            inbox = self._inboxes[entity] = Inbox(depth)
             entities = self._nodes.get(node)
-            source = None if entities is None else entities.sources.get(subscription)
-            if isinstance(source, SubscriptionSource):
+            source = None if entities is None else entities.sources.get(entity)
+            if source is not None:
                 _connect(inbox, source)
             return inbox
 
@@ -163,7 +163,7 @@ class EntityRegistry:
                 with suppress(InvalidHandle):
                     source = source_class(entity, node, self._parts)
                     source.observer = self._observers.get(entity)
-                    if isinstance(source, SubscriptionSource) and entity in self._inboxes:
+                    if entity in self._inboxes:
                         _connect(self._inboxes[entity], source)
                     self._open(source)
                     seen.sources[entity] = source
@@ -183,7 +183,7 @@ class EntityRegistry:
         source.close()
 
 
-def _connect(inbox: Inbox, source: SubscriptionSource) -> None:
+def _connect(inbox: Inbox, source: EventSource) -> None:
     source.inbox, inbox.source = inbox, source
     if inbox.messages:
         source.on_events(UNKNOWN_COUNT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import ENTITY_KINDS
@@ -18,8 +19,8 @@ from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
+from composer.runtime.messages.local_delivery import LocalServices, LocalTopics
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
-from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
@@ -130,6 +131,7 @@ class System:
             stop_timeout_sec=spec.shutdown_timeout_sec,
             health=HealthRegistry(),
             topics=LocalTopics(self._executor),
+            services=LocalServices(self._executor),
         )
 
     @property
@@ -192,7 +194,12 @@ class System:
     @property
     def snapshot(self) -> Snapshot:
         """What it runs as, as its files say it."""
-        return self._reading.snapshot
+        set_live = {
+            node.full_name: frozenset(node.parameters.set_live)
+            for node in list(self._nodes.values())
+            if node.parameters and node.parameters.set_live
+        }
+        return replace(self._reading.snapshot, set_live=set_live)
 
     def rewire(self, new: Reading, aborts_goals: Callable[[], bool]) -> Plan:
         """Become the system of `new`; return what was done.
@@ -203,7 +210,7 @@ class System:
         Raises:
             ComposerError: That failed, and the system is as it was.
         """
-        plan = compare(self._reading.snapshot, new.snapshot)
+        plan = compare(self.snapshot, new.snapshot)
         rewiring = Rewiring(
             self._nodes,
             self._processes,

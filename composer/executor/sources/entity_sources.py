@@ -14,7 +14,7 @@ from composer.executor import c_bindings
 from composer.executor.after_fork import end_child
 from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT
-from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
+from composer.executor.sources.event_source import NOTHING, EventSource
 from composer.executor.sources.inbox import Inbox
 
 _MIN_RESET_NS = 1_000_000
@@ -42,6 +42,19 @@ class QueueObserver(Protocol):
 
     def note_nothing_taken(self, begun: int) -> None:
         """Note that nothing was there."""
+
+
+class LocalRequest(Protocol):
+    """A request that comes to a service without the middleware.
+
+    Attributes:
+        message: The request.
+    """
+
+    message: Any
+
+    def respond(self, response: Any) -> None:
+        """Take the response."""
 
 
 class TimerSource(EventSource):
@@ -166,17 +179,7 @@ class SubscriptionSource(EventSource):
     rank = 1
     ask = staticmethod(Readiness.has_messages)
     watch_entity = staticmethod(c_bindings.watch_subscription)
-    __slots__ = ('inbox',)
-
-    def __init__(self, entity: Any, node: Any, parts: ExecutorParts) -> None:
-        super().__init__(entity, node, parts)
-        self.inbox: Inbox | None = None
-
-    def close(self) -> None:
-        """See the base class."""
-        if self.inbox is not None:
-            self.inbox.source = None
-        super().close()
+    __slots__ = ()
 
     def on_events(self, count: int) -> None:
         """See the base class."""
@@ -281,6 +284,8 @@ class ServiceSource(EventSource):
 
     def run(self) -> Any:
         """See the base class."""
+        if self.inbox is not None and self.inbox.messages:
+            return self._serve_local(self.inbox)
         revision = self.revision
         service = self.entity
         try:
@@ -301,6 +306,25 @@ class ServiceSource(EventSource):
             return self._respond(response, header)
         service.send_response(response, header)
         return None
+
+    def _serve_local(self, inbox: Inbox) -> Any:
+        service = self.entity
+        try:
+            request: LocalRequest = inbox.messages.popleft()
+        except IndexError:
+            return NOTHING
+        callback = service.callback
+        response = callback(request.message, service.srv_type.Response())
+        if self.parts.executor.is_forked:
+            end_child()
+        if self._is_async(callback):
+            return self._respond_locally(response, request)
+        request.respond(response)
+        return None
+
+    @staticmethod
+    async def _respond_locally(response: Any, request: LocalRequest) -> None:
+        request.respond(await response)
 
     async def _respond(self, response: Any, header: Any) -> None:
         self.entity.send_response(await response, header)

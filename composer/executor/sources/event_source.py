@@ -9,6 +9,7 @@ from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT, EventFd
 from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Group, Scheduler
+from composer.executor.sources.inbox import Inbox
 from composer.executor.sources.qos_events import QosEventPoll
 
 NOTHING = object()
@@ -43,6 +44,7 @@ class EventSource:
         ask: The method of `Readiness` that tells whether there is something to take.
         watch_entity: The function that has rcl write to an eventfd.
         observer: Is told what happens to the entity; or None.
+        inbox: What comes to it without the middleware; or None.
         slow: Whether the last callback held up the leader.
     """
 
@@ -58,6 +60,7 @@ class EventSource:
         'entity',
         'event_fd',
         'group',
+        'inbox',
         'node',
         'observer',
         'parts',
@@ -79,6 +82,7 @@ class EventSource:
         self.slow = False
         self.event_fd: EventFd | None = None
         self.observer: Any = None
+        self.inbox: Inbox | None = None
         self._callback: Any = None
         self._is_coroutine_function = False
 
@@ -90,6 +94,8 @@ class EventSource:
     def close(self) -> None:
         """Stop listening."""
         self.alive = False
+        if self.inbox is not None:
+            self.inbox.source = None
         self.parts.event_fds.detach(self)
 
     def watch(self, fd: int | None) -> None:

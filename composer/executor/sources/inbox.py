@@ -1,4 +1,4 @@
-"""Messages that are handed to a subscription within the process."""
+"""What is handed to a subscription or a service within the process."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from composer.executor.sources.entity_sources import SubscriptionSource
+    from composer.executor.sources.event_source import EventSource
 
 
 class Inbox:
-    """The queue of a subscription for messages that do not come through the middleware.
+    """The queue of a subscription or a service for what does not come through the middleware.
 
     They are executed before those of the middleware. It holds as many as the middleware would: a
     newer message pushes out the oldest.
@@ -20,7 +20,7 @@ class Inbox:
 
     Attributes:
         messages: The oldest first.
-        source: What takes them, while an executor listens to the subscription.
+        source: What takes them, while an executor listens to the entity.
         overruns: How many were pushed out.
     """
 
@@ -29,11 +29,11 @@ class Inbox:
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque()
-        self.source: SubscriptionSource | None = None
+        self.source: EventSource | None = None
         self.overruns = 0
 
     def put(self, message: Any) -> None:
-        """Hand over a message, which is the subscription's from now on."""
+        """Hand over a message, which is the receiver's from now on."""
         source = self.source
         if source is not None:
             source.parts.scheduler.deliver(source, self, message)
@@ -53,6 +53,6 @@ class Inbox:
         return False
 
     def is_drained(self) -> bool:
-        """Tell whether the middleware has nothing more for the subscription."""
+        """Tell whether the middleware has nothing more for the entity."""
         source = self.source
         return source is None or not source.has_data()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import (
@@ -18,7 +17,12 @@ from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.task import Future
+
     from composer.language.specs import ServiceClientSpec
+    from composer.runtime.messages.local_delivery import LocalService
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -32,6 +36,7 @@ class ServiceClient:
         self._failures = node.system.failures
         self._convert = converter_for(service_class.Request).convert
         self._service = node.ros.resolve_service_name(spec.service)
+        self._service_class = service_class
         # Never in a group of behaviours: one that waits for a response would keep it out.
         self._client = node.ros.create_client(
             service_class,
@@ -41,7 +46,7 @@ class ServiceClient:
         )
         self._requests = Requests(
             node.waits,
-            self._client.service_is_ready,
+            self._is_available,
             WaitNotice(node.ros.get_logger().info, f"service '{self._service}'"),
             self._unavailable,
             self._unanswered,
@@ -56,14 +61,30 @@ class ServiceClient:
             CallError: There is no response; its subclasses say why.
             SystemStoppingError: A stop was requested while it waited.
         """
-        request = self._convert(payload)
-        return self._requests.send(partial(self._client.call_async, request), timeout_sec)
+        return self._requests.send(self._sending(payload), timeout_sec)
 
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
         """As `call`, without holding a thread while it waits."""
+        return await self._requests.send_async(self._sending(payload), timeout_sec)
+
+    def _sending(self, payload: Payload) -> Callable[[], Future]:
+        """Return what sends a request, or hands it to a server of the same system."""
         request = self._convert(payload)
-        send = partial(self._client.call_async, request)
-        return await self._requests.send_async(send, timeout_sec)
+        is_held = request is payload
+
+        def send() -> Future:
+            local = self._find_local()
+            if local is None:
+                return self._client.call_async(request)
+            return local.call(request, is_held=is_held)
+
+        return send
+
+    def _find_local(self) -> LocalService | None:
+        return self._node.system.services.find(self._service, self._service_class)
+
+    def _is_available(self) -> bool:
+        return self._find_local() is not None or self._client.service_is_ready()
 
     def change(self, _spec: ServiceClientSpec) -> None:
         """See `LiveEntity`: all that it has is fixed."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED
 from composer.runtime.behaviours.running_calls import Owner
+from composer.runtime.messages.local_delivery import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError
@@ -23,13 +24,16 @@ class Service:
 
     def __init__(self, node: LiveNode, spec: ServiceSpec) -> None:
         self._node = node
+        profile = create_qos_profile(spec.qos, node.system.profiles)
         self._ros = node.ros.create_service(
             import_interface(spec.type),
             spec.service,
             _create_callback(node, spec),
-            qos_profile=create_qos_profile(spec.qos, node.system.profiles),
+            qos_profile=profile,
             callback_group=node.group(spec.group),
         )
+        name = node.ros.resolve_service_name(spec.service)
+        self._local = node.system.services.add(node.ros, self._ros, name, queue_depth(profile))
 
     def change(self, spec: ServiceSpec) -> None:
         """See `LiveEntity`."""
@@ -37,6 +41,7 @@ class Service:
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
+        self._node.system.services.remove(self._local)
         self._node.ros.destroy_service(self._ros)
 
 

@@ -19,6 +19,7 @@ from rclpy.qos import (
     QoSCompatibility,
     qos_check_compatible,
 )
+from rclpy.task import Future
 
 from composer.runtime.messages.ownership import ownership_of
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from rclpy.publisher import Publisher as RosPublisher
     from rclpy.qos import QoSProfile
+    from rclpy.service import Service as RosService
     from rclpy.subscription import Subscription as RosSubscription
 
     from composer.executor import ComposerExecutor
@@ -71,7 +73,7 @@ class LocalPublisher:
         if not inboxes:
             return
         ownership = self._ownership
-        message = ownership.copy(message) if is_held else ownership.move(message)
+        message = ownership.take(message, is_held=is_held)
         for inbox in inboxes[1:]:
             inbox.put(ownership.copy(message))
         inboxes[0].put(message)
@@ -101,9 +103,7 @@ class _Topic:
             ]
             reasons = [publisher.own_reason, *(each.reason for each in matched)]
             publisher.reason = next(filter(None, reasons), '')
-            publisher.inboxes = (
-                None if publisher.reason else tuple(each.inbox for each in matched)
-            )
+            publisher.inboxes = None if publisher.reason else tuple(each.inbox for each in matched)
 
 
 class LocalTopics:
@@ -123,10 +123,8 @@ class LocalTopics:
 
     def add_subscription(self, node: Any, ros: RosSubscription) -> LocalSubscription:
         """Take in a subscription of `node`."""
-        profile = ros.qos_profile
-        depth = profile.depth if profile.history == HistoryPolicy.KEEP_LAST else None
-        inbox = self._executor.open_inbox(node, ros, depth)
-        subscription = LocalSubscription(ros, inbox, _why_sent(profile))
+        inbox = self._executor.open_inbox(node, ros, queue_depth(ros.qos_profile))
+        subscription = LocalSubscription(ros, inbox, _why_sent(ros.qos_profile))
         self._change(ros, lambda topic: topic.subscriptions.append(subscription))
         return subscription
 
@@ -145,6 +143,76 @@ class LocalTopics:
             topic = self._topics[ros.topic_name, ros.msg_type]
             change(topic)
             topic.connect()
+
+
+class LocalService:
+    """A service of the system.
+
+    Args:
+        inbox: Takes requests.
+    """
+
+    def __init__(self, ros: RosService, inbox: Inbox) -> None:
+        self.ros = ros
+        self._inbox = inbox
+        self._requests = ownership_of(ros.srv_type.Request)
+        self._responses = ownership_of(ros.srv_type.Response)
+
+    def call(self, request: Any, *, is_held: bool) -> Future:
+        """Hand a request over, and return the future of its response.
+
+        Args:
+            is_held: Whether somebody else refers to the request.
+        """
+        future = Future()
+        taken = self._requests.take(request, is_held=is_held)
+        self._inbox.put(_Request(taken, future, self._responses.copy))
+        return future
+
+
+class _Request:
+    """A request that was handed over."""
+
+    __slots__ = ('_copy', '_future', 'message')
+
+    def __init__(self, message: Any, future: Future, copy: Callable[[Any], Any]) -> None:
+        self.message = message
+        self._future = future
+        self._copy = copy
+
+    def respond(self, response: Any) -> None:
+        """Take the response, which the server may keep."""
+        self._future.set_result(self._copy(response))
+
+
+class LocalServices:
+    """The services of one system, by their names in the graph and their types."""
+
+    def __init__(self, executor: ComposerExecutor) -> None:
+        self._executor = executor
+        self._services: dict[tuple[str, type], LocalService] = {}
+
+    def add(self, node: Any, ros: RosService, name: str, depth: int | None) -> LocalService:
+        """Take in a service of `node`."""
+        service = LocalService(ros, self._executor.open_inbox(node, ros, depth))
+        self._services[name, ros.srv_type] = service
+        return service
+
+    def remove(self, service: LocalService) -> None:
+        """Forget a service."""
+        for key, known in list(self._services.items()):
+            if known is service:
+                del self._services[key]
+
+    def find(self, name: str, service_class: type) -> LocalService | None:
+        """Return the service of a name and a type, if it is the system's own."""
+        return self._services.get((name, service_class))
+
+
+def queue_depth(profile: QoSProfile) -> int | None:
+    """Return how many messages a queue holds; `None` for any number."""
+    depth: int = profile.depth
+    return depth if profile.history == HistoryPolicy.KEEP_LAST else None
 
 
 def _are_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:

@@ -56,9 +56,17 @@ class Ownership:
             (name, mover) for name, each in known.items() if (mover := _mover_for(each))
         )
 
+    def take(self, message: Any, *, is_held: bool) -> Any:
+        """Return a message with the same content that belongs to nobody else.
+
+        Args:
+            is_held: Whether somebody else refers to it.
+        """
+        return self.copy(message) if is_held else self.move(message)
+
     def copy(self, message: Any) -> Any:
         """Return a copy that shares nothing that can change."""
-        new = self._class.__new__(self._class)
+        new: Any = object.__new__(self._class)
         for name in self._others:
             setattr(new, name, getattr(message, name))
         for name, copier in self._copiers:

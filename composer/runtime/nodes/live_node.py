@@ -25,6 +25,7 @@ from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.health.missed import count_missed
+from composer.runtime.messages.ownership import UNHELD_RESULT
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     Gate,
@@ -34,7 +35,6 @@ from composer.runtime.nodes.callback_groups import (
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
-from composer.runtime.messages.ownership import UNHELD_RESULT
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
@@ -75,13 +75,24 @@ class LiveEntity(Protocol):
 
 
 class NodeParameters(Protocol):
-    """The declared parameters of a node that runs."""
+    """The declared parameters of a node that runs.
+
+    Attributes:
+        specs: What they are declared as.
+        set_live: The names of those that somebody has set since they were declared.
+    """
+
+    specs: dict[str, ParameterSpec]
+    set_live: set[str]
 
     def declare(self, spec: ParameterSpec) -> None:
         """Declare a parameter."""
 
     def undeclare(self, name: str) -> None:
         """Remove a parameter."""
+
+    def set(self, spec: ParameterSpec, value: Any) -> None:
+        """Set a parameter to a value of the files."""
 
     def ask(self, behaviour: BehaviourSpec | None) -> None:
         """Ask this behaviour about changes from now on."""
@@ -279,9 +290,10 @@ class LiveNode:
         publishers: dict[str, Any] = self.entities['publishers']
 
         def publish_result(payload: Any) -> None:
-            if payload is not None:
-                # Looked up each time: an edit may put another one in its place.
-                publishers[publisher].publish(payload, UNHELD_RESULT)
+            # Looked up each time: an edit may put another one in its place, or remove it while a
+            # behaviour runs for long.
+            if payload is not None and (end := publishers.get(publisher)) is not None:
+                end.publish(payload, UNHELD_RESULT)
 
         return publish_result
 

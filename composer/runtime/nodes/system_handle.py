@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import OnError, QosSpec
     from composer.runtime.health.statistics import HealthRegistry
-    from composer.runtime.messages.local_delivery import LocalTopics
+    from composer.runtime.messages.local_delivery import LocalServices, LocalTopics
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
     from composer.yaml_text.positions import SourceMap
@@ -59,6 +59,7 @@ class SystemHandle:
         stop_timeout_sec: What running behaviours get to end.
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
+        services: Hands requests over between its nodes.
     """
 
     context: Context
@@ -75,3 +76,4 @@ class SystemHandle:
     stop_timeout_sec: float
     health: HealthRegistry
     topics: LocalTopics
+    services: LocalServices
