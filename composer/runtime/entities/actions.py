@@ -51,7 +51,8 @@ class ActionServer(RosActionServer):
             node.ros,
             import_interface(spec.type),
             spec.action,
-            execute_callback=self._execution.execute,
+            # An edit may put another one in its place.
+            execute_callback=lambda goal: self._execution.execute(goal),
             callback_group=node.serving,
             goal_callback=self._decide,
             handle_accepted_callback=self._add,

@@ -316,21 +316,11 @@ class LiveNode:
                 del self.limits[owner]
 
     def forget(self, noun: str, name: str) -> None:
-        """Forget what is known of an entity that is gone: its `own_state`, limits and health."""
-
-        def owns(owner: Owner) -> bool:
-            return (owner.kind, owner.name) == (noun, name)
-
-        for known in (self.limits, self._views):
-            for owner in filter(owns, list(known)):
-                del known[owner]
-        if self.system.health is not None:
-            self.system.health.forget(self.full_name, owns)
-
-    def forget_all(self) -> None:
-        """Forget the health of all its entities: it is gone for good."""
-        if self.system.health is not None:
-            self.system.health.forget(self.spec.full_name, lambda _owner: True)
+        """Forget what is known of an entity that is gone: its limits and `own_state`."""
+        self.drop_limits(noun, name)
+        for owner in list(self._views):
+            if (owner.kind, owner.name) == (noun, name):
+                del self._views[owner]
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""

@@ -61,13 +61,14 @@ def fresh_modules(
         stale: The full names of the modules to execute anew.
         sources: The texts of modules, by their names.
     """
-    before = {name: module for name, module in sys.modules.items() if name in sources}
+    # A module that is gone has no source.
+    before = {name: sys.modules.get(name) for name in (*sources, *stale)}
     for name in stale:
-        sys.modules.pop(name, None)
+        _put_back(name, None)
 
     def put_back() -> None:
-        for name in sources:
-            _put_back(name, before.get(name))
+        for name, module in before.items():
+            _put_back(name, module)
 
     finder: Any = _Finder(sources)
     sys.meta_path.insert(0, finder)
@@ -85,8 +86,9 @@ def _put_back(name: str, module: ModuleType | None) -> None:
     """Make a module what this name means, in its package, too; `None` for no module."""
     package, _, last = name.rpartition('.')
     if module is None:
-        sys.modules.pop(name, None)
-        if package in sys.modules:
+        gone = sys.modules.pop(name, None)
+        # `from package import module` would take it from there.
+        if package in sys.modules and vars(sys.modules[package]).get(last, gone) is gone:
             vars(sys.modules[package]).pop(last, None)
         return
     sys.modules[name] = module

@@ -109,6 +109,7 @@ class Rewiring:
             raise
         for finish in self._finish:
             finish()
+        self._forget_health()
 
     def _going_actions(self, plan: Plan) -> Iterable[ActionServer]:
         for operation in plan.operations:
@@ -137,6 +138,12 @@ class Rewiring:
                 undo()
             except Exception as error:  # noqa: BLE001 - the rest must be undone
                 system_logger.error(f'reload: something could not be undone: {error}')
+        self._forget_health()
+
+    def _forget_health(self) -> None:
+        """Forget the health of behaviours that are gone, or were not to come after all."""
+        if self._handle.health is not None:
+            self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
 
     def _read_as(self, reading: Reading) -> None:
         """Let what is created from now on, and what errors tell of places, be of these files."""
@@ -155,7 +162,6 @@ class Rewiring:
                 if each.target[1] == section and each.action in actions
             ]
 
-        nodes = self._nodes
         self._end_nodes(targets('nodes', Action.RECREATE))
         self._end_processes(targets('processes', Action.RECREATE))
         self._begin(targets('nodes', *_COMING), targets('processes', *_COMING))
@@ -165,7 +171,6 @@ class Rewiring:
             process.spec = self._new.spec.processes[name]
         for full_name in targets('nodes', Action.REMOVE):
             self._finish.append(partial(self._restarter.remove, full_name))
-            self._finish.append(partial(nodes[full_name].forget_all))
         for name in targets('processes', Action.REMOVE):
             self._finish.append(partial(self._processes.remove, name))
 
