@@ -109,6 +109,10 @@ class ComposerExecutor(MultiThreadedExecutor):
         finally:
             self._spinner.scheduler.add_waiting(-1)
 
+    def limit_threads(self, num_threads: int | None) -> None:
+        """Let so many callbacks run at the same time from now on; None for as many as block."""
+        self._spinner.scheduler.limit_running(num_threads or _MAX_THREADS)
+
     def add_node(self, node: Any) -> bool:
         """Run the callbacks of `node`; returns False if the executor has it already."""
         scheduler = self._spinner.scheduler  # Refused in a forked child.

@@ -139,6 +139,12 @@ class Scheduler:
         """Tell whether something is ready, and one more callback may run."""
         return len(self) > 0 and self._has_free_slot()
 
+    def limit_running(self, most: int) -> None:
+        """Let so many callbacks run at the same time; those beyond that run to their end."""
+        with self.lock:
+            self._max_running = most
+        self._wake()
+
     def _has_free_slot(self) -> bool:
         return self.running - self.waiting < self._max_running
 

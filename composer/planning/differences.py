@@ -89,7 +89,6 @@ _SYSTEM = _Rules(
     'all that is not in the files',
     {
         'environment': 'ROS reads this when it starts',
-        'executor.threads': 'the executor takes this when it starts',
         'interfaces': 'a process can load an interface package once',
     },
 )

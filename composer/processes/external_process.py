@@ -54,6 +54,11 @@ class ExternalProcess:
         # A process that keeps dying is started again ever more slowly, as nodes are.
         self.backoff = Backoff(least_sec=spec.restart_delay_sec)
 
+    def change(self, spec: ProcessSpec) -> None:
+        """Be kept as `spec` says from now on; it runs as before."""
+        self.spec = spec
+        self.backoff.least_sec = spec.restart_delay_sec
+
     @property
     def is_ready(self) -> bool:
         """Whether it runs, or has ended with exit code 0."""

@@ -19,6 +19,7 @@ import contextlib
 import os
 import select
 import signal
+import struct
 import sys
 import time
 from pathlib import Path
@@ -27,8 +28,9 @@ RLIMIT_LOCKS = 10
 # Prints the stacks of Composer's threads.
 STACKS_SIGNAL = signal.SIGRTMAX
 # What Composer sends, beside the numbers of signals: a stop has begun or is over, or the process
-# goes on without the guardian.
-BEGUN, OVER, LEAVE = 101, 102, 103
+# goes on without the guardian. `LIMIT` is followed by the seconds that a stop may take.
+BEGUN, OVER, LEAVE, LIMIT = 101, 102, 103, 104
+SECONDS = struct.Struct('=d')
 # A second one means that the user does not want to wait.
 _INTERRUPTS = {signal.SIGINT, signal.SIGTERM}
 
@@ -69,6 +71,7 @@ class Guardian:
         self._deadline = _NEVER
         self._interrupts = 0
         self._has_left = False
+        self._unread = b''
 
     def run(self) -> bool:
         """Return whether Composer has ended; it may have sent the guardian away before."""
@@ -90,8 +93,7 @@ class Guardian:
                     self._take(BEGUN)
                     # Not counted if the system stops already.
                     self._signal(signal.SIGHUP)
-                for byte in data:
-                    self._take(byte)
+                self._take_all(data)
             # It may have reported a signal right before its end.
             if self._ended in ready:
                 if self._deadline == _NEVER:
@@ -101,6 +103,19 @@ class Guardian:
                     )
                 return True
         return False
+
+    def _take_all(self, data: bytes) -> None:
+        rest = self._unread + data
+        while rest:
+            size = 1 + SECONDS.size if rest[0] == LIMIT else 1
+            if len(rest) < size:
+                break
+            if rest[0] == LIMIT:
+                (self._stop_sec,) = SECONDS.unpack_from(rest, 1)
+            else:
+                self._take(rest[0])
+            rest = rest[size:]
+        self._unread = rest
 
     def _take(self, byte: int) -> None:
         now = time.monotonic()

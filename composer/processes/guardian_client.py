@@ -68,6 +68,10 @@ class GuardianClient:
         """Wait until the guardian is no child of this process any more."""
         self._process.wait()
 
+    def allow(self, stop_sec: float) -> None:
+        """Let a stop take so long from now on."""
+        self._send(guardian.LIMIT, guardian.SECONDS.pack(stop_sec))
+
     def begin_stop(self) -> bool:
         """Let the time of a stop run; return whether the guardian can be told."""
         return self._send(guardian.BEGUN)
@@ -82,13 +86,13 @@ class GuardianClient:
         with suppress(OSError):
             os.close(self.descriptor)
 
-    def _send(self, byte: int) -> bool:
+    def _send(self, byte: int, rest: bytes = b'') -> bool:
         # A behaviour may have closed it; then the guardian stops the system. Its number may be
         # that of something else by now.
         try:
             if os.fstat(self.descriptor).st_ino != self._inode:
                 return False
-            os.write(self.descriptor, bytes([byte]))
+            os.write(self.descriptor, bytes([byte]) + rest)
         except OSError as error:
             return error.errno != errno.EBADF
         return True

@@ -42,12 +42,12 @@ class ProcessSupervisor:
     Args:
         logger: The logger of the system.
         end_system: Called with an exit code when a required process has ended, or the last of all.
-        timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line.
 
     Attributes:
         by_name: The processes.
+        timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
     """
 
@@ -63,7 +63,7 @@ class ProcessSupervisor:
         self.by_name = {spec.name: ExternalProcess(spec) for spec in specs}
         self._logger = logger
         self._end_system = end_system
-        self._timeout_sec = timeout_sec
+        self.timeout_sec = timeout_sec
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
         self.is_alone = False
@@ -160,7 +160,7 @@ class ProcessSupervisor:
             return run
 
     def _timeout_of(self, spec: ProcessSpec) -> float:
-        return self._timeout_sec if spec.stop_timeout_sec is None else spec.stop_timeout_sec
+        return self.timeout_sec if spec.stop_timeout_sec is None else spec.stop_timeout_sec
 
     def _take_answer(self, answer: dict[str, Any]) -> None:
         run = self._runs.get(answer['number'])

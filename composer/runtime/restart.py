@@ -69,7 +69,6 @@ class NodeRestarter:
 
     Args:
         nodes: The nodes of the system, by their full names.
-        timeout_sec: How long the behaviours of a node get to end.
 
     Attributes:
         lock: Held while a node is rebuilt, for nothing to stop an incomplete node.
@@ -80,13 +79,11 @@ class NodeRestarter:
         nodes: dict[str, LiveNode],
         starter: NodeStarter,
         system: SystemHandle,
-        timeout_sec: float,
     ) -> None:
         self.lock = threading.Lock()
         self._nodes = nodes
         self._starter = starter
         self._system = system
-        self._timeout_sec = timeout_sec
 
     def restart(self, full_name: str) -> str:
         """Rebuild a node: its entities, parameters and state are as at the start again.
@@ -131,7 +128,7 @@ class NodeRestarter:
     def _end(self, node: LiveNode) -> bool:
         """Remove a node; return whether a new one may take its place."""
         stop, executor, name = self._system.stop, self._system.executor, node.spec.key
-        has_ended = stop_node(node, self._timeout_sec, lambda: stop.is_set)
+        has_ended = stop_node(node, self._system.stop_timeout_sec, lambda: stop.is_set)
         if stop.is_set:
             return False
         if not has_ended:

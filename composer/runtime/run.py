@@ -15,6 +15,7 @@ from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forked_children
 from composer.runtime.control.readiness import notify, take_notify_socket
 from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
+from composer.runtime.stop import limit_stop
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system import System
 
@@ -31,10 +32,6 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
 # with SIGTERM, and Python handles it first.
 _HANG_UP = signal.SIGHUP
-# How much longer than its timeouts a stop may take.
-_MARGIN_SEC = 5.0
-# To destroy nodes one by one takes time that grows with the square of their number.
-_DESTRUCTION_SEC = 0.0005
 _EXIT_SEC = 10.0
 
 
@@ -118,9 +115,7 @@ def _end_process(code: int) -> NoReturn:
 
 @contextmanager
 def _guarded(spec: SystemSpec, *, ends_process: bool) -> Iterator[GuardianClient]:
-    stop_sec = spec.longest_stop_sec + _MARGIN_SEC
-    if not ends_process:
-        stop_sec += len(spec.nodes) ** 2 * _DESTRUCTION_SEC
+    stop_sec = limit_stop(spec, ends_process=ends_process)
     try:
         guardian = GuardianClient(stop_sec, _EXIT_SEC, owns_process=ends_process)
     except OSError as error:

@@ -15,9 +15,24 @@ from composer.runtime.logs import system_logger
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from composer.language.specs import SystemSpec
     from composer.runtime.nodes.live_node import LiveNode
 
 _POLL_SEC = 0.05
+# How much longer than its timeouts a stop may take.
+_MARGIN_SEC = 5.0
+# To destroy nodes one by one takes time that grows with the square of their number.
+_DESTRUCTION_SEC = 0.0005
+
+
+def limit_stop(spec: SystemSpec, *, ends_process: bool) -> float:
+    """Return how long the stop of a system may take, in seconds.
+
+    Args:
+        ends_process: Whether the process exits afterwards, and destroys no nodes before.
+    """
+    destruction_sec = 0.0 if ends_process else len(spec.nodes) ** 2 * _DESTRUCTION_SEC
+    return spec.longest_stop_sec + _MARGIN_SEC + destruction_sec
 
 
 def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:

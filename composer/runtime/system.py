@@ -25,7 +25,7 @@ from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
 from composer.runtime.rewiring.rewire import Rewiring
 from composer.runtime.start import NodeStarter
-from composer.runtime.stop import stop_nodes
+from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import WaitingStarter, list_waiters
@@ -98,9 +98,7 @@ class System:
         self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
         self._handle = self._create_handle(ros_arguments)
         self._starter = NodeStarter(self._nodes, self._handle)
-        self._restarter = NodeRestarter(
-            self._nodes, self._starter, self._handle, spec.shutdown_timeout_sec
-        )
+        self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = ControlNode(self, spec, self._handle.health, commands)
         self._processes = ProcessSupervisor(
@@ -129,7 +127,7 @@ class System:
             failures=ServiceFailures(),
             without_parameter_services=spec.without_parameter_services,
             stop_timeout_sec=spec.shutdown_timeout_sec,
-            health=None if spec.diagnostics_period_sec is None else HealthRegistry(),
+            health=HealthRegistry(),
         )
 
     @property
@@ -216,14 +214,21 @@ class System:
         )
         rewiring.wait_for_goals(plan, aborts_goals)
         with self._restarter.lock:
-            if self.stop_requested or not plan:
+            if self.stop_requested:
                 return plan
             rewiring.apply(plan)
             self._reading = new
-            self._processes.is_alone = not new.spec.nodes
-            self._hang_watcher.follow(_limits(new.spec))
-            self._control.follow(new.spec)
+            self._follow(new.spec)
         return plan
+
+    def _follow(self, spec: SystemSpec) -> None:
+        """Do what the system as a whole does as `spec` says from now on."""
+        self._executor.limit_threads(spec.threads)
+        self._handle.stop_timeout_sec = self._processes.timeout_sec = spec.shutdown_timeout_sec
+        self._guardian.allow(limit_stop(spec, ends_process=self._guardian.owns_process))
+        self._processes.is_alone = not spec.nodes
+        self._hang_watcher.follow(_limits(spec))
+        self._control.follow(spec)
 
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""

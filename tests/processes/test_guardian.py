@@ -23,9 +23,9 @@ import subprocess
 import sys
 import time
 
-from composer.runtime import run
+from composer.runtime import stop
 
-run._MARGIN_SEC = 0.5
+stop._MARGIN_SEC = 0.5
 
 def hold_interpreter(node):
     node.logger.info('holding')
@@ -104,6 +104,18 @@ def test_a_process_that_was_told_to_end_has_not_crashed(capfd):
     assert capfd.readouterr().err == ''
     for each in (ended, reports, descriptor):
         os.close(each)
+
+
+def test_a_stop_may_take_as_long_as_was_told_last(capfd):
+    """The bytes of the time mean nothing else, and may come in two pieces."""
+    with subprocess.Popen(['sleep', '1000']) as process:
+        reports, descriptor = os.pipe()
+        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, descriptor, 1000.0, 10.0)
+        told = bytes([guardian.LIMIT]) + guardian.SECONDS.pack(0.01)
+        watching._take_all(told[:4])
+        os.write(descriptor, told[4:] + bytes([guardian.BEGUN]))
+        assert watching.run()
+    assert 'the system did not end in time' in capfd.readouterr().err
 
 
 def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):

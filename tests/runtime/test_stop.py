@@ -143,9 +143,9 @@ def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_aliv
         nodes: {stuck: {on_stop: 'parts:hold_interpreter'}}
     """
     hurry = """
-from composer.runtime import run
+from composer.runtime import stop
 
-run._MARGIN_SEC = 0.5
+stop._MARGIN_SEC = 0.5
 """
     child = compose(text, CODE + hurry)
     child.wait_until_ready()

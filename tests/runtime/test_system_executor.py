@@ -94,7 +94,7 @@ def test_a_callback_that_waits_does_not_count_against_the_threads(system_executo
     waiter.cancel()
 
 
-def test_one_thread_runs_one_callback_at_a_time(system_executor, node, wait_for):
+def test_as_many_callbacks_run_at_a_time_as_there_may_be_now(system_executor, node, wait_for):
     inside, most = [], []
 
     def enter():
@@ -103,11 +103,17 @@ def test_one_thread_runs_one_callback_at_a_time(system_executor, node, wait_for)
         threading.Event().wait(0.005)
         inside.pop()
 
-    for _ in range(3):
+    for _ in range(5):
         node.create_timer(0.001, enter, callback_group=MutuallyExclusiveCallbackGroup())
 
     wait_for(lambda: len(most) > 20, 'callbacks')
     assert max(most) == 1
+    for threads in (3, 2, None):
+        system_executor.limit_threads(threads)
+        wait_for(lambda: len(inside) <= (threads or 5), 'the end of those that were more')  # noqa: B023
+        most.clear()
+        wait_for(lambda: len(most) > 50, 'callbacks')
+        assert max(most) == (threads or 5)
 
 
 def test_a_call_later_comes_and_a_cancelled_one_does_not(system_executor, wait_for):

@@ -81,7 +81,7 @@ class ControlNode:
     """The node of a system itself, from `start` to `stop`.
 
     Args:
-        health: The health of the system's entities; `None` if it is not measured.
+        health: The health of the system's entities.
         commands: `None` if the system is not to be asked over ROS.
     """
 
@@ -89,19 +89,19 @@ class ControlNode:
         self,
         system: ControlledSystem,
         spec: SystemSpec,
-        health: HealthRegistry | None,
+        health: HealthRegistry,
         commands: Commands | None,
     ) -> None:
         self._system = system
         self._commands = commands
+        self._health = health
+        self._period_sec = spec.diagnostics_period_sec
         self._diagnostics: DiagnosticsPublisher | None = None
-        if health is not None and spec.diagnostics_period_sec is not None:
-            self._diagnostics = DiagnosticsPublisher(
-                system.state, spec.diagnostics_period_sec, health, system.overdue_calls
-            )
         self._node: RosNode | None = None
         self._executor: SystemExecutor | None = None
         self._claim: NameClaim | None = None
+        # Held while the node and what it has are created or destroyed.
+        self._lock = threading.Lock()
         self._may_begin = threading.Event()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-control', daemon=True)
@@ -123,8 +123,7 @@ class ControlNode:
         if owner is not None:
             advice = f"stop it with 'composer down {state.name}', or use another ROS_DOMAIN_ID"
             raise StartError(self._describe_rival(owner), help=advice)
-        if self._diagnostics is not None or self._commands is not None:
-            self._thread.start()
+        self._thread.start()
 
     def begin(self) -> None:
         """Create the node now, as the system is up."""
@@ -132,8 +131,13 @@ class ControlNode:
 
     def follow(self, spec: SystemSpec) -> None:
         """Do from now on what a system says that was edited."""
-        if self._diagnostics is not None and spec.diagnostics_period_sec is not None:
-            self._diagnostics.period_sec = spec.diagnostics_period_sec
+        with self._lock:
+            before, self._period_sec = self._period_sec, spec.diagnostics_period_sec
+            if before is None:
+                # What came until now is of no period.
+                self._health.reports(1.0, (), 0)
+            if self._may_begin.is_set():
+                self._update()
 
     def stop(self) -> None:
         """Answer no more, and destroy the node, if it was created."""
@@ -141,8 +145,7 @@ class ControlNode:
         self._may_begin.set()
         if self._thread.ident is not None:
             self._thread.join()
-        if self._diagnostics is not None:
-            self._diagnostics.stop()
+        self._stop_diagnostics()
         if self._executor is not None:
             self._executor.stop(_STOP_SEC)
         if self._node is not None:
@@ -155,12 +158,23 @@ class ControlNode:
 
     def _run(self) -> None:
         self._may_begin.wait(_LATEST_SEC)
+        with self._lock:
+            self._may_begin.set()
+            self._update()
+
+    def _update(self) -> None:
+        """Have the node, and what belongs to it, if they are wanted."""
         if self._ended.is_set():
             return
         try:
-            self._node = self._create_node()
-            self._publish_diagnostics()
+            is_wanted = self._period_sec is not None or self._commands is not None
+            if self._node is None and is_wanted:
+                self._node = self._create_node()
+            self._update_diagnostics()
             self._serve()
+            if self._node is not None and not is_wanted:
+                self._node.destroy_node()
+                self._node = None
         except Exception as error:  # noqa: BLE001 - rclpy and the middleware raise many kinds
             system_logger.error(f'the system cannot be asked over ROS: {error}')
 
@@ -179,16 +193,30 @@ class ControlNode:
             ],
         )
 
-    def _publish_diagnostics(self) -> None:
-        if self._diagnostics is None or self._node is None:
-            return
-        try:
-            self._diagnostics.start(self._node)
-        except ImportError as error:
-            system_logger.warning(f'/diagnostics is not published: {error}')
+    def _update_diagnostics(self) -> None:
+        period_sec = self._period_sec
+        if period_sec is None:
+            self._stop_diagnostics()
+        elif self._diagnostics is not None:
+            self._diagnostics.change_period(period_sec)
+        elif self._node is not None:
+            system = self._system
+            diagnostics = DiagnosticsPublisher(
+                system.state, period_sec, self._health, system.overdue_calls
+            )
+            try:
+                diagnostics.start(self._node)
+            except ImportError as error:
+                system_logger.warning(f'/diagnostics is not published: {error}')
+            self._diagnostics = diagnostics
+
+    def _stop_diagnostics(self) -> None:
+        if self._diagnostics is not None:
+            self._diagnostics.stop()
+            self._diagnostics = None
 
     def _serve(self) -> None:
-        if self._commands is None or self._node is None:
+        if self._commands is None or self._node is None or self._executor is not None:
             return
         self._create_services(self._node, self._commands)
         self._executor = SystemExecutor(self._context, None, log=self._log)

@@ -67,7 +67,8 @@ class DiagnosticsPublisher:
         self._registry = registry
         self._overdue = overdue
         self._watched_until = 0.0
-        self._ended = threading.Event()
+        self._has_ended = False
+        self._woken = threading.Event()
         self._thread = threading.Thread(target=self._run, name='diagnostics', daemon=True)
 
     def start(self, node: RosNode) -> None:
@@ -84,9 +85,18 @@ class DiagnosticsPublisher:
 
     def stop(self) -> None:
         """Stop to publish."""
-        self._ended.set()
+        self._has_ended = True
+        self._woken.set()
         if self._thread.ident is not None:
             self._thread.join()
+            cpu_meter.turn(on=False)
+            self._node.destroy_publisher(self._publisher)
+
+    def change_period(self, period_sec: float) -> None:
+        """Let so many seconds be between two messages; a new period begins now."""
+        if period_sec != self.period_sec:
+            self.period_sec = period_sec
+            self._woken.set()
 
     def watch(self) -> None:
         """Measure for some time what calls cost the processor, from the next period on."""
@@ -100,7 +110,11 @@ class DiagnosticsPublisher:
         writers: dict[EntityKey, StatusWriter] = {}
         begun = monotonic()
         due = begun + self.period_sec
-        while not self._ended.wait(max(0.0, due - monotonic())):
+        while not self._has_ended:
+            if self._woken.wait(max(0.0, due - monotonic())):
+                self._woken.clear()
+                due = monotonic() + self.period_sec
+                continue
             now = monotonic()
             reports = self._registry.reports(now - begun, self._overdue(), monotonic_ns())
             begun = now

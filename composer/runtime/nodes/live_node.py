@@ -202,8 +202,7 @@ class LiveNode:
         def failed(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
-            if health is not None:
-                health.note_error(error)
+            health.note_error(error)
             self.errors.report(f'{owner} ({self.place(path)})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
@@ -213,7 +212,7 @@ class LiveNode:
             self.running,
             deliver=deliver,
             failed=failed,
-            add_time=None if health is None else health.times.add,
+            add_time=health.times.add,
             may_begin=may_begin,
         )
 
@@ -286,10 +285,8 @@ class LiveNode:
 
     def count_missed(self, owner: Owner, entity: Any) -> None:
         """Count in the health of an entity what its ROS entity has missed."""
-        health = self._health(owner)
-        if health is not None:
-            counter = count_missed(self.system.executor, self.ros, entity)
-            health.follow(counter, counter.queued)
+        counter = count_missed(self.system.executor, self.ros, entity)
+        self._health(owner).follow(counter, counter.queued)
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""
@@ -335,10 +332,9 @@ class LiveNode:
         release(self.ros)
         self.ros.destroy_node()
 
-    def _health(self, owner: Owner) -> EntityHealth | None:
-        """Return the health of an entity, `None` if it is not measured."""
-        board = self.system.health
-        return None if board is None else board.entity(self.full_name, owner)
+    def _health(self, owner: Owner) -> EntityHealth:
+        """Return the health of an entity."""
+        return self.system.health.entity(self.full_name, owner)
 
     def _limit(self, owner: Owner, path: DataPath, options: BehaviourOptions) -> None:
         warn = EscapingLogger(self.ros.get_logger()).warning

@@ -56,7 +56,7 @@ class SystemHandle:
         failures: Which services failed lately.
         without_parameter_services: The full names of the nodes that have none.
         stop_timeout_sec: What running behaviours get to end.
-        health: The health of the system's entities; `None` measures nothing.
+        health: The health of the system's entities.
     """
 
     context: Context
@@ -71,4 +71,4 @@ class SystemHandle:
     failures: ServiceFailures
     without_parameter_services: frozenset[str]
     stop_timeout_sec: float
-    health: HealthRegistry | None
+    health: HealthRegistry

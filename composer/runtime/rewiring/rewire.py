@@ -142,8 +142,7 @@ class Rewiring:
 
     def _forget_health(self) -> None:
         """Forget the health of behaviours that are gone, or were not to come after all."""
-        if self._handle.health is not None:
-            self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
+        self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
 
     def _read_as(self, reading: Reading) -> None:
         """Let what is created from now on, and what errors tell of places, be of these files."""
@@ -167,8 +166,8 @@ class Rewiring:
         self._begin(targets('nodes', *_COMING), targets('processes', *_COMING))
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
-            self._undo.append(partial(setattr, process, 'spec', process.spec))
-            process.spec = self._new.spec.processes[name]
+            self._undo.append(partial(process.change, process.spec))
+            process.change(self._new.spec.processes[name])
         for full_name in targets('nodes', Action.REMOVE):
             self._finish.append(partial(self._restarter.remove, full_name))
         for name in targets('processes', Action.REMOVE):

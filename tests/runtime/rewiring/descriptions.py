@@ -26,14 +26,13 @@ def describe(system):
             for name in system.snapshot.code
             if name in sys.modules and system.snapshot.code[name]
         ),
-        'threads': spec.threads,
+        'threads': system._executor._spinner.scheduler._most_running,
+        'timeouts': (system._handle.stop_timeout_sec, system._processes.timeout_sec),
         'environment': {name: os.environ.get(name) for name in spec.environment},
         'profiles': repr(system._handle.profiles),
         'closed': sorted(system._handle.without_parameter_services),
-        'health': sorted(
-            f'{node} {owner}' for node, owner in getattr(system._handle.health, '_entities', ())
-        ),
-        'diagnostics': system._control._diagnostics and system._control._diagnostics.period_sec,
+        'health': sorted(f'{node} {owner}' for node, owner in system._handle.health._entities),
+        'diagnostics': system._control._period_sec,
         'pause_sec': system._hang_watcher._pause_sec,
         'is_alone': system._processes.is_alone,
     }

@@ -1,0 +1,92 @@
+"""What belongs to the system as a whole changes while it runs, or starts all of it again."""
+
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import String
+
+pytestmark = pytest.mark.ros
+
+# It all would take a quarter of an hour, if it stayed like that.
+BEFORE = """
+version: 1
+executor: {threads: 1, shutdown_timeout: 900}
+diagnostics: false
+nodes:
+  one: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
+  two: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
+  hanging: {subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hang}}}
+processes:
+  deaf:
+    command: [sh, -c, "trap '' INT; echo deaf; while true; do sleep 0.1; done"]
+    stop: {timeout: 900}
+"""
+AFTER = """
+version: 1
+executor: {threads: 3, shutdown_timeout: 0.3}
+diagnostics: {period: 900}
+nodes:
+  one: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
+  two: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
+  hanging: {subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hang}}}
+processes:
+  deaf:
+    command: [sh, -c, "trap '' INT; echo deaf; while true; do sleep 0.1; done"]
+    stop: {timeout: 0.2}
+"""
+CODE = """
+import threading
+
+both = threading.Barrier(2)
+
+def meet(node):
+    try:
+        both.wait(0.2)
+    except threading.BrokenBarrierError:
+        node.logger.info('alone')
+        both.reset()
+    else:
+        node.logger.info('together')
+
+def hang(node, message):
+    node.logger.info('hanging')
+    threading.Event().wait(900)
+"""
+
+
+def test_threads_and_times_change_in_place(compose, peer, wait_for):
+    child = compose(BEFORE, CODE, '--watch')
+    child.wait_until_ready()
+    child.wait_for_line('alone', times=3)
+    assert not child.matching('together')
+
+    def count():
+        return peer.node.count_publishers('/diagnostics')
+
+    assert not count()
+
+    compose.write(AFTER, CODE)
+    assert child.wait_for_line('reloaded in').endswith('~1 system, ~1 process')
+    child.wait_for_line('together', times=3)
+    messages = peer.listen(DiagnosticArray, '/diagnostics')
+    wait_for(count, 'a publisher of diagnostics')
+
+    compose.write(AFTER.replace('period: 900', 'period: 0.1'), CODE)
+    wait_for(lambda: len(messages) > 2, 'messages of a shorter period')
+    names = {status.name for status in messages[-1].status}
+    assert '/one: timer meet' in names
+
+    compose.write(AFTER.replace('{period: 900}', 'false'), CODE)
+    wait_for(lambda: not count(), 'the end of the publisher')
+    assert not child.matching('not reloaded')
+
+    publisher = peer.advertise(String, '/words')
+    publisher.publish(String())
+    child.wait_for_line('hanging')
+    assert child.stop(signal.SIGINT) == 1
+    assert child.matching("process 'deaf' did not end within 0.2 s of SIGINT, and is killed")
+    assert child.matching("node 'hanging': subscription 'words' did not end in time")
