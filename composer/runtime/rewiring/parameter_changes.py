@@ -14,8 +14,10 @@ from composer.runtime.entities.parameters import create_descriptor, loosen_param
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.language.specs import ParameterSpec
     from composer.planning.plan import Operation
+    from composer.planning.snapshot import Snapshot
+    from composer.ros_parameters.file_reader import ParameterEntry
     from composer.runtime.nodes.live_node import LiveNode
 
 
@@ -23,13 +25,13 @@ class ParameterChange:
     """Changes of the parameters of one node.
 
     Args:
-        before: What the node was declared as.
-        after: What it is declared as now.
+        old: What the system was read as.
+        new: What it is read as now.
     """
 
-    def __init__(self, node: LiveNode, before: NodeSpec, after: NodeSpec) -> None:
+    def __init__(self, node: LiveNode, old: Snapshot, new: Snapshot) -> None:
         self._node = node
-        self._before, self._after = before, after
+        self._old, self._new = old, new
 
     def apply(self, operation: Operation) -> Callable[[], None]:
         """Add, change or remove a parameter; return what undoes it.
@@ -39,42 +41,45 @@ class ParameterChange:
         Raises:
             StartError: The node refuses the value: its declaration, or its `on_parameters`.
         """
-        name = operation.target[2]
-        before, after = self._before.parameters.get(name), self._after.parameters.get(name)
+        full_name, _, name = operation.target
+        before, old_entry = _find(self._old, full_name, name)
+        after, new_entry = _find(self._new, full_name, name)
         node, parameters = self._node, self._node.parameters
         assert parameters is not None  # noqa: S101 - its entities have been created
-        if before is None:
-            parameters.declare(self._after.parameters[name])
+        node.ros.override(name, new_entry)
+        if before is None and after is not None:
+            parameters.declare(after)
             return lambda: parameters.undeclare(name)
+        assert before is not None  # noqa: S101 - there is no such operation
         value = node.behaviour_node.parameters[name]
+        kept = node.ros.copy_parameter(name)
 
         def put_back() -> None:
-            if node.ros.has_parameter(name):
-                parameters.undeclare(name)
-            parameters.declare(before)
-            self._set(before, value)
+            node.ros.override(name, old_entry)
+            node.ros.put_parameter(*kept)
 
+        was, becomes = _initial_value(before, old_entry), _initial_value(after, new_entry)
+        # rclpy does not unset a parameter that has a type.
+        is_unset = becomes is None and value == was
         try:
-            if after is None or operation.action is Action.RECREATE:
+            if after is None or operation.action is Action.RECREATE or is_unset:
                 parameters.undeclare(name)
                 if after is not None:
                     parameters.declare(after)
             else:
-                self._change(after, operation, value)
+                self._change(after, becomes if value == was else value)
         except ComposerError:
             put_back()
             raise
         return put_back
 
-    def _change(self, spec: ParameterSpec, operation: Operation, value: Any) -> None:
-        """Change the descriptor of a parameter, and its value if nobody has set it."""
+    def _change(self, spec: ParameterSpec, value: Any) -> None:
+        """Give a parameter another descriptor, and a value."""
         ros = self._node.ros
-        changes = {each.key: each for each in operation.changes}
-        told = changes.get('value') or changes.get('default')
         # The old limits may not fit the new value.
         loosen_parameter(ros, spec.name)
-        if told is not None and value == told.old:
-            self._set(spec, told.new)
+        if value != self._node.behaviour_node.parameters[spec.name]:
+            self._set(spec, value)
         descriptor = create_descriptor(spec)
         descriptor.type = _type_of(spec).value
         try:
@@ -90,6 +95,21 @@ class ParameterChange:
         if not result.successful:
             message = f"parameter '{spec.name}' of '{self._node.spec.key}': {result.reason}"
             raise StartError(message)
+
+
+def _find(
+    snapshot: Snapshot, full_name: str, name: str
+) -> tuple[ParameterSpec | None, ParameterEntry | None]:
+    """Return the declaration of a parameter, and what parameter files say of it."""
+    spec = next(each for each in snapshot.spec.nodes.values() if each.full_name == full_name)
+    return spec.parameters.get(name), snapshot.overrides.get(full_name, {}).get(name)
+
+
+def _initial_value(spec: ParameterSpec | None, entry: ParameterEntry | None) -> Any:
+    if entry is not None or spec is None:
+        return entry and entry.value
+    is_bytes = spec.type == 'byte_array' and spec.value is not None
+    return [bytes([item]) for item in spec.value] if is_bytes else spec.value
 
 
 def _type_of(spec: ParameterSpec) -> Parameter.Type:

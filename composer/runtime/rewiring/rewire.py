@@ -293,7 +293,7 @@ class Rewiring:
         full_name, section, name = operation.target
         node = self._nodes[full_name]
         if section == 'parameters':
-            change = ParameterChange(node, self._before[full_name], self._after[full_name])
+            change = ParameterChange(node, self._old.snapshot, self._new.snapshot)
             self._undo.append(change.apply(operation))
             return
         entities = node.entities[section]

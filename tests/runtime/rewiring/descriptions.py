@@ -26,7 +26,7 @@ def describe(system):
             for name in system.snapshot.code
             if name in sys.modules and system.snapshot.code[name]
         ),
-        'threads': system._executor._spinner.scheduler._most_running,
+        'threads': system._executor._spinner.scheduler._max_running,
         'timeouts': (system._handle.stop_timeout_sec, system._processes.timeout_sec),
         'environment': {name: os.environ.get(name) for name in spec.environment},
         'profiles': repr(system._handle.profiles),
@@ -75,11 +75,10 @@ def describe_node(system, node):
         'suspended': len(node.suspended),
         'at_destruction': len(node.at_destruction),
         'limits': {
-            str(owner): limit.after_sec
-            for owner, limit in sorted(node.limits.items(), key=str)
+            str(owner): (limit.after_sec, limit._place())
+            for owner, limit in node.limits.items()
             if owner.kind not in ('on_start', 'on_stop')  # They count from the next start.
         },
-        'places': [limit._place() for _, limit in sorted(node.limits.items(), key=str)],
         'state': sorted(vars(node.behaviour_node.state)),
         'hooks': [
             describe_function(node.functions[hook.name], hook.arguments)
