@@ -319,6 +319,14 @@ class LiveNode:
             if (owner.kind, owner.name) == (noun, name):
                 del self._views[owner]
 
+    def take_over(self, old: LiveNode) -> None:
+        """Begin where a node that was the same ended: with its state and parameters."""
+        vars(self.behaviour_node.state).update(vars(old.behaviour_node.state))
+        for owner, view in old._views.items():
+            self._views[owner].own_state = view.own_state
+        for name in self.spec.parameters:
+            self.ros.put_parameter(*old.ros.copy_parameter(name))
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:

@@ -184,7 +184,7 @@ class Rewiring:
 
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
-        vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
+        again.take_over(node)
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
