@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter
 
-from composer.entity_kinds import ENTITY_KINDS
+from composer.entity_kinds import ENTITY_KINDS, USED_KINDS
 from composer.errors import StartError
 from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from composer.runtime.start import NodeStarter
 
 _POLL_SEC = 0.02
+# How long calls that have begun may take to end before what they use goes.
+_CALLS_END_SEC = 0.1
+_USED_SECTIONS = frozenset(kind.section for kind in USED_KINDS)
 _GOING = (Action.RECREATE, Action.REMOVE)
 _COMING = (Action.RECREATE, Action.ADD)
 
@@ -226,6 +229,14 @@ class Rewiring:
             if full_name in changed:
                 self._pause(node)
             self._replace_record(node, spec)
+        # What has begun may still publish on something that goes.
+        users = {
+            each.target[0]
+            for each in plan.operations
+            if each.target[1] in _USED_SECTIONS and each.action in _GOING
+        }
+        for full_name in users:
+            self._nodes[full_name].running.wait_until_idle(_CALLS_END_SEC)
         for kind in ENTITY_KINDS:
             for operation in plan.operations:
                 if operation.target[1] == kind.section:

@@ -74,7 +74,7 @@ class Project:
     def edit(self):
         """Make one to three edits; return what they are."""
         times = self._random.choice([1, 1, 1, 2, 2, 3])
-        return [self._random.choice(self._list_edits())() for _ in range(times)]
+        return [self._edit() for _ in range(times)]
 
     def keep(self):
         """Remember the files as they are: they are valid."""
@@ -116,15 +116,19 @@ class Project:
         self.edited.add(key)
         return f'{document}: {".".join(map(str, [*owner, last]))} = {value!r}'
 
-    def _list_edits(self):
+    def _edit(self):
+        """Make one edit; return what it is."""
         modules = [self._edit_module] * 4
         rest = [self._edit_layer, self._edit_limit, self._add_or_remove, self._rename, self._reset]
-        return [*[self._edit_key] * 15, *modules, *rest]
+        edits = [*[self._edit_key] * 15, *modules, *rest]
+        while (done := self._random.choice(edits)()) is None:
+            pass
+        return done
 
     def _edit_key(self):
         key = self._random.choice(sorted(VALUES))
         value = self._random.choice(VALUES[key])
-        return self.set_key(key, value) or f'no place for {key}'
+        return self.set_key(key, value)
 
     def _edit_module(self):
         name = self._random.choice(sorted(MODULES))
@@ -171,7 +175,7 @@ class Project:
         section = self._random.choice(_SECTIONS)
         mine = entries.get(section)
         if node == 'witness' or (mine is not None and not isinstance(mine, dict)):
-            return 'nothing'
+            return None
         if mine and self._random.random() < 0.5:
             name = self._random.choice(sorted(mine))
             del mine[name]

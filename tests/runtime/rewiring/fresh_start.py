@@ -4,6 +4,7 @@ A parent that has imported everything forks for each of them: so a start takes n
 imports, and nothing of one start is left in the next.
 """
 
+import importlib
 import os
 import pickle
 import struct
@@ -32,9 +33,13 @@ class FreshStarter:
             stdout=subprocess.PIPE,
         )
 
-    def begin(self):
-        """Start the system as its files are now."""
-        self._process.stdin.write(b'.')
+    def begin(self, *, checks):
+        """Start the system as its files are now.
+
+        Args:
+            checks: Whether it is to be checked first, which takes as long as all the rest.
+        """
+        self._process.stdin.write(b'c' if checks else b'-')
         self._process.stdin.flush()
 
     def result(self):
@@ -48,8 +53,17 @@ class FreshStarter:
         self._process.stdout.close()
 
 
+def _read(reader):
+    from composer.checks.checker import create_context
+    from composer.cli.common.file_selection import load_given
+    from composer.interfaces.catalogue import InterfaceCatalogue
+
+    system = load_given(reader.paths, reader.words, reader.set_values)
+    return create_context(system, InterfaceCatalogue())
+
+
 @contextmanager
-def running_system(paths):
+def running_system(paths, *, checks=True):
     """Start a system as `composer up` does; yield it with its reloader.
 
     Raises:
@@ -66,7 +80,7 @@ def running_system(paths):
     from composer.runtime.system import System
 
     reader = SystemReader(paths, [], [])
-    context = reader.check()
+    context = reader.check() if checks else _read(reader)
     if context is None:
         message = 'it has errors'
         raise ComposerError(message)
@@ -95,7 +109,7 @@ def create_parameter_services(system):
         node.ros.start_parameter_services()
 
 
-def _start_and_tell(paths, answers):
+def _start_and_tell(paths, answers, *, checks):
     from composer.errors import ComposerError
     from composer.runtime import forked_children
     from tests.runtime.rewiring.descriptions import describe
@@ -104,7 +118,7 @@ def _start_and_tell(paths, answers):
     # It is no child of a behaviour, which must end with it.
     forked_children.in_child = False
     try:
-        with running_system(paths) as (system, _):
+        with running_system(paths, checks=checks) as (system, _):
             node = next(iter(system._nodes.values())).ros
             _send(answers, (describe(system), see_graph(node)[0]))
     except ComposerError as error:
@@ -124,24 +138,26 @@ def _serve(paths):
     answers = os.fdopen(os.dup(1), 'wb')
     os.dup2(2, 1)
     sys.dont_write_bytecode = True
-    _import_all()
-    while os.read(0, 1):
+    _import_all(paths)
+    while command := os.read(0, 1):
         child = os.fork()
         if child == 0:
-            _start_and_tell(paths, answers)
+            _start_and_tell(paths, answers, checks=command == b'c')
             os._exit(0)
         os.waitpid(child, 0)
 
 
-def _import_all():
-    import composer.cli.reload
-    import composer.cli.up
-    import composer.runtime.run
-    import std_msgs.msg
-    import std_srvs.srv
-    import test_msgs.action
-    import tests.runtime.rewiring.descriptions
-    import tests.runtime.rewiring.observing
+def _import_all(paths):
+    from composer.cli.common.system_reader import SystemReader
+
+    for name in (
+        *('composer.cli.reload', 'composer.runtime.run', 'composer.runtime.system'),
+        *('std_msgs.msg', 'std_srvs.srv', 'test_msgs.action', 'diagnostic_msgs.msg'),
+        *('tests.runtime.rewiring.descriptions', 'tests.runtime.rewiring.observing'),
+    ):
+        importlib.import_module(name)
+    # What the check imports when it needs it.
+    SystemReader(paths, [], []).check()
 
 
 if __name__ == '__main__':

@@ -45,13 +45,14 @@ class Game:
         applied: How many edits have changed the system.
     """
 
-    def __init__(self, project, seed, system, reloader, fresh, observer):
+    def __init__(self, project, seed, system, reloader, fresh, observer, checked):  # noqa: PLR0913, PLR0917
         self._project = project
         self._random = random.Random(seed)
         self._system = system
         self._reloader = reloader
         self._fresh = fresh
         self._observer = observer
+        self._checked = checked
         # What was set while the system ran, by its node and parameter.
         self._live = {(_WITNESS, 'level'): '7'}
         self._plan = None
@@ -79,13 +80,14 @@ class Game:
             text = outcome.text.splitlines()[-1]
         if not outcome.succeeded:
             if self._plan is not None and not any(each in text for each in _OWN_REASONS):
-                self._fresh.begin()
+                self._fresh.begin(checks=True)
                 assert isinstance(self._fresh.result(), str), f'{done}: only refused: {text}'
             self._check_refused(done, text)
             self._project.go_back()
             return done, text
         plan = compare(self._old, self._system.snapshot)
-        self._fresh.begin()
+        # It has passed the check in this process, as it does in any other.
+        self._fresh.begin(checks=self._random.random() < self._checked)
         try:
             self._forget_live(plan)
             self._check_untouched(plan.operations, done)
@@ -218,7 +220,7 @@ class Game:
                     self._observer.publish(ros.topic_name, node.spec.subscriptions[key[2]].type)
                 elif key[1] == 'services':
                     spec = node.spec.services[key[2]]
-                    name = ros_of(entity).srv_name
+                    name = node.ros.resolve_service_name(spec.service)
                     self._observer.wait(self._observer.begin_call(name, spec.type))
                 elif key[1] == 'actions':
                     if key not in touched:
@@ -313,8 +315,13 @@ class Witness:
 
 
 @contextmanager
-def playing(folder, seed, domains):
-    """Yield a game in a folder; of the two ROS domains the second is for fresh starts."""
+def playing(folder, seed, domains, checked=0.1):
+    """Yield a game in a folder.
+
+    Args:
+        domains: Two ROS domains; the second is for fresh starts.
+        checked: The share of the fresh starts that are checked first.
+    """
     project = Project(folder, seed)
     project.write()
     environment = {
@@ -336,7 +343,7 @@ def playing(folder, seed, domains):
         stack.callback(observer.close)
         witness = Witness(system, observer)
         stack.callback(witness.release)
-        yield Game(project, seed, system, reloader, fresh, observer)
+        yield Game(project, seed, system, reloader, fresh, observer, checked)
         witness.check()
 
 

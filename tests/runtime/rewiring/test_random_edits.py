@@ -44,7 +44,7 @@ if __name__ == '__main__':
     seed, count = sys.argv[1:]
     domain = int(os.environ['ROS_DOMAIN_ID'])
     with tempfile.TemporaryDirectory() as folder:
-        with playing(Path(folder), int(seed), (domain, domain + 1)) as game:
+        with playing(Path(folder), int(seed), (domain, domain + 1), 1.0) as game:
             for number in range(int(count)):
                 print(number, *game.play(), flush=True)
         print('applied', game.applied, threading.enumerate())
