@@ -210,7 +210,9 @@ def describe_function(function, arguments):
         'arguments': dict(arguments),
         'code': _describe_code(target.__code__),
         'globals': {
-            name: _describe_global(each) for name, each in sorted(names.items()) if name[:2] != '__'
+            name: _describe_global(each)
+            for name, each in sorted(names.items())
+            if name[:2] != '__'
         },
     }
 
@@ -227,6 +229,8 @@ def _describe_global(value):
 
 
 def _describe_code(code):
-    constants = [_describe_code(each) if isinstance(each, CodeType) else repr(each)
-                 for each in code.co_consts]
+    constants = [
+        _describe_code(each) if isinstance(each, CodeType) else repr(each)
+        for each in code.co_consts
+    ]
     return code.co_code, constants, code.co_names, code.co_firstlineno

@@ -34,7 +34,12 @@ _SECTIONS = ('parameters', 'publishers', 'subscriptions', 'timers', 'services', 
 _SECTIONS = (*_SECTIONS, 'actions', 'action_clients')
 _LINES = (
     *('# {}', 'LEVEL_{} = 1', 'class Level{}:\n    pass', 'import nothing_{}', 'def broken_{}(:'),
-    *('1 / 0', 'import helper\nassert helper.WORD == {}', 'raise SystemExit({})', 'from . import x'),
+    *(
+        '1 / 0',
+        'import helper\nassert helper.WORD == {}',
+        'raise SystemExit({})',
+        'from . import x',
+    ),
 )
 _RENAMES = (('def tick(', 'def tock('), ('def hear(', 'def haer('), ('node, text=', 'node, txt='))
 _LIMITS = ('5', '8', '1.5', 'many', '[1', '[1, 2]')

@@ -123,7 +123,7 @@ def _start_and_tell(paths, answers, *, checks):
             _send(answers, (describe(system), see_graph(node)[0]))
     except ComposerError as error:
         _send(answers, str(error))
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - the parent waits for an answer
         _send(answers, traceback.format_exc())
 
 

@@ -4,6 +4,7 @@ import os
 import random
 import sys
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from time import monotonic, sleep
 from unittest import mock
 
@@ -15,8 +16,8 @@ from composer.planning.differences import compare
 from composer.planning.plan import Action
 from composer.runtime import system as system_module
 from composer.runtime.rewiring.rewire import Rewiring
-from tests.running import DEADLINE_SEC, wait_for
-from tests.runtime.rewiring.descriptions import describe, describe_bound, ros_of
+from tests.running import PATIENCE_SEC
+from tests.runtime.rewiring.descriptions import describe
 from tests.runtime.rewiring.edits import Project
 from tests.runtime.rewiring.fresh_start import (
     FreshStarter,
@@ -25,6 +26,8 @@ from tests.runtime.rewiring.fresh_start import (
 )
 from tests.runtime.rewiring.memories import find_lost, remember
 from tests.runtime.rewiring.observing import Observer, see_graph
+from tests.runtime.rewiring.running import check_runs
+from tests.runtime.rewiring.witness import WITNESS, Witness
 
 # What only a system that runs can have against an edit.
 _OWN_REASONS = (
@@ -34,8 +37,6 @@ _OWN_REASONS = (
 )
 # After steps of these a failure strikes.
 _STEPS = ('_begin', '_change_entity', '_change_node', '_replace_record', '_end_nodes')
-_PROMPT_NS = 200_000_000
-_WITNESS = '/witness'
 
 
 class Game:
@@ -45,7 +46,7 @@ class Game:
         applied: How many edits have changed the system.
     """
 
-    def __init__(self, project, seed, system, reloader, fresh, observer, checked):  # noqa: PLR0913, PLR0917
+    def __init__(self, project, seed, system, reloader, fresh, observer, checked):
         self._project = project
         self._random = random.Random(seed)
         self._system = system
@@ -54,7 +55,7 @@ class Game:
         self._observer = observer
         self._checked = checked
         # What was set while the system ran, by its node and parameter.
-        self._live = {(_WITNESS, 'level'): '7'}
+        self._live = {(WITNESS, 'level'): '7'}
         self._plan = None
         self.applied = 0
         project.keep()
@@ -66,7 +67,7 @@ class Game:
         self._set_live(done)
         self._before = describe(self._system)
         self._kept = remember(self._system)
-        self._gids = see_graph(self._observer.node)[1]
+        self._graph, self._gids = see_graph(self._observer.node)
         self._old = self._system.snapshot
         self._plan = None
         with self._failing(done):
@@ -91,12 +92,15 @@ class Game:
         try:
             self._forget_live(plan)
             self._check_untouched(plan.operations, done)
-            self._check_runs(plan, done)
+            check_runs(self._system, self._observer, plan, done)
         finally:
             fresh = self._fresh.result()
         if isinstance(fresh, str):
             # It counts from the next start: this system would not survive one.
-            assert 'on_start raised' in fresh or 'waited' in fresh or 'wait' in fresh, (done, fresh)
+            assert 'on_start raised' in fresh or 'waited' in fresh or 'wait' in fresh, (
+                done,
+                fresh,
+            )
             self._project.go_back()
             self._project.write()
             assert self._reloader.reload(self._system).succeeded, done
@@ -138,7 +142,7 @@ class Game:
 
     def _set_live(self, done):
         """Set a parameter or a value of the state now and then."""
-        nodes = [node for name, node in self._system._nodes.items() if name != _WITNESS]
+        nodes = [node for name, node in self._system._nodes.items() if name != WITNESS]
         if not nodes or self._random.random() < 0.7:
             return
         node = self._random.choice(nodes)
@@ -171,6 +175,7 @@ class Game:
             if each.target[1] in ('nodes', 'processes') and each.action is Action.RECREATE
         ]
         _check_same(self._before, describe(self._system), (done, text))
+        self._check_graph(self._graph, (done, text))
         self._check_untouched(begun_again, (done, text))
 
     def _check_untouched(self, operations, done):
@@ -190,80 +195,15 @@ class Game:
         for (full_name, name), value in self._live.items():
             fresh['nodes'][full_name]['parameters'][name]['value'] = value
         _check_same(fresh, describe(self._system), done)
-        deadline = monotonic() + 10.0
-        while (seen := see_graph(self._observer.node)[0]) != fresh_graph:
+        self._check_graph(fresh_graph, done)
+
+    def _check_graph(self, expected, done):
+        """Wait until the observer sees what it should: what others do comes to it later."""
+        deadline = monotonic() + PATIENCE_SEC
+        while (seen := see_graph(self._observer.node)[0]) != expected:
             if monotonic() > deadline:
-                _check_same(fresh_graph, seen, done)
+                _check_same(expected, seen, done)
             sleep(0.01)
-
-    def _check_runs(self, plan, done):
-        """Wait until all has run that should, on the code that it should."""
-        pending = {}
-        for full_name, node in self._system._nodes.items():
-            for section, entities in node.entities.items():
-                for name, entity in entities.items():
-                    view = self._find_view(node, section, name)
-                    if view is not None and self._should_run(node, section, name, entity):
-                        key = full_name, section, name
-                        view.own_state.pop('ran', None)
-                        pending[key] = view, entity, node
-        deadline = monotonic() + DEADLINE_SEC
-        touched = {each.target for each in plan.operations}
-        while pending:
-            for key, (view, entity, node) in list(pending.items()):
-                ran = view.own_state.get('ran')
-                if ran is not None:
-                    _check_ran(ran, describe_bound(entity), (done, key))
-                    del pending[key]
-                elif key[1] == 'subscriptions':
-                    ros = ros_of(entity)
-                    self._observer.publish(ros.topic_name, node.spec.subscriptions[key[2]].type)
-                elif key[1] == 'services':
-                    spec = node.spec.services[key[2]]
-                    name = node.ros.resolve_service_name(spec.service)
-                    self._observer.wait(self._observer.begin_call(name, spec.type))
-                elif key[1] == 'actions':
-                    if key not in touched:
-                        del pending[key]
-                        continue
-                    spec = node.spec.actions[key[2]]
-                    name = node.resolve_action_name(spec.action)
-                    self._observer.wait(self._observer.send_goal(name, spec.type, order=1))
-            assert monotonic() < deadline, f'{done}: does not run: {list(pending)}'
-            sleep(0.002)
-
-    def _find_view(self, node, section, name):
-        for owner, view in node._views.items():
-            if f'{owner.kind}s' == section and owner.name == name:
-                return view
-        return None
-
-    def _should_run(self, node, section, name, entity):
-        spec = getattr(node.spec, section)[name]
-        if node.full_name == _WITNESS or spec.behaviour is None or not node.gate.is_open:
-            return False
-        if section == 'timers':
-            is_simulated = node.ros.get_parameter('use_sim_time').value and spec.clock == 'ros'
-            is_prompt = entity.ros.timer_period_ns < _PROMPT_NS
-            return is_prompt and not is_simulated and not entity.ros.is_canceled()
-        if section == 'subscriptions':
-            return spec.type == 'std_msgs/msg/String'
-        if section == 'services':
-            return spec.type == 'std_srvs/srv/Trigger'
-        return spec.type == 'test_msgs/action/Fibonacci'
-
-
-def _check_ran(ran, bound, told):
-    (described,) = [each for each in bound if 'note' in each['code'][2] or 'own_state' in
-                    each['code'][2]] or bound[:1]
-    names = described['globals']
-    word = names['WORD'] if 'WORD' in names else names['helper'][1]['WORD']
-    tags = [names['TAG'], word]
-    if 'inner' in names:
-        tags.append(names['inner'][1]['TAG'])
-    found = [repr(each) for each in ran[1 : 1 + len(tags)]]
-    assert found == tags, (told, ran, tags)
-    assert described['arguments'].items() <= ran[4].items(), (told, ran, described['arguments'])
 
 
 def _check_same(expected, found, done):
@@ -281,37 +221,6 @@ def _differences(expected, found, path=()):
         for key in {**expected, **found}
         for difference in _differences(expected.get(key), found.get(key), (*path, key))
     ]
-
-
-class Witness:
-    """A node that no edit names: what it has begun passes through all of them."""
-
-    def __init__(self, system, observer):
-        self._node, self._observer = system._nodes[_WITNESS], observer
-        self._ros = self._node.ros
-        self._ros.set_parameters([Parameter('level', value=7)])
-        observer.publish('/held', 'std_msgs/msg/Int64', data=-1)
-        wait_for(lambda: observer.count_subscriptions('/held', 'std_msgs/msg/Int64'), 'a match')
-        for number in range(5):
-            observer.publish('/held', 'std_msgs/msg/Int64', data=number)
-        self._response = observer.begin_call('/slow', 'std_srvs/srv/Trigger')
-        self._result = observer.send_goal('/long', 'test_msgs/action/Fibonacci', order=42)
-
-    def release(self):
-        """Let what it does come to its end."""
-        self._node.behaviour_node.state.released = True
-
-    def check(self):
-        """See that nothing was lost."""
-        state = self._node.behaviour_node.state
-        self.release()
-        wait_for(lambda: state.held[-5:] == list(range(5)), 'all messages that were held')
-        assert self._observer.wait(self._response).message == 'released'
-        assert list(self._observer.wait(self._result).result.sequence) == [42]
-        heard = list(state.heard)
-        assert heard == list(range(heard[0], heard[0] + len(heard)))
-        assert self._node.behaviour_node.parameters.level == 7
-        assert self._node.ros is self._ros
 
 
 @contextmanager
@@ -333,7 +242,7 @@ def playing(folder, seed, domains, checked=0.1):
         stack.enter_context(mock.patch.object(sys, 'dont_write_bytecode', True))
         modules = {*sys.modules}
         stack.callback(_forget_modules, folder, modules)
-        before = os.getcwd()
+        before = Path.cwd()
         os.chdir(folder)
         stack.callback(os.chdir, before)
         fresh = FreshStarter(project.paths, domains[1])
