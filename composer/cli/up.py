@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import os
 import sys
+from time import time_ns
 from typing import TYPE_CHECKING
 
 import click
 
 from composer.cli.common.file_selection import load_given
+from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import SystemReader, import_reading
+from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
@@ -18,10 +21,11 @@ from composer.planning.snapshot import take_snapshot
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
+    from composer.cli.reload import Reloader
 
 
 def up(  # noqa: PLR0913 - one for each option
@@ -56,8 +60,10 @@ def up(  # noqa: PLR0913 - one for each option
         # What behaviours print is shown at once, in a file, too.
         sys.stdout.reconfigure(line_buffering=True)
     reader = SystemReader(paths, words, set_values)
-    context = reader.check()
-    if context is None:
+    begun_ns = time_ns()
+    context, _files, told = reader.read()
+    show_findings(told)
+    if context is None or has_errors(told):
         return ExitCode.FAILED
     # These import nothing of ROS, which reads its environment when it is imported.
     from composer.runtime.environment import (
@@ -70,14 +76,16 @@ def up(  # noqa: PLR0913 - one for each option
     )
 
     check_ros()
+    from composer.cli.reload import Reloader
+
     variables = context.spec.environment
     with environment_set({**find_colour(), **variables}):
         check_shell(variables)
         check_log_folder(ros_arguments)
         check_middleware(os.environ)
         return _run(
-            reader,
             context,
+            lambda prefixes: Reloader(reader, context, prefixes, begun_ns, told),
             ros_arguments,
             log_levels,
             watches=watches,
@@ -87,8 +95,8 @@ def up(  # noqa: PLR0913 - one for each option
 
 
 def _run(
-    reader: SystemReader,
     context: CheckContext,
+    create_reloader: Callable[[Sequence[Path]], Reloader],
     ros_arguments: Sequence[str],
     log_levels: Sequence[str],
     *,
@@ -96,7 +104,6 @@ def _run(
     is_asked: bool,
     ends_process: bool,
 ) -> int:
-    from composer.cli.reload import Reloader
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.environment import environment_set
@@ -110,7 +117,7 @@ def _run(
         reading = import_reading(context, take_snapshot(context, prefixes))
         if reading is None:
             return ExitCode.FAILED
-        reloader = Reloader(reader, context, prefixes)
+        reloader = create_reloader(prefixes)
         return run_system(
             reading,
             watch=reloader.watching if watches else None,

@@ -110,6 +110,30 @@ class ComposedRosNode(Node):
         )
         return self._late_events
 
+    def follow_files(self, entries: Mapping[str, ParameterEntry]) -> None:
+        """Let parameters that are declared from now on have the values of parameter files.
+
+        Args:
+            entries: What the files say now; the command line wins over them.
+        """
+        overrides = self._parameter_overrides
+        for name in self.from_files:
+            overrides.pop(name, None)
+        self.from_files = {name: entries[name] for name in entries if name not in overrides}
+        overrides.update(
+            {
+                name: Parameter(name, Parameter.Type[entry.type.upper()], entry.value)
+                for name, entry in self.from_files.items()
+                # An empty list has no type.
+                if entry.type is not None
+            }
+        )
+
+    def find_override(self, name: str) -> Any:
+        """Return the value that a file or the command line gives a parameter; `None` for none."""
+        entry, override = self.from_files.get(name), self._parameter_overrides.get(name)
+        return entry.value if entry else override and override.value
+
     def start_parameter_services(self) -> None:
         """Create the parameter services, unless the node has them or the file turns them off."""
         if not self._lacks_services:
@@ -118,17 +142,6 @@ class ComposedRosNode(Node):
         if self._late_events is not None:
             self._late_events.create()
         self._parameter_service = ParameterService(self)
-
-    def override(self, name: str, entry: ParameterEntry | None) -> None:
-        """Let a parameter have this value of a parameter file when it is declared again."""
-        if name in self._parameter_overrides and name not in self.from_files:
-            return  # The command line wins.
-        self._parameter_overrides.pop(name, None)
-        self.from_files.pop(name, None)
-        if entry is not None:
-            self.from_files[name] = entry
-            if entry.value != []:
-                self._parameter_overrides[name] = Parameter(name, value=entry.value)
 
     def copy_parameter(self, name: str) -> tuple[Parameter, ParameterDescriptor]:
         """Return a parameter and its descriptor, for `put_parameter`."""

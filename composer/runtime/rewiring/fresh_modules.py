@@ -15,7 +15,8 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
     from types import CodeType, ModuleType
 
 
@@ -50,7 +51,7 @@ class _Finder:
 
 @contextmanager
 def fresh_modules(
-    stale: Collection[str], sources: Mapping[str, str]
+    stale: Collection[str], sources: Mapping[str, str], search_path: Iterable[Path] = ()
 ) -> Iterator[Callable[[], None]]:
     """Let imports make new modules in place of those that are stale.
 
@@ -60,15 +61,20 @@ def fresh_modules(
     Args:
         stale: The full names of the modules to execute anew.
         sources: The texts of modules, by their names.
+        search_path: Folders to search first from now on, as far as they are new.
     """
     # A module that is gone has no source.
     before = {name: sys.modules.get(name) for name in (*sources, *stale)}
     for name in stale:
         _put_back(name, None)
+    new_folders = [each for each in map(str, search_path) if each not in sys.path]
+    sys.path[:0] = new_folders
 
     def put_back() -> None:
         for name, module in before.items():
             _put_back(name, module)
+        for each in new_folders:
+            sys.path.remove(each)
 
     finder: Any = _Finder(sources)
     sys.meta_path.insert(0, finder)
@@ -87,8 +93,8 @@ def _put_back(name: str, module: ModuleType | None) -> None:
     package, _, last = name.rpartition('.')
     if module is None:
         gone = sys.modules.pop(name, None)
-        # `from package import module` would take it from there.
-        if package in sys.modules and vars(sys.modules[package]).get(last, gone) is gone:
+        # A package may have something else of this name.
+        if package in sys.modules and vars(sys.modules[package]).get(last) is gone:
             vars(sys.modules[package]).pop(last, None)
         return
     sys.modules[name] = module

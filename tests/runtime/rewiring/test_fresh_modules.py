@@ -51,7 +51,7 @@ def test_a_module_that_is_gone_cannot_be_imported_and_comes_back_after_that(load
     (tmp_path / 'fresh_pack/low.py').unlink()
     names = ('fresh_parts', 'fresh_pack.inner', 'fresh_pack.low')
     with (
-        pytest.raises(ModuleNotFoundError, match='fresh_pack.low'),
+        pytest.raises(ModuleNotFoundError, match=r'fresh_pack\.low'),
         stale(*names, fresh_pack__low=None),
     ):
         pass
