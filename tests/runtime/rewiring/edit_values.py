@@ -3,7 +3,7 @@
 The keys are named as `tests.runtime.rewiring.schema_keys` reads them from the schema.
 """
 
-NULL = object()
+NULL = 'null, which is a value'
 
 _BOOL = [True, False, None]
 _STRINGS = ['how it is', 'otherwise', None]

@@ -163,7 +163,7 @@ class Project:
         node = self._random.choice(sorted(nodes.keys() - {'witness'}) or ['nobody'])
         key = self._random.choice(sorted(each for each in VALUES if each.startswith('node.')))
         value = self._random.choice(VALUES[key])
-        layer['nodes'][node] = {key.partition('.')[2]: None if value is NULL else value}
+        layer['nodes'][node] = {key.partition('.')[2]: None if value == NULL else value}
         if self._random.random() < 0.5:
             layer['nodes'] = {}
         return f'layer.yaml: {layer["nodes"]}'
@@ -242,4 +242,4 @@ def _set(data, owner, last, value):
     if value is None:
         at.pop(last, None)
     else:
-        at[last] = None if value is NULL else value
+        at[last] = None if value == NULL else value

@@ -113,7 +113,7 @@ class Game:
     @contextmanager
     def _failing(self, done):
         """Let one step of the reload fail now and then, after it was done; and see the plan."""
-        left = self._random.choice([0] * 6 + [1, 2, 3, 5])
+        left = self._random.choice([0] * 20 + [1, 2, 3, 4, 5])
 
         def counting(original):
             def step(*arguments):
