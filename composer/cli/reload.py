@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import Counter
 from contextlib import contextmanager
@@ -9,12 +10,17 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
+import click
+
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import import_reading
+from composer.cli.rehearsal import rehearse
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
+from composer.interfaces.declared_packages import import_declared
+from composer.interfaces.search_paths import extend_variables
 from composer.language.paths import resolve_path
-from composer.planning.differences import compare
+from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
 from composer.reports.text import render_finding
@@ -25,7 +31,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.cli.common.system_reader import Report, SystemReader
     from composer.diagnostics import Diagnostic
-    from composer.planning.plan import Plan
+    from composer.planning.plan import Operation, Plan
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.system import System
 
@@ -36,6 +42,7 @@ _STEP_MS = 10
 _DEBOUNCE_MS = 100
 _LOOK_MS = 500
 _RUNS_ON = 'the system runs on as it was'
+_STOPS = 'the system stops'
 _NO_CHANGE = 'nothing has changed'
 
 
@@ -84,7 +91,10 @@ class Reloader:
                 return Outcome(succeeded=False, text=_with_findings(findings, text))
             took_ms = (monotonic() - begun) * 1000
             text = _NO_CHANGE
-            if plan:
+            if system.starts_again:
+                text = f'the system starts again: {summarize(plan)}'
+                system_logger.info(text)
+            elif plan:
                 text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}'
                 system_logger.info(text)
             system.state.note_reload(Outcome(succeeded=True, text=text))
@@ -123,6 +133,14 @@ class Reloader:
         context = self._check(report)
         self._note_files(self._files | _list_files(self._reader, context))
         snapshot = take_snapshot(context, self._prefixes)
+        if cause := find_new_start(system.snapshot, snapshot):
+            self._start_again(system, cause)
+            if not system.starts_again:
+                raise ComposerError(_STOPS)
+            return compare(system.snapshot, snapshot)
+        if snapshot.definitions != system.snapshot.definitions:
+            self._add_packages(system, context)
+            snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         with fresh_modules(stale, snapshot.sources):
             reading = import_reading(context, snapshot, report)
@@ -130,10 +148,33 @@ class Reloader:
                 raise ComposerError(_RUNS_ON)
             plan = system.rewire(reading, self._aborts_goals.is_set)
             if system.stop_requested:
-                message = 'the system stops'
-                raise ComposerError(message)
+                raise ComposerError(_STOPS)
         self._note_files(_list_files(self._reader, context))
         return plan
+
+    def _start_again(self, system: System, cause: Operation) -> None:
+        """Have the whole system start again, if it can."""
+        from composer.runtime.logs import system_logger
+
+        changes = ' and '.join(sorted({each.key for each in cause.changes}))
+        if not system.can_start_again:
+            message = f'{changes} cannot change while the system runs: {cause.reason}'
+            raise ComposerError(
+                message, help='end the program that it runs in, and start that again'
+            )
+        system_logger.info(f'reload: the system must start again, because of {changes}')
+        rehearse(system)
+        system.start_again(self._aborts_goals.is_set)
+
+    def _add_packages(self, system: System, context: CheckContext) -> None:
+        """Build and import the interface packages that were not declared before."""
+        if system.can_start_again:
+            # Another process can be ended whatever it does.
+            rehearse(system)
+        self._prefixes = import_declared(
+            context.interfaces, lambda line: click.echo(line, err=True)
+        )
+        os.environ.update(extend_variables(os.environ, self._prefixes))
 
     def _check(self, report: Report) -> CheckContext:
         if any(str(path) == '-' for path in self._reader.paths):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from composer.language.specs import BehaviourSpec, ConditionSpec, QosSpec
 from composer.planning.plan import Change
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator
 
     from composer.diagnostics import Span
     from composer.planning.snapshot import Snapshot
@@ -61,7 +62,7 @@ def compare_fields(old: Reading, new: Reading, names: Iterable[str]) -> Iterator
                 resolve_qos(after, new.snapshot.spec.qos),
             )
             yield from compare_entries(old, new, name, *resolved)
-        elif isinstance(before, dict):
+        elif isinstance(before, Mapping):
             yield from compare_entries(old, new, name, before, after)
         elif _differ(plain := _plain(before), plain_after := _plain(after)):
             yield _change(old, new, name, plain, plain_after)

@@ -144,8 +144,14 @@ EDITS = [
         'version: 1',
         'version: 1\nexecutor: {threads: 2}',
         None,
+        ["~ system 'system': executor.threads = 2 (2)"],
+    ),
+    (
+        'version: 1',
+        'version: 1\nenvironment: {MODE: fast}',
+        None,
         [
-            "± system 'system': executor.threads = 2 (2); the executor takes this when it starts; "
+            "± system 'system': environment.MODE = fast (2); ROS reads this when it starts; "
             'lost: all that is not in the files'
         ],
     ),

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import NodeStarter
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
 _GOING = (Action.RECREATE, Action.REMOVE)
@@ -81,17 +82,8 @@ class Rewiring:
         """
         servers = list(self._going_actions(plan))
         for server in servers:
-            server.retire(is_retired=True)
             self._undo.append(partial(server.retire, is_retired=False))
-        was_told = False
-        while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
-            if aborts():
-                for server in servers:
-                    server.retire(is_retired=True, aborts=True)
-            elif not was_told:
-                was_told = True
-                system_logger.info('reload: waiting for the goals in flight of actions that go…')
-            sleep(_POLL_SEC)
+        wait_for_goals(servers, self._handle.stop, aborts)
 
     def apply(self, plan: Plan) -> None:
         """Do all that a plan says.
@@ -100,7 +92,6 @@ class Rewiring:
             ComposerError: Something failed, and everything is as before.
         """
         try:
-            self._refuse_restart(plan)
             self._read_as(self._new)
             self._exchange_nodes_and_processes(plan)
             self._change_nodes(plan)
@@ -122,13 +113,6 @@ class Rewiring:
                 continue
             actions: dict[str, Any] = node.entities['actions']
             yield from actions.values() if section == 'nodes' else [actions[name]]
-
-    def _refuse_restart(self, plan: Plan) -> None:
-        for operation in plan.operations:
-            if operation.noun == 'system' and operation.action is Action.RECREATE:
-                changes = ' and '.join(sorted({each.key for each in operation.changes}))
-                message = f'{changes} cannot change while the system runs: {operation.reason}'
-                raise StartError(message, help='stop the system, and start it again')
 
     def _undo_all(self) -> None:
         self._read_as(self._old)
@@ -314,6 +298,27 @@ class Rewiring:
         if operation.action is Action.REMOVE:
             del entities[name]
             self._finish.append(partial(node.forget, operation.noun, name))
+
+
+def wait_for_goals(
+    servers: Collection[ActionServer], stop: StopRequest, aborts: Callable[[], bool]
+) -> None:
+    """Let actions accept no more goals, and wait until none is in flight, or for a stop.
+
+    Args:
+        aborts: Returns whether the goals are aborted; asked again and again.
+    """
+    for server in servers:
+        server.retire(is_retired=True)
+    was_told = False
+    while any(each.has_goals for each in servers) and not stop.is_set:
+        if aborts():
+            for server in servers:
+                server.retire(is_retired=True, aborts=True)
+        elif not was_told:
+            was_told = True
+            system_logger.info('reload: waiting for the goals in flight of actions that go…')
+        sleep(_POLL_SEC)
 
 
 def _set_sim_time(node: LiveNode, *, value: bool) -> None:
