@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,16 @@ if TYPE_CHECKING:
     from composer import Node
 
 _MOST_AT_ONCE = 10
+GAP_BUCKET_SEC = 0.1
 
 
 def ignore(_node: Node, _message: Empty) -> None:
     """Do nothing."""
+
+
+def ignore_request(_node: Node, _request: object) -> dict[str, object]:
+    """Do nothing, and answer so."""
+    return {}
 
 
 def hit_back(node: Node, message: Empty) -> None:
@@ -69,3 +76,35 @@ def count(node: Node, message: Int64) -> None:
     sent = -message.data
     print(json.dumps({'sent': sent, 'lost': sent - node.state.got}), flush=True)
     node.shutdown()
+
+
+def tell_edit(node: Node, edit: int) -> None:
+    """Print when an edit is seen for the first time (monotonic, s)."""
+    at = time.monotonic()
+    if node.own_state.get('edit') != edit:
+        node.own_state['edit'] = edit
+        # In one write: another thread may print, too.
+        sys.stdout.write(json.dumps({'edit': edit, 'at': at}) + '\n')
+
+
+def send_next(node: Node) -> int:
+    """Send the next number."""
+    node.state.sent += 1
+    return int(node.state.sent)
+
+
+def note_gap(node: Node, message: Int64) -> None:
+    """Count the numbers that did not come, and note the longest gap between two."""
+    now, state = time.monotonic(), node.state
+    state.lost += message.data - state.number - 1
+    state.number = message.data
+    state.came = state.came or now
+    bucket = int(now / GAP_BUCKET_SEC)
+    state.gaps[bucket] = max(state.gaps.get(bucket, 0.0), now - state.came)
+    state.came = now
+
+
+def tell_gaps(node: Node) -> None:
+    """Print what `note_gap` noted."""
+    gaps = list(node.state.gaps.items())
+    print(json.dumps({'lost': node.state.lost, 'gaps': gaps}), flush=True)

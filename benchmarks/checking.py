@@ -1,4 +1,4 @@
-"""What it costs to check files, each in a process of its own, as people and CI run it."""
+"""What it costs to check and compare files, each time in a new process, as people and CI do."""
 
 import os
 import subprocess
@@ -39,14 +39,14 @@ def write_system(path: Path, nodes: int) -> Path:
     return path
 
 
-def run_check(paths: list[Path]) -> tuple[float, float, float]:
-    """Return what a whole `composer check` takes: seconds, processor seconds and megabytes."""
+def run_command(command: str, paths: list[Path]) -> tuple[float, float, float]:
+    """Return what a whole `composer COMMAND` takes: seconds, processor seconds and megabytes."""
     script = 'import sys; from composer.cli.main import main; sys.exit(main())'
     # Started anew, so that no other process counts as its memory.
     watched = (
         'import resource, subprocess, sys, time\n'
         'begun = time.perf_counter()\n'
-        f'code = subprocess.call([sys.executable, "-c", {script!r}, "check", *sys.argv[1:]],'
+        f'code = subprocess.call([sys.executable, "-c", {script!r}, *sys.argv[1:]],'
         ' stdout=subprocess.DEVNULL)\n'
         'print(time.perf_counter() - begun)\n'
         'used = resource.getrusage(resource.RUSAGE_CHILDREN)\n'
@@ -55,7 +55,7 @@ def run_check(paths: list[Path]) -> tuple[float, float, float]:
     )
     environment = os.environ | {'PYTHONPATH': str(ROOT)}
     done = subprocess.run(  # noqa: S603 - Composer itself
-        [sys.executable, '-c', watched, *map(str, paths)],
+        [sys.executable, '-c', watched, command, *map(str, paths)],
         cwd=ROOT,
         env=environment,
         check=True,
@@ -68,7 +68,7 @@ def run_check(paths: list[Path]) -> tuple[float, float, float]:
 
 def measure_files(paths: list[Path], repeats: int = _REPEATS) -> Figures:
     """Return the least time and the most memory of some runs over the same files."""
-    runs = [run_check(paths) for _ in range(repeats)]
+    runs = [run_command('check', paths) for _ in range(repeats)]
     seconds, cpu_seconds, megabytes = zip(*runs, strict=True)
     return {
         'seconds': min(seconds),
@@ -77,16 +77,31 @@ def measure_files(paths: list[Path], repeats: int = _REPEATS) -> Figures:
     }
 
 
+def measure_plan(folder: Path, nodes: int) -> Figures:
+    """Return the least time of a plan and of a check of such a system, measured in turn."""
+    old, new = (write_system(folder / f'{each}.yaml', nodes) for each in ('old', 'new'))
+    new.write_text(new.read_text().replace('rate: 10\n', 'rate: 20\n', 1))
+    runs = [
+        (run_command('plan', [old, new])[0], run_command('check', [new])[0])
+        for _ in range(_REPEATS)
+    ]
+    plans, checks = zip(*runs, strict=True)
+    return {'plan_seconds': min(plans), 'check_seconds': min(checks)}
+
+
 def measure(side: str, size: int, _seconds: float) -> Figures:
     """Return what a check takes.
 
     Args:
         side: `shipped` for one small file, `many` for a hundred of `size` nodes, `one` for one
-            file of `size` nodes with five times as many entities.
+            file of `size` nodes with five times as many entities; `plan` for such a file and an
+            edit of it, planned and checked.
     """
     if side == 'shipped':
         return measure_files([ROOT / 'configs' / 'greeter.yaml'])
     with tempfile.TemporaryDirectory(dir=ROOT) as folder:
+        if side == 'plan':
+            return measure_plan(Path(folder), size)
         count = 100 if side == 'many' else 1
         paths = [write_system(Path(folder) / f'{each}.yaml', size) for each in range(count)]
         return measure_files(paths, repeats=3)

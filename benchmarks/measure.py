@@ -37,6 +37,8 @@ SUBJECTS = {
     'jitter': Subject('benchmarks.jitter', 6.0),
     'idle_cpu': Subject('benchmarks.idle_cpu', 5.0),
     'check': Subject('benchmarks.checking', most_rounds=2),
+    'save_to_callback': Subject('benchmarks.save_to_callback', 10.0, most_rounds=2),
+    'reloads': Subject('benchmarks.reloads', 100.0, most_rounds=1),
     'soak': Subject('benchmarks.soak', 60.0, most_rounds=1),
 }
 

@@ -18,11 +18,15 @@ from geometry_msgs.msg import Twist
 from rclpy.node import Node as RosNode
 from std_msgs.msg import Int32, String
 
-import composer
+from composer.checks.checker import create_context
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+from composer.planning.snapshot import take_snapshot
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime.behaviours.calls import BehaviourCall
 from composer.runtime.behaviours.running_calls import RunningCalls
 from composer.runtime.health.statistics import CallTimes
+from composer.runtime.rewiring.reading import Reading
 from composer.runtime.system import System
 
 _MESSAGES = 2000
@@ -162,13 +166,15 @@ def _start_composed(type_name: str, answer: Callable[[Any], Any]) -> System:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'overhead.yaml'
         path.write_text(_SYSTEM.format(type=type_name))
-        loaded = composer.load(path)
-    if loaded.spec is None:
+        loaded = load_system(path)
+    context = create_context(loaded, InterfaceCatalogue())
+    if context is None:
         message = f'the system cannot be read: {loaded.diagnostics}'
         raise ValueError(message)
     functions = {'parts:answer': lambda _node, message: answer(message)}
     guardian = GuardianClient(_STOP_SEC, _STOP_SEC, owns_process=True)
-    system = System(loaded.spec, loaded.positions, functions, guardian)
+    reading = Reading(context.spec, loaded.positions, functions, take_snapshot(context))
+    system = System(reading, guardian)
     system.start()
     return system
 

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +67,18 @@ class Program:
                 return int(line.split()[1]) / 1000
         message = f'smaps_rollup has no {field}'
         raise RuntimeError(message)
+
+    def threads(self) -> int:
+        """Return how many threads it has."""
+        return sum(1 for _ in Path(f'/proc/{self._process.pid}/task').iterdir())
+
+    def descriptors(self) -> list[str]:
+        """Return what its descriptors are of, as in `socket:[1234]`."""
+        found = []
+        for each in Path(f'/proc/{self._process.pid}/fd').iterdir():
+            with suppress(FileNotFoundError):
+                found.append(str(each.readlink()))
+        return found
 
     def cpu_sec(self) -> float:
         """Return the processor time that it has used."""

@@ -185,12 +185,42 @@ def _check() -> list[Row]:
         return Row(f'composer check of {what}', ours, None, alone, '<=', target)
 
     once, twice = (_side('check', 'one', size, 'seconds') for size in (1000, 2000))
+    plan, of_new = (_side('check', 'plan', 1000, f'{each}_seconds') for each in ('plan', 'check'))
     return [
         row('a small file, s', 'shipped', 2, 'seconds', 0.25),
         row('100 files of 10 nodes, s', 'many', 10, 'seconds', 2.5),
         row('1,000 nodes, 5,000 entities, s', 'one', 1000, 'seconds', 1),
         row('1,000 nodes, 5,000 entities, MB', 'one', 1000, 'megabytes', 200),
         Row('composer check of twice as large, s', twice, once, times, '<=', 2.2),
+        Row('composer plan of 1,000 nodes, s, against check', plan, of_new, times, '<=', 1.5),
+    ]
+
+
+def _save_to_callback() -> list[Row]:
+    def row(what: str, side: str, target: float) -> Row:
+        ours = _side('save_to_callback', side, 50, 'p95_ms')
+        what = f'50 nodes, ms from the save of {what} to its callback, p95'
+        return Row(what, ours, None, alone, '<=', target)
+
+    return [row('an entity', 'entity', 150), row('a module', 'module', 300)]
+
+
+def _reloads() -> list[Row]:
+    def side(key: str) -> Side:
+        return _side('reloads', 'composer', 1000, key)
+
+    def left(what: str, key: str, target: float) -> Row:
+        return Row(f'1,000 reloads, {what}', side(key), None, alone, '<=', target)
+
+    what = '1,000 reloads, longest gap in ms of a stream at 1 kHz, more than alone'
+    return [
+        left('messages lost', 'lost', 0),
+        Row(what, side('gap_ms'), side('alone_gap_ms'), more, '<=', 10),
+        left('MB grown', 'mb_grown', 5),
+        *(
+            left(f'{each} grown', f'{each}_grown', 0)
+            for each in ('threads', 'descriptors', 'sockets', 'endpoints')
+        ),
     ]
 
 
@@ -211,5 +241,7 @@ ROWS: list[Row] = [
     *_start_stop(),
     *_at_rest_and_under_load(),
     *_check(),
+    *_save_to_callback(),
+    *_reloads(),
     *_soak(),
 ]

@@ -38,6 +38,35 @@ def _idle_node(number: int, parameters: bool) -> dict[str, Any]:  # noqa: FBT001
     return own | node
 
 
+def busy_nodes(count: int) -> dict[str, Any]:
+    """Return nodes with five entities each, which do something once a second."""
+    return {f'busy_{number}': _busy_node(number, count) for number in range(count)}
+
+
+def _busy_node(number: int, count: int) -> dict[str, Any]:
+    behaviour = 'benchmarks.behaviours:ignore'
+    return {
+        'publishers': {'out': {'type': _TYPE, 'topic': f'busy_topic_{number}'}},
+        'subscriptions': {
+            'in': {'type': _TYPE, 'topic': f'busy_topic_{number}', 'behaviour': behaviour},
+            'next': {
+                'type': _TYPE,
+                'topic': f'busy_topic_{(number + 1) % count}',
+                'behaviour': behaviour,
+                'qos': 5,
+            },
+        },
+        'services': {
+            'reset': {
+                'type': 'std_srvs/srv/Empty',
+                'service': '~/reset',
+                'behaviour': f'{behaviour}_request',
+            }
+        },
+        'timers': {'tick': {'period': 1.0, 'publish': 'out', 'message': {}}},
+    }
+
+
 def rally(seconds: float) -> dict[str, Any]:
     """Return two nodes that play ping-pong, print how many round trips a second, and stop."""
     return {
@@ -86,6 +115,32 @@ def stream(seconds: float, rate: int) -> dict[str, Any]:
                     'qos': rate,
                     'behaviour': 'benchmarks.behaviours:count',
                 }
+            },
+        },
+    }
+
+
+def unbroken_stream(rate: int) -> dict[str, Any]:
+    """Return two nodes: `rate` messages a second from one to the other, which notes the gaps."""
+    numbers = {'type': 'std_msgs/msg/Int64', 'qos': rate}
+    behaviours = 'benchmarks.behaviours'
+    return {
+        'source': {
+            'state': {'sent': 0},
+            'publishers': {'numbers': numbers},
+            'timers': {
+                'send': {
+                    'rate': rate,
+                    'behaviour': f'{behaviours}:send_next',
+                    'publish': 'numbers',
+                }
+            },
+        },
+        'sink': {
+            'state': {'number': 0, 'lost': 0, 'came': 0.0, 'gaps': {}},
+            'on_stop': f'{behaviours}:tell_gaps',
+            'subscriptions': {
+                'numbers': {**numbers, 'behaviour': f'{behaviours}:note_gap'},
             },
         },
     }

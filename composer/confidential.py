@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.ament import ament_prefixes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
 PROJECT_MARKS = ('pyproject.toml', '.git')
 _WORD = re.compile(r'\w+')
@@ -33,6 +35,7 @@ def begin(files: Iterable[Path]) -> None:
     """Forget all values, and take the projects of these files, and that of this folder, as own."""
     _origins.clear()
     _roots.clear()
+    may_show_lines.cache_clear()
     for path in (Path('file'), *files):
         # A name may be no path at all, or the working folder may be gone.
         with suppress(OSError, ValueError):
@@ -51,6 +54,7 @@ def list_lineage(folder: Path) -> list[Path]:
     return lineage[: roots[0] + 1] if roots else [folder]
 
 
+@cache
 def may_show_lines(name: str) -> bool:
     """Return whether lines of a file may be shown: it is in the project, or in a ROS package."""
     if not _roots or not os.path.lexists(name):
@@ -98,6 +102,17 @@ def origin_of(value: Any) -> str | None:
 def conceal(text: str) -> str:
     """Return a text with the origins of hidden values in their place."""
     return _QUOTED_OR_WORD.sub(_concealed, text) if _origins else text
+
+
+def conceal_data(value: Any) -> Any:
+    """Return data with the origins of hidden values in their place, also inside of it."""
+    if isinstance(value, str):
+        return conceal(value)
+    if isinstance(value, Mapping):
+        return {conceal_data(key): conceal_data(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [conceal_data(each) for each in value]
+    return f'<from {origin}>' if (origin := origin_of(value)) else value
 
 
 def _concealed(found: re.Match[str]) -> str:

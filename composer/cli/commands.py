@@ -29,8 +29,8 @@ from composer.terminal import escape
 
 # What `check --types` can be followed by.
 TYPE_CHECKERS = ('mypy', 'pyright')
-# What a check imports and reads lives until its end: to look for garbage in it as often as usual
-# takes a fifth more.
+# What a check or a plan imports and reads lives until its end: to look for garbage in it as often
+# as usual takes a fifth more.
 _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
@@ -386,9 +386,12 @@ def plan_command(
     There is a line for each operation: + added, ~ changed in place, ± recreated, - removed; with
     old and new values, why something must be recreated, and what is lost.
     """
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     from composer.cli.plan import plan
 
     paths, arguments = split_words(words)
+    if arguments[:1] == ['-']:
+        paths.append(Path(arguments.pop(0)))
     return plan(
         paths,
         arguments,

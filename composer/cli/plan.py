@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
     from composer.planning.plan import Plan
 
 
@@ -54,13 +55,18 @@ def plan(
         message = f'a plan compares two files, not {len(paths)}'
         raise UsageError(message, help='give layers with --layer')
     contexts = []
+    findings: list[Diagnostic] = []
     hidden: dict[str, str] = {}
     for path in paths:
         is_new = path is paths[-1]
-        contexts.append(_read([path, *layers], words, set_values, checks=is_new))
+        context, found = _read([path, *layers], words, set_values, checks=is_new)
+        contexts.append(context)
+        # Both may have one, as of a layer.
+        findings += [each for each in found if each not in findings]
         hidden |= confidential.hidden_values()
     confidential.hide_again(hidden)
-    if any(each is None for each in contexts):
+    show_findings(findings)
+    if has_errors(findings):
         return ExitCode.FAILED
     old, *more = filter(None, contexts)
     result = (
@@ -88,10 +94,8 @@ def _compare_with_running(context: CheckContext) -> Plan:
 
 def _read(
     paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], *, checks: bool
-) -> CheckContext | None:
-    """Return the context of a system; without one, its errors have been printed."""
+) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
+    """Return the context of a system, and what was found in it."""
     system = load_given(paths, words, set_values)
     context = create_context(system, InterfaceCatalogue())
-    findings = check_in_context(system, context) if checks else system.diagnostics
-    show_findings(findings)
-    return None if has_errors(findings) else context
+    return context, check_in_context(system, context) if checks else system.diagnostics

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -15,35 +15,33 @@ import click
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import import_reading
 from composer.cli.rehearsal import rehearse
+from composer.cli.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
-from composer.language.paths import resolve_path
+from composer.language.paths import PathError, resolve_path
 from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
+from composer.python_source.module_finder import project_search_path
 from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from composer.checks.context import CheckContext
-    from composer.cli.common.system_reader import Report, SystemReader
+    from composer.cli.common.system_reader import SystemReader
     from composer.diagnostics import Diagnostic
     from composer.planning.plan import Operation, Plan
+    from composer.planning.snapshot import Snapshot
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.system import System
 
-# Changes of these files may change a system; parameter files may have any name.
-_SUFFIXES = ('.yaml', '.yml', '.py', '.msg', '.srv', '.action')
-# An editor writes a file in several steps: the last one counts.
-_STEP_MS = 10
-_DEBOUNCE_MS = 100
-_LOOK_MS = 500
 _RUNS_ON = 'the system runs on as it was'
 _STOPS = 'the system stops'
 _NO_CHANGE = 'nothing has changed'
+_GOOD_AGAIN = 'the files have no errors any more, and nothing has changed'
 
 
 class Reloader:
@@ -53,17 +51,25 @@ class Reloader:
         reader: Reads them.
         context: What they said when it started.
         prefixes: Where the interface packages are that were built for the system.
+        begun_ns: When they began to be read, on the system's clock.
+        told: What was found in them then.
     """
 
     def __init__(
-        self, reader: SystemReader, context: CheckContext, prefixes: Sequence[Path]
+        self,
+        reader: SystemReader,
+        context: CheckContext,
+        prefixes: Sequence[Path],
+        begun_ns: int | None = None,
+        told: Iterable[Diagnostic] = (),
     ) -> None:
         self._reader = reader
         self._prefixes = prefixes
-        self._files = _list_files(reader, context)
-        self._seen = _stamps(self._files)
+        self._files = WatchedFiles([*reader.paths, *_list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
+        self._warnings = _warnings_in(told)
+        self._failure = ''
 
     def reload(self, system: System) -> Outcome:
         """Read the files, and rewire the system; after errors it is as it was.
@@ -71,34 +77,70 @@ class Reloader:
         What was done is logged, and errors are printed. Goals in flight of actions that go are
         waited for.
         """
+        return self._reload(system, lambda: True)
+
+    def _reload(self, system: System, is_whole: Callable[[], bool]) -> Outcome:
+        """Do as `reload`.
+
+        Args:
+            is_whole: Whether files with errors are more than half written; may wait to see.
+        """
         from composer.runtime.health.system_state import Outcome
         from composer.runtime.logs import system_logger
 
         with self._lock, system.state.reloading():
             begun = monotonic()
             findings: list[Diagnostic] = []
-            try:
-                plan = self._rewire(system, findings)
-            except ComposerError as error:
-                text = f'not reloaded: {error}'
-                system_logger.error(text)
-                errors = [
-                    f'{each.span or each.file}: {each.message}'
-                    for each in findings
-                    if has_errors([each])
-                ]
-                system.state.note_reload(Outcome(succeeded=False, text='; '.join(errors) or text))
-                return Outcome(succeeded=False, text=_with_findings(findings, text))
+            while True:
+                try:
+                    plan = self._rewire(system, findings, is_whole)
+                except _HalfWrittenError:
+                    findings.clear()
+                    continue
+                except ComposerError as error:
+                    text = f'not reloaded: {error}'
+                    if not system.stop_requested and self._show(findings, text):
+                        system_logger.error(text)
+                    errors = [
+                        f'{each.span or each.file}: {each.message}'
+                        for each in findings
+                        if has_errors([each])
+                    ]
+                    told = Outcome(succeeded=False, text='; '.join(errors) or text)
+                    system.state.note_reload(told)
+                    return Outcome(succeeded=False, text=_with_findings(findings, text))
+                break
             took_ms = (monotonic() - begun) * 1000
-            text = _NO_CHANGE
+            was_good = not self._failure
+            self._show(findings)
+            text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}' if plan else _NO_CHANGE
             if system.starts_again:
                 text = f'the system starts again: {summarize(plan)}'
-                system_logger.info(text)
-            elif plan:
-                text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}'
-                system_logger.info(text)
+            if plan or not was_good:
+                system_logger.info(text if plan else _GOOD_AGAIN)
             system.state.note_reload(Outcome(succeeded=True, text=text))
             return Outcome(succeeded=True, text=_with_findings(findings, text))
+
+    def _show(self, findings: Sequence[Diagnostic], failure: str = '') -> bool:
+        """Print what was not told before; return whether there are errors that were not.
+
+        Args:
+            failure: Why the system is not reloaded, if it is not.
+        """
+        told = self._warnings
+        # Errors hide some.
+        self._warnings = _warnings_in(findings) | (told if failure else set())
+        errors = [each for each in findings if has_errors([each])]
+        # Without errors in the files something was tried, and failed again.
+        failure = _with_findings(errors, failure) if errors else failure
+        is_new = not errors or failure != self._failure
+        self._failure = failure
+        show_findings(
+            each
+            for each in findings
+            if (is_new if has_errors([each]) else _key_of(each) not in told)
+        )
+        return is_new
 
     def reload_now(self, system: System) -> Outcome:
         """Do as `reload`, but abort goals; also those that another reload waits for."""
@@ -115,44 +157,53 @@ class Reloader:
         findings: list[Diagnostic] = []
         with self._lock:
             try:
-                context = self._check(findings.extend)
+                context = self._check(findings)
                 new = take_snapshot(context, self._prefixes)
             except ComposerError as error:
                 return Outcome(succeeded=False, text=_with_findings(findings, str(error)))
             text = render_plan(compare(system.snapshot, new)).rstrip('\n')
         return Outcome(succeeded=True, text=_with_findings(findings, text))
 
-    def _rewire(self, system: System, findings: list[Diagnostic]) -> Plan:
+    def _rewire(
+        self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
+    ) -> Plan:
+        self._files.note_reading()
+        try:
+            return self._become(system, findings, is_whole)
+        except ComposerError as error:
+            if not (system.stop_requested or is_whole()):
+                raise _HalfWrittenError from error
+            raise
+
+    def _become(
+        self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
+    ) -> Plan:
         from composer.runtime.rewiring.fresh_modules import fresh_modules
 
-        def report(found: list[Diagnostic]) -> None:
-            findings.extend(found)
-            show_findings(found)
-
-        self._seen = _stamps(self._files)
-        context = self._check(report)
-        self._note_files(self._files | _list_files(self._reader, context))
+        context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
+        self._files.also_follow(_list_files(context))
         if cause := find_new_start(system.snapshot, snapshot):
-            self._start_again(system, cause)
-            if not system.starts_again:
-                raise ComposerError(_STOPS)
+            self._start_again(system, cause, is_whole)
             return compare(system.snapshot, snapshot)
         if snapshot.definitions != system.snapshot.definitions:
             self._add_packages(system, context)
             snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
-        with fresh_modules(stale, snapshot.sources):
-            reading = import_reading(context, snapshot, report)
+        search_path = project_search_path(context.system.files)
+        with fresh_modules(stale, snapshot.sources, search_path):
+            reading = import_reading(context, snapshot, findings.extend)
             if reading is None:
                 raise ComposerError(_RUNS_ON)
+            if _loses_parts(system.snapshot, snapshot) and not is_whole():
+                raise _HalfWrittenError
             plan = system.rewire(reading, self._aborts_goals.is_set)
             if system.stop_requested:
                 raise ComposerError(_STOPS)
-        self._note_files(_list_files(self._reader, context))
+        self._files.follow([*self._reader.paths, *_list_files(context)])
         return plan
 
-    def _start_again(self, system: System, cause: Operation) -> None:
+    def _start_again(self, system: System, cause: Operation, is_whole: Callable[[], bool]) -> None:
         """Have the whole system start again, if it can."""
         from composer.runtime.logs import system_logger
 
@@ -162,9 +213,15 @@ class Reloader:
             raise ComposerError(
                 message, help='end the program that it runs in, and start that again'
             )
+        if not is_whole():
+            raise _HalfWrittenError
         system_logger.info(f'reload: the system must start again, because of {changes}')
         rehearse(system)
+        if not is_whole():
+            raise _HalfWrittenError
         system.start_again(self._aborts_goals.is_set)
+        if not system.starts_again:
+            raise ComposerError(_STOPS)
 
     def _add_packages(self, system: System, context: CheckContext) -> None:
         """Build and import the interface packages that were not declared before."""
@@ -176,19 +233,16 @@ class Reloader:
         )
         os.environ.update(extend_variables(os.environ, self._prefixes))
 
-    def _check(self, report: Report) -> CheckContext:
+    def _check(self, findings: list[Diagnostic]) -> CheckContext:
         if any(str(path) == '-' for path in self._reader.paths):
             message = 'the system was read from standard input, which cannot be read again'
             raise ComposerError(message)
-        context = self._reader.check(report)
-        if context is None:
+        context, files, found = self._reader.read()
+        findings += found
+        self._files.also_follow([*files, *(_list_files(context) if context else ())])
+        if context is None or has_errors(found):
             raise ComposerError(_RUNS_ON)
         return context
-
-    def _note_files(self, files: set[Path]) -> None:
-        """Watch these files; those that are new were read just now."""
-        self._seen.update(_stamps(files - self._files))
-        self._files = files
 
     @contextmanager
     def watching(self, system: System) -> Iterator[None]:
@@ -205,29 +259,39 @@ class Reloader:
             thread.join()
 
     def _watch(self, system: System, ended: threading.Event) -> None:
-        from watchfiles import watch
+        from composer.runtime.behaviours.tracebacks import format_internal_error
+        from composer.runtime.logs import system_logger
 
-        while not ended.is_set():
-            folders = {path.parent for path in self._files}
-            changes = watch(
-                *folders,
-                watch_filter=lambda _change, path: self._matters(path),
-                stop_event=ended,
-                step=_STEP_MS,
-                debounce=_DEBOUNCE_MS,
-                rust_timeout=_LOOK_MS,
-                yield_on_timeout=True,
-                recursive=False,
-            )
-            for changed in changes:
-                # Nothing tells of edits before the watch began, or on some network drives.
-                if changed or any(self._seen.get(p) != s for p, s in _stamps(self._files).items()):
-                    self.reload(system)
-                if folders != {path.parent for path in self._files}:
-                    break
+        for _ in self._files.edits(ended, system_logger.warning):
+            try:
+                self._reload(system, lambda: self._files.are_still(ended))
+            except Exception as error:  # noqa: BLE001 - the next edit may be fine
+                system_logger.error(f'not reloaded:\n{format_internal_error(error)}')
 
-    def _matters(self, path: str) -> bool:
-        return path.endswith(_SUFFIXES) or Path(path) in self._files
+
+class _HalfWrittenError(Exception):
+    """The files changed while they were read, or soon after that."""
+
+
+def _loses_parts(old: Snapshot, new: Snapshot) -> bool:
+    """Return whether nodes or processes go: a file may have lost its end, and get it in a moment.
+
+    This is where no lease tells that it is being written.
+    """
+    before, after = old.spec, new.spec
+    return bool(
+        before.nodes.keys() - after.nodes.keys()
+        or before.processes.keys() - after.processes.keys()
+    )
+
+
+def _key_of(finding: Diagnostic) -> tuple[str, str, str]:
+    """Return what a finding is known by; its line changes with what is written above it."""
+    return str(finding.file), finding.rule, finding.message
+
+
+def _warnings_in(findings: Iterable[Diagnostic]) -> set[tuple[str, str, str]]:
+    return {_key_of(each) for each in findings if not has_errors([each])}
 
 
 def _with_findings(findings: list[Diagnostic], text: str) -> str:
@@ -244,28 +308,18 @@ def summarize(plan: Plan) -> str:
     )
 
 
-def _stamps(files: set[Path]) -> dict[Path, tuple[int, ...] | None]:
-    """Return what changes when a file is written or replaced; `None` for no file."""
-    stamps: dict[Path, tuple[int, ...] | None] = {}
-    for path in files:
-        try:
-            status = path.stat()
-        except OSError:
-            stamps[path] = None
-        else:
-            stamps[path] = status.st_mtime_ns, status.st_size, status.st_ino
-    return stamps
-
-
-def _list_files(reader: SystemReader, context: CheckContext) -> set[Path]:
-    """Return the files that a system is read from, as their real paths."""
+def _list_files(context: CheckContext) -> set[Path]:
+    """Return the files that a system is read from, and those that it lacks."""
     spec = context.spec
-    files = {*reader.paths, *context.system.files, *context.modules.read_files()}
+    files = {*context.system.files, *context.system.named, *context.modules.list_files()}
     named = [
         *(each.parameter_files for each in spec.nodes.values()),
         *(each.parameter_files for each in spec.processes.values()),
     ]
-    files |= {resolve_path(text, Path()) for texts in named for text in texts}
+    for text in (text for texts in named for text in texts):
+        # A package that is not installed is for the checks to say.
+        with suppress(PathError):
+            files.add(resolve_path(text, Path()))
     for package in context.interfaces.definitions or ():
         files |= {package.folder / name for name in package.sources}
-    return {path.resolve() for path in files}
+    return files

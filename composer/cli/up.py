@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from time import time_ns
 from typing import TYPE_CHECKING
 
 import click
@@ -22,10 +23,11 @@ from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
+    from composer.cli.reload import Reloader
     from composer.diagnostics import Diagnostic
 
 
@@ -66,8 +68,11 @@ def up(  # noqa: PLR0913 - one for each option
     if ends_process:
         note_start()
     reader = SystemReader(paths, words, set_values)
-    context = reader.check(_show_errors if rehearses else show_findings)
-    if context is None:
+    begun_ns = time_ns()
+    context, _files, told = reader.read()
+    report = _show_errors if rehearses else show_findings
+    report(told)
+    if context is None or has_errors(told):
         return ExitCode.FAILED
     # These import nothing of ROS, which reads its environment when it is imported.
     from composer.runtime.environment import (
@@ -80,14 +85,16 @@ def up(  # noqa: PLR0913 - one for each option
     )
 
     check_ros()
+    from composer.cli.reload import Reloader
+
     variables = context.spec.environment
     with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)
         check_log_folder(ros_arguments)
         check_middleware(os.environ)
         return _run(
-            reader,
             context,
+            lambda prefixes: Reloader(reader, context, prefixes, begun_ns, told),
             ros_arguments,
             log_levels,
             watches=watches,
@@ -103,8 +110,8 @@ def _show_errors(findings: list[Diagnostic]) -> None:
 
 
 def _run(  # noqa: PLR0913 - as above
-    reader: SystemReader,
     context: CheckContext,
+    create_reloader: Callable[[Sequence[Path]], Reloader],
     ros_arguments: Sequence[str],
     log_levels: Sequence[str],
     *,
@@ -113,7 +120,6 @@ def _run(  # noqa: PLR0913 - as above
     ends_process: bool,
     rehearses: bool,
 ) -> int:
-    from composer.cli.reload import Reloader
     from composer.executor.after_fork import flush_output
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
@@ -133,7 +139,7 @@ def _run(  # noqa: PLR0913 - as above
             os._exit(ExitCode.FAILED if reading is None else ExitCode.DONE)
         if reading is None:
             return ExitCode.FAILED
-        reloader = Reloader(reader, context, prefixes)
+        reloader = create_reloader(prefixes)
         return run_system(
             reading,
             watch=reloader.watching if watches else None,

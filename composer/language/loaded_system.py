@@ -32,6 +32,7 @@ class LoadedSystem(Document):
         arguments: The arguments that the file declares.
         given: Their values.
         included: The files that are part of it.
+        named: The files that it includes, also if they cannot be read.
         chains: The includes that entries come from, innermost first, by the entries' paths.
         inner_names: The namespaces, as written, and simple names of nodes that are called by
             their full names only because another node has the simple one.
@@ -45,6 +46,7 @@ class LoadedSystem(Document):
     arguments: Mapping[str, ArgumentSpec] = field(default_factory=dict)
     given: ArgumentValues = field(default_factory=lambda: ArgumentValues({}))
     included: dict[SourceFile, None] = field(default_factory=dict)
+    named: dict[Path, None] = field(default_factory=dict)
     chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     inner_names: dict[str, tuple[str, str]] = field(default_factory=dict)
     sampled_unused: list[Span] = field(default_factory=list)

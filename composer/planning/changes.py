@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import resolve_qos
 from composer.language.specs import BehaviourSpec, ConditionSpec, QosSpec
+from composer.names import expand_name
 from composer.planning.plan import Change
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from composer.diagnostics import Span
+    from composer.language.specs import NodeSpec
     from composer.planning.snapshot import Snapshot
     from composer.yaml_text.positions import DataPath
 
+_SCALARS = frozenset((str, int, bool, type(None)))
 # Fields that the file has under other keys; where there are several, it has one of them.
 _KEYS = {
     'period_sec': ('period', 'rate'),
@@ -31,20 +35,29 @@ _KEYS = {
     'stop_signal': ('stop.signal',),
     'stop_timeout_sec': ('stop.timeout',),
 }
+# What no value of these fields stands for.
+_NONE = {'warn_after_sec': 'never', 'diagnostics_period_sec': False}
+# Entities that do not set these have those of their node.
+_INHERITED = ('on_error', 'warn_after_sec')
+_CHANNELS = {kind.channel for kind in ENTITY_KINDS if kind.channel}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reading:
-    """A record, and the snapshot that it is part of."""
+    """A record, and the snapshot and the node that it is part of."""
 
     snapshot: Snapshot
     record: Any
     path: DataPath
+    node: NodeSpec | None = None
 
     def find_span(self, name: str) -> Span:
         """Return where the value of a field is written, or the nearest around it that is."""
         positions = self.snapshot.positions
-        paths = [(*self.path, *key.split('.')) for key in _KEYS.get(name, (name,))]
+        keys = _KEYS.get(name, (name,))
+        paths = [(*self.path, *key.split('.')) for key in keys]
+        if name in _INHERITED:
+            paths.append((*self.path[:-2], keys[0]))
         return positions.value(
             next((each for each in paths if each in positions.values), paths[0])
         )
@@ -54,17 +67,21 @@ def compare_fields(old: Reading, new: Reading, names: Iterable[str]) -> Iterator
     """Yield what differs in these fields of two records."""
     for name in names:
         before, after = getattr(old.record, name), getattr(new.record, name)
+        # Most fields are of these types and as before.
+        if type(before) in _SCALARS and type(before) is type(after) and before == after:
+            continue
         if isinstance(before, BehaviourSpec) or isinstance(after, BehaviourSpec):
             yield from _compare_behaviours(old, new, name)
         elif isinstance(before, QosSpec):
-            resolved = (
-                resolve_qos(before, old.snapshot.spec.qos),
-                resolve_qos(after, new.snapshot.spec.qos),
-            )
-            yield from compare_entries(old, new, name, *resolved)
+            profiles = old.snapshot.spec.qos, new.snapshot.spec.qos
+            if before != after or profiles[0] != profiles[1]:
+                resolved = map(resolve_qos, (before, after), profiles)
+                yield from compare_entries(old, new, name, *resolved)
         elif isinstance(before, Mapping):
             yield from compare_entries(old, new, name, before, after)
-        elif _differ(plain := _plain(before), plain_after := _plain(after)):
+        elif _differ(plain := _plain(before, name), plain_after := _plain(after, name)):
+            if name in _CHANNELS and _expand(old, before) == _expand(new, after):
+                continue
             yield _change(old, new, name, plain, plain_after)
 
 
@@ -72,6 +89,8 @@ def compare_entries(
     old: Reading, new: Reading, name: str, before: Mapping[str, Any], after: Mapping[str, Any]
 ) -> Iterator[Change]:
     """Yield what differs between two mappings under a key."""
+    if not (before or after):
+        return
     for key in dict.fromkeys([*before, *after]):
         if (key in before) != (key in after) or _differ(before[key], after[key]):
             yield _change(old, new, f'{name}.{key}', before.get(key), after.get(key))
@@ -87,7 +106,8 @@ def _compare_behaviours(old: Reading, new: Reading, name: str) -> Iterator[Chang
         yield _change(old, new, name, before.name, after.name)
     elif old.snapshot.code.get(before.module) != new.snapshot.code.get(after.module):
         yield _change(old, new, name, before.name, after.name, is_code=True)
-    yield from compare_entries(old, new, 'with', before.arguments, after.arguments)
+    key = 'with' if name == 'behaviour' else f'{name}.with'
+    yield from compare_entries(old, new, key, before.arguments, after.arguments)
 
 
 def _change(
@@ -97,8 +117,15 @@ def _change(
     return Change(key, before, after, old.find_span(name), new.find_span(name), is_code)
 
 
-def _plain(value: Any) -> Any:
+def _expand(reading: Reading, name: str) -> str:
+    node = reading.node
+    return name if node is None else expand_name(name, node.name, node.namespace)
+
+
+def _plain(value: Any, name: str = '') -> Any:
     """Return a value without the places in the file that records know."""
+    if value is None:
+        return _NONE.get(name)
     if isinstance(value, tuple):
         return [_plain(each) for each in value]
     if isinstance(value, ConditionSpec):

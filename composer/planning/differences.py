@@ -7,12 +7,16 @@ recreated. All else changes in place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
+from composer.language.specs import ParameterSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
+from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -31,7 +35,7 @@ _NOT_COMPARED = {
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Rules:
     """How things of one kind change.
 
@@ -63,6 +67,12 @@ _LOST = {
     'service_clients': 'responses that calls wait for',
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
+}
+_ENTITIES = {
+    kind.section: _PARAMETERS
+    if kind.section == 'parameters'
+    else _Rules(kind.noun, _LOST[kind.section], _FIXED)
+    for kind in ENTITY_KINDS
 }
 _NODES = _Rules(
     'node',
@@ -121,7 +131,7 @@ class _Comparison:
         old, new = self._old.spec, self._new.spec
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
-            yield from self._compare(_PROCESSES, ('', 'processes', name), '', *process)
+            yield from self._compare(_PROCESSES, ('', 'processes', name), *process)
         before = {node.full_name: node for node in old.nodes.values()}
         after = {node.full_name: node for node in new.nodes.values()}
         for full_name in dict.fromkeys([*before, *after]):
@@ -133,7 +143,7 @@ class _Comparison:
         if changes:
             target = ('', 'system', self._new.spec.name)
             span = self._new.positions.value(())
-            yield _modification(_SYSTEM, target, self._new.spec.name, '', span, changes)
+            yield _modification(_SYSTEM, target, self._new.spec.name, span, changes)
 
     def _changed_packages(self, old: Reading, new: Reading) -> Iterator[Change]:
         """Yield the packages that are loaded, and are others now."""
@@ -153,8 +163,8 @@ class _Comparison:
         if old is not None and new is not None:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
             further += compare_entries(*readings, 'state', old.state, new.state)
-        own = list(self._compare(_NODES, (full_name, 'nodes', ''), '', old, new, further))
-        yield from own
+        own = list(self._compare(_NODES, (full_name, 'nodes', ''), old, new, further))
+        yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
             return
         for kind in ENTITY_KINDS:
@@ -163,15 +173,17 @@ class _Comparison:
     def _compare_entities(
         self, kind: EntityKind, old: NodeSpec, new: NodeSpec
     ) -> Iterator[Operation]:
-        rules = _PARAMETERS
-        if kind.section != 'parameters':
-            rules = _Rules(kind.noun, _LOST[kind.section], _FIXED)
+        rules = _ENTITIES[kind.section]
         before, after = getattr(old, kind.section), getattr(new, kind.section)
+        if not (before or after):
+            return
         for name in dict.fromkeys([*before, *after]):
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
             entity = (before.get(name), after.get(name))
-            yield from self._compare(rules, target, new.key, *entity, further)
+            for operation in self._compare(rules, target, *entity, further, (old, new)):
+                is_new = operation.action is Action.ADD
+                yield operation if is_new else with_notes(operation, old, self._old)
 
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""
@@ -186,43 +198,53 @@ class _Comparison:
         self,
         rules: _Rules,
         target: Target,
-        node: str,
         old: Any,
         new: Any,
         further: Iterable[Change] = (),
+        nodes: tuple[NodeSpec | None, NodeSpec | None] = (None, None),
     ) -> Iterator[Operation]:
         """Yield what is done to one thing, of which each side may have none."""
         if old is None:
             span = self._new.positions.key(new.path)
-            yield Operation(Action.ADD, rules.noun, target, _name(new), node, span)
+            yield Operation(Action.ADD, rules.noun, target, _name(new), span)
         elif new is None:
             span, lost = self._old.positions.key(old.path), (rules.lost,)
-            yield Operation(Action.REMOVE, rules.noun, target, _name(old), node, span, lost=lost)
+            yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
         elif old is not new:
-            names = [each.name for each in fields(new) if each.name not in _NOT_COMPARED]
-            readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
-            changes = [*compare_fields(*readings, names), *further]
+            readings = (
+                Reading(self._old, old, old.path, nodes[0]),
+                Reading(self._new, new, new.path, nodes[1]),
+            )
+            changes = [*compare_fields(*readings, _compared_fields(new.__class__)), *further]
             if changes:
                 span = self._new.positions.key(new.path)
-                yield _modification(rules, target, _name(new), node, span, changes)
+                yield _modification(rules, target, _name(new), span, changes)
 
     @staticmethod
     def _reading(snapshot: Snapshot) -> Reading:
         return Reading(snapshot, snapshot.spec, ())
 
 
+@cache
+def _compared_fields(kind: Any) -> tuple[str, ...]:
+    """Return the fields of a class of records that are compared."""
+    # ROS knows the description of a parameter; nobody asks for the others.
+    skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
+    return tuple(each.name for each in fields(kind) if each.name not in skipped)
+
+
 def _modification(
-    rules: _Rules, target: Target, name: str, node: str, span: Span, changes: list[Change]
+    rules: _Rules, target: Target, name: str, span: Span, changes: list[Change]
 ) -> Operation:
     reasons = (rules.fixed.get(each.key) or rules.fixed.get(each.top_key) for each in changes)
     reason = next(filter(None, reasons), '')
-    late = [each.key for each in changes if each.key in _AT_ITS_START and not reason]
+    keys = dict.fromkeys(each.top_key for each in changes)
+    late = [key for key in keys if key in _AT_ITS_START and not reason]
     return Operation(
         Action.RECREATE if reason else Action.CHANGE,
         rules.noun,
         target,
         name,
-        node,
         span,
         tuple(changes),
         reason,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from composer.confidential import conceal
+from composer.confidential import conceal_data
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -42,8 +42,8 @@ def _describe_change(change: Change) -> dict[str, Any]:
     return {
         'key': change.key,
         'is_code': change.is_code,
-        'old': _conceal(change.old),
-        'new': _conceal(change.new),
+        'old': _as_json(change.old),
+        'new': _as_json(change.new),
         'old_place': _describe_span(change.old_span),
         'new_place': _describe_span(change.new_span),
     }
@@ -55,5 +55,6 @@ def _describe_span(span: Span | None) -> dict[str, Any] | None:
     return {'file': span.source.name, 'line': span.line, 'column': span.column}
 
 
-def _conceal(value: Any) -> Any:
-    return conceal(value) if isinstance(value, str) else value
+def _as_json(value: Any) -> Any:
+    """Return a value as JSON has it: it knows no infinity."""
+    return json.loads(json.dumps(conceal_data(value), default=str), parse_constant=str)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
+
+from composer.records import record
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -24,7 +25,7 @@ class Action(Enum):
     REMOVE = '-'
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Change:
     """One value that differs.
 
@@ -50,7 +51,7 @@ class Change:
         return self.key.partition('.')[0]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Operation:
     """What is done to one part of a system.
 
@@ -58,7 +59,6 @@ class Operation:
         noun: What it is: `node`, `timer`, `process`, `system`, …
         target: Which one it is.
         name: Its key in the file.
-        node: The key of its node in the file; empty if it belongs to none.
         span: Where it is written: in the new files, unless it is removed.
         changes: The values that differ.
         reason: Why it must be recreated; empty if it need not be.
@@ -70,7 +70,6 @@ class Operation:
     noun: str
     target: Target
     name: str
-    node: str
     span: Span
     changes: tuple[Change, ...] = ()
     reason: str = ''
@@ -78,7 +77,7 @@ class Operation:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Plan:
     """All operations: on the system, its processes, and its nodes with their entities."""
 

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
+from composer.python_source.modules import ModuleSource
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import MergedFiles
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
-    from composer.python_source.modules import ModuleSource
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
     from composer.yaml_text.positions import SourceMap
 
@@ -39,6 +39,9 @@ class Snapshot:
         overrides: What the parameter files of nodes say of their parameters, by the nodes' full
             names and the parameters' names.
         prefixes: Where the interface packages are that were built for the system.
+        generators: The behaviours of timers that are generators.
+        set_live: The parameters that somebody has set while the system ran, by the nodes' full
+            names; `None` if it does not run.
     """
 
     spec: SystemSpec
@@ -48,6 +51,8 @@ class Snapshot:
     definitions: Mapping[tuple[str, str], str]
     overrides: Mapping[str, Mapping[str, ParameterEntry]]
     prefixes: tuple[str, ...] = ()
+    generators: Collection[str] = frozenset()
+    set_live: Mapping[str, Collection[str]] | None = None
 
     def stale_modules(self, other: Snapshot) -> set[str]:
         """Return the modules whose source, or what they import, differs from `other`'s."""
@@ -80,7 +85,21 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         definitions,
         _read_overrides(nodes),
         tuple(map(str, prefixes)),
+        frozenset(_find_generators(context)),
     )
+
+
+def _find_generators(context: CheckContext) -> Iterator[str]:
+    for node in context.spec.nodes.values():
+        for timer in node.timers.values():
+            if (behaviour := timer.behaviour) is None:
+                continue
+            module = context.modules.find(behaviour.module)
+            source = None
+            if not isinstance(module, MissingModule):
+                source = module.functions.get(behaviour.function)
+            if source is not None and source.kind is not None and source.kind.is_generator:
+                yield behaviour.name
 
 
 class _Sources:
@@ -110,6 +129,9 @@ class _Sources:
     def text(self, name: str) -> str:
         """Return the source of a module."""
         module = self._finder.find(name)
+        if isinstance(module, ModuleSource) and module.syntax_error and not module.lines:
+            # It cannot be read, and an import of it has to fail.
+            return f'raise ImportError({module.syntax_error!r})\n'
         return '' if isinstance(module, MissingModule) else '\n'.join(module.lines) + '\n'
 
     def _imports(self, name: str) -> tuple[str, ...]:
@@ -133,15 +155,14 @@ def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
     is_package = module.path is not None and module.path.name == '__init__.py'
     package = name.split('.') if is_package else name.split('.')[:-1]
     yield from ('.'.join(package[:depth]) for depth in range(1, len(package) + 1))
-    for statement in module.body:
-        for node in ast.walk(statement):
-            if isinstance(node, ast.Import):
-                yield from (alias.name for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                base = package[: len(package) - node.level + 1] if node.level else []
-                parts = [*base, *(node.module.split('.') if node.module else ())]
-                yield '.'.join(parts)
-                yield from ('.'.join([*parts, alias.name]) for alias in node.names)
+    for node in module.import_statements:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+            continue
+        base = package[: len(package) - node.level + 1] if node.level else []
+        parts = [*base, *(node.module.split('.') if node.module else ())]
+        yield '.'.join(parts)
+        yield from ('.'.join([*parts, alias.name]) for alias in node.names)
 
 
 def _read_overrides(nodes: Iterable[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:

@@ -12,7 +12,7 @@ from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from composer.confidential import conceal
+from composer.confidential import conceal, conceal_data
 from composer.diagnostics import SourceFile, Span
 from composer.errors import ComposerError
 from composer.language import specs
@@ -51,6 +51,8 @@ def encode_snapshot(snapshot: Snapshot) -> dict[str, Any]:
         'values': places(snapshot.positions.values),
         'code': dict(snapshot.code),
         'prefixes': list(snapshot.prefixes),
+        'generators': sorted(snapshot.generators),
+        'set_live': {node: sorted(names) for node, names in (snapshot.set_live or {}).items()},
         'definitions': [
             [*at, hashlib.sha256(text.encode(errors='surrogatepass')).hexdigest()]
             for at, text in snapshot.definitions.items()
@@ -106,6 +108,8 @@ def _decode_snapshot(data: Mapping[str, Any]) -> Snapshot:
         {(package, name): digest for package, name, digest in data['definitions']},
         overrides,
         tuple(data['prefixes']),
+        frozenset(data['generators']),
+        dict(data['set_live']),
     )
 
 
@@ -114,7 +118,7 @@ def _encode(value: Any, key: str = '') -> Any:
     if isinstance(value, str):
         return _absolute(value) if key in _PATHS else conceal(value)
     if value is None or isinstance(value, bool | int | float):
-        return value
+        return conceal_data(value)
     if is_dataclass(value):
         names = [each.name for each in fields(value)]
         return [

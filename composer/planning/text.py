@@ -61,9 +61,12 @@ def _render_operation(operation: Operation, *, colour: bool) -> str:
 
 
 def _describe(operation: Operation) -> Iterator[str]:
-    subject = f"{operation.noun} '{operation.name}'"
-    if operation.node:
-        subject += f" of '{operation.node}'"
+    full_name, section, _ = operation.target
+    # Several nodes in different namespaces may have one name.
+    node = full_name if full_name.count('/') > 1 else full_name[1:]
+    subject = f"{operation.noun} '{node if section == 'nodes' else operation.name}'"
+    if node and section != 'nodes':
+        subject += f" of '{node}'"
     changes = ', '.join(map(describe_change, operation.changes))
     yield f'{subject}: {changes}' if changes else f'{subject} ({operation.span.place})'
     if operation.reason:
@@ -86,8 +89,19 @@ def _describe_places(change: Change) -> str:
 
 def _show(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
-    if isinstance(value, str) and value and not any(map(str.isspace, value)):
+    if isinstance(value, str) and _is_plain(value):
         text = value
     if len(text) > _LONGEST_VALUE:
         text = f'{text[:_LONGEST_VALUE]}…'
     return conceal(text)
+
+
+def _is_plain(text: str) -> bool:
+    """Tell whether text needs no quotes: it is a word that is no number, and no other value."""
+    if not text or any(map(str.isspace, text)):
+        return False
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError):
+        return True
+    return False

@@ -68,6 +68,7 @@ class ModuleFinder:
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
+        self._located: dict[str, _Location] = {}
         self._listed: dict[Path, list[str]] = {}
         self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
@@ -78,13 +79,16 @@ class ModuleFinder:
             self._found[name] = self._find(name)
         return self._found[name]
 
-    def read_files(self) -> list[Path]:
-        """Return the files of the modules of the project that have been read."""
-        return [
-            module.path
-            for name, module in self._found.items()
-            if isinstance(module, ModuleSource) and module.path and self.is_of_project(name)
-        ]
+    def list_files(self) -> list[Path]:
+        """Return the files of the modules of the project that were searched, found or not."""
+        files: list[Path] = []
+        for name, module in self._found.items():
+            if isinstance(module, MissingModule):
+                paths = [folder.joinpath(*name.split('.')) for folder in self._project]
+                files += [*paths, *(each.with_name(f'{each.name}.py') for each in paths)]
+            elif module.path and self.is_of_project(name):
+                files.append(module.path)
+        return files
 
     def has(self, name: str) -> bool:
         """Return whether there is a module or package of this name."""
@@ -125,6 +129,11 @@ class ModuleFinder:
         return module
 
     def _locate(self, name: str) -> _Location:
+        if name not in self._located:
+            self._located[name] = self._locate_anew(name)
+        return self._located[name]
+
+    def _locate_anew(self, name: str) -> _Location:
         folders = self._roots
         done: list[str] = []
         file: Path | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import threading
@@ -92,6 +93,10 @@ def run_system(
             system.start()
             if system.state.is_up:
                 notify(notify_socket, 'READY=1')
+            if ends_process:
+                # To look for garbage in what has been imported and created so far would stop all
+                # callbacks for many milliseconds, again and again.
+                gc.freeze()
             try:
                 with watch(system) if watch else nullcontext():
                     system.wait()

@@ -137,3 +137,24 @@ def test_a_definition_that_is_a_link_to_something_else_does_not_show_its_words(p
         'that is not a definition\n'
     ) in shown
     assert 'abc' not in shown
+
+
+@pytest.mark.parametrize('options', [(), ('--format', 'json')])
+def test_a_plan_shows_no_value_of_the_environment(project, monkeypatch, capsys, options):
+    monkeypatch.setenv('PIN', '73519')
+    for name, number in (('old.yaml', 1), ('new.yaml', 2)):
+        (project / name).write_text(
+            f"""\
+version: 1
+nodes:
+  a: {{state: {{k: [{number}, {{deep: "{{{{ env('PW') }}}}", pin: "{{{{ env('PIN') | int }}}}"}}]}}}}
+environment: {{TOKEN: "{number}{{{{ env('PW') }}}}"}}
+processes: {{p: {{command: [echo, "{number}", "--pin={{{{ env('PIN') }}}}"]}}}}
+"""
+        )
+
+    assert run(['plan', 'old.yaml', 'new.yaml', *options]) == 0
+    shown = capsys.readouterr().out
+    assert 'env("PW")' in shown.replace('\\"', '"')
+    assert SECRET not in shown
+    assert '73519' not in shown

@@ -40,7 +40,7 @@ def say(node):
     return str(node.parameters.speed)
 
 
-def begin(node):
+def begin(node, loud=True):
     helper.log(node)
 
 
@@ -142,19 +142,53 @@ EDITS = [
     ),
     (
         'version: 1',
+        'version: 1\nenvironment: {SITE: lab}',
+        None,
+        [
+            "± system 'system': environment.SITE = lab (2); ROS reads this when it starts; "
+            'lost: all that is not in the files'
+        ],
+    ),
+    (
+        'version: 1',
         'version: 1\nexecutor: {threads: 2}',
         None,
         ["~ system 'system': executor.threads = 2 (2)"],
     ),
     (
         'version: 1',
-        'version: 1\nenvironment: {MODE: fast}',
+        'version: 1\ndiagnostics: false',
+        None,
+        ["~ system 'system': diagnostics 1.0 → false (1 → 2)"],
+    ),
+    (
+        'on_start: parts:begin',
+        'on_start: {behaviour: parts:begin, with: {loud: false}}',
+        None,
+        ["~ node 'talker': on_start.with.loud = false (14); on_start counts from its next start"],
+    ),
+    ('{count: 0}', "{count: '0'}", None, ['~ node \'talker\': state.count 0 → "0" (9 → 9)']),
+    ('{count: 0}', '{count: .inf}', None, ["~ node 'talker': state.count 0 → Infinity (9 → 9)"]),
+    (
+        '    parameters:',
+        '    warn_after: null\n    parameters:',
         None,
         [
-            "± system 'system': environment.MODE = fast (2); ROS reads this when it starts; "
-            'lost: all that is not in the files'
+            "~ node 'talker': warn_after 5.0 → never (5 → 6)",
+            "~ timer 'say' of 'talker': warn_after 5.0 → never (13 → 6)",
         ],
     ),
+    (
+        '  listener:',
+        '  listener:\n    namespace: /far',
+        None,
+        [
+            "- node 'listener' (15); lost: its state, parameters set while it ran, all that is queued",
+            "+ node '/far/listener' (15)",
+        ],
+    ),
+    ('qos: near}', 'qos: near, topic: /words}', None, []),
+    ('  listener:', '  listener:\n    description: It hears.', None, []),
     ('version: 1', '# nothing\nversion: 1', None, []),
 ]
 

@@ -48,11 +48,20 @@ class SystemReader:
         Raises:
             UsageError: The arguments do not fit the file.
         """
-        system = load_given(self.paths, self.words, self.set_values)
-        context = create_context(system, InterfaceCatalogue())
-        findings = check_in_context(system, context)
+        context, _files, findings = self.read()
         report(findings)
         return None if has_errors(findings) else context
+
+    def read(self) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
+        """Return a system, if there is one, the files that it names, and what is wrong with it.
+
+        Raises:
+            UsageError: The arguments do not fit the file.
+        """
+        system = load_given(self.paths, self.words, self.set_values)
+        context = create_context(system, InterfaceCatalogue())
+        files = [*self.paths, *system.files, *system.named]
+        return context, files, check_in_context(system, context)
 
 
 def import_reading(

@@ -77,6 +77,8 @@ class IncludeEntry:
     def find_file(self) -> Path | None:
         """Return the file that is named; report it if there is none, and return `None`."""
         try:
+            # It may come later.
+            self.system.named[resolve_path(self.file, self.span.source.folder)] = None
             return locate_file(self.file, self.span)
         except PathError as error:
             # What is left out may be in a package of other machines, and have a name that is whole

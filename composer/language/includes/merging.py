@@ -77,6 +77,7 @@ class IncludeMerger:
         self._whole.sampled += part.sampled
         self._whole.sampled_unused += part.sampled_unused
         self._whole.included |= {part.positions.source: None} | part.included
+        self._whole.named |= part.named
 
     def _node_key(self, simple: str, namespace: str, *, is_left_out: bool) -> str | None:
         """Return a key that is free: the name, or the full name; `None` if that is taken too."""

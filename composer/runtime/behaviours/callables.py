@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import sys
+import threading
 import traceback
 from contextlib import contextmanager
 from functools import partial
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
 from composer.python_source.modules import FunctionKind
+from composer.runtime.behaviours.tracebacks import summarize
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -34,10 +36,14 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
     try:
         module = importlib.import_module(spec.module)
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
+        # Python raises Ctrl-C in the main thread; elsewhere it is the module that raises.
+        if (
+            isinstance(error, KeyboardInterrupt)
+            and threading.current_thread() is threading.main_thread()
+        ):
             raise
         where = _innermost_place(error)
-        message = f"importing '{spec.module}' raised {type(error).__name__}: {error}{where}"
+        message = f"importing '{spec.module}' raised {summarize(error)}{where}"
         raise BehaviourImportError(message) from error
     function = getattr(module, spec.function, None)
     if function is None:

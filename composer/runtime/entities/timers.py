@@ -49,16 +49,19 @@ class Timer:
         node.count_missed(self._owner, self.ros)
 
     def change(self, spec: TimerSpec) -> None:
-        """See `LiveEntity`: a generator begins anew, and a new period begins now."""
-        self._ticker.close(self._node.system.stop_timeout_sec)
-        self._ticker.forget()
-        self._ticker = _Ticker(self._node, self._owner, spec)
-        self._ticker.timer = self.ros
+        """See `LiveEntity`: a generator with new code begins anew, and a new period begins now."""
+        if not self._ticker.goes_on(spec):
+            self._ticker.close(self._node.system.stop_timeout_sec)
+            self._ticker.forget()
+            self._ticker = _Ticker(self._node, self._owner, spec)
+            self._ticker.timer = self.ros
         self.ros.callback = self._create_callback(spec)
         if spec.period_sec != self._period_sec:
             self._period_sec = spec.period_sec
             self.ros.timer_period_ns = round(spec.period_sec * 1e9)
-            self.ros.reset()
+            if not self.ros.is_canceled():
+                # A generator that has ended has cancelled it.
+                self.ros.reset()
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
@@ -82,6 +85,24 @@ def _create_clock(name: ClockName) -> Clock | None:
     return Clock(clock_type=_CLOCKS[name]) if name in _CLOCKS else None
 
 
+class _Constant:
+    """The message of a timer, of the type that its publisher has: an edit may change that."""
+
+    def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
+        self._node, self._spec = node, spec
+        self._type = ''
+        self._message: Any = None
+        self.message()
+
+    def message(self) -> Any:
+        """Return the message."""
+        type_name = self._node.spec.publishers[self._spec.publish or ''].type
+        if type_name != self._type:
+            convert = converter_for(import_interface(type_name)).convert
+            self._message, self._type = convert(self._spec.message), type_name
+        return self._message
+
+
 class _Ticker:
     """What a timer does at each tick.
 
@@ -98,10 +119,9 @@ class _Ticker:
         # Ticks of a reentrant group overlap, which a generator cannot: it skips such a tick.
         self._turn = threading.Lock()
         if spec.behaviour is None:
-            publisher = node.spec.publishers[spec.publish or '']
-            message = converter_for(import_interface(publisher.type)).convert(spec.message)
-            self.function: Callable[[], Any] = lambda: message
+            self.function: Callable[[], Any] = _Constant(node, spec).message
             return
+        self._bound = node.functions[spec.behaviour.name]
         self._begin = self.function = node.bind(spec.behaviour, owner)
         self._kind = kind_of(self._begin)
         if self._kind is FunctionKind.GENERATOR:
@@ -111,6 +131,15 @@ class _Ticker:
         else:
             return
         node.suspended.append(self)
+
+    def goes_on(self, spec: TimerSpec) -> bool:
+        """Return whether it does what `spec` says, so that a generator need not begin anew."""
+        behaviour, own = spec.behaviour, self._spec.behaviour
+        if behaviour is None or own is None:
+            return False
+        # `1` and `1.0` are equal, and not the same.
+        is_same = repr(dict(behaviour.arguments)) == repr(dict(own.arguments))
+        return is_same and self._bound is self._node.functions[behaviour.name]
 
     def close(self, timeout_sec: float) -> None:
         """See `Suspended`: what the generator has in `finally:` runs."""

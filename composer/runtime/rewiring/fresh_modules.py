@@ -15,7 +15,8 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
     from types import CodeType, ModuleType
 
 
@@ -50,7 +51,7 @@ class _Finder:
 
 @contextmanager
 def fresh_modules(
-    stale: Collection[str], sources: Mapping[str, str]
+    stale: Collection[str], sources: Mapping[str, str], search_path: Iterable[Path] = ()
 ) -> Iterator[Callable[[], None]]:
     """Let imports make new modules in place of those that are stale.
 
@@ -60,14 +61,19 @@ def fresh_modules(
     Args:
         stale: The full names of the modules to execute anew.
         sources: The texts of modules, by their names.
+        search_path: Folders to search first from now on, as far as they are new.
     """
     before = {name: module for name, module in sys.modules.items() if name in sources}
     for name in stale:
-        sys.modules.pop(name, None)
+        _put_back(name, None)
+    new_folders = [each for each in map(str, search_path) if each not in sys.path]
+    sys.path[:0] = new_folders
 
     def put_back() -> None:
         for name in sources:
             _put_back(name, before.get(name))
+        for each in new_folders:
+            sys.path.remove(each)
 
     finder: Any = _Finder(sources)
     sys.meta_path.insert(0, finder)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from contextlib import suppress
 from functools import partial
-from time import sleep
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter
@@ -21,13 +21,14 @@ from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
+from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
     from composer.language.specs import NodeSpec
-    from composer.planning.plan import Operation, Plan
+    from composer.planning.plan import Operation, Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.entities.actions import ActionServer
     from composer.runtime.nodes.live_node import LiveNode
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
     from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
+_SETTLE_SEC = 0.05
+_SETTLE_POLL_SEC = 0.0005
 _GOING = (Action.RECREATE, Action.REMOVE)
 _COMING = (Action.RECREATE, Action.ADD)
 
@@ -93,7 +96,14 @@ class Rewiring:
         """
         try:
             self._read_as(self._new)
-            self._exchange_nodes_and_processes(plan)
+            clashing = find_clashing_ends(self._old.spec, self._new.spec)
+            at_first = self._are_in_the_way(plan, clashing)
+            if at_first:
+                self._end_clashing(plan, clashing)
+            self._exchange_nodes_and_processes(plan, {each[0] for each in clashing})
+            self._pause({each.target[0] for each in plan.operations})
+            if not at_first:
+                self._end_clashing(plan, clashing)
             self._change_nodes(plan)
         except BaseException:
             self._undo_all()
@@ -130,7 +140,27 @@ class Rewiring:
         handle.functions = reading.functions
         handle.without_parameter_services = spec.without_parameter_services
 
-    def _exchange_nodes_and_processes(self, plan: Plan) -> None:
+    def _are_in_the_way(self, plan: Plan, clashing: Collection[Target]) -> bool:
+        """Return whether nodes that come need what clashes to be gone."""
+        names = {target[0] for target in clashing}
+        return any(
+            each.target[1] == 'nodes' and each.action in _COMING and each.target[0] in names
+            for each in plan.operations
+        )
+
+    def _end_clashing(self, plan: Plan, clashing: Collection[Target]) -> None:
+        """End what keeps its topic from having the new type; to undo that, it is created again."""
+        for operation in plan.operations:
+            full_name, section, name = operation.target
+            if operation.target in clashing and operation.action in _GOING:
+                node, spec = (
+                    self._nodes[full_name],
+                    getattr(self._before[full_name], section)[name],
+                )
+                self._undo.append(partial(_create_again, node, section, spec))
+                node.entities[section].pop(name).destroy()
+
+    def _exchange_nodes_and_processes(self, plan: Plan, clashing: Collection[str]) -> None:
         def targets(section: str, *actions: Action) -> list[str]:
             which = 0 if section == 'nodes' else 2
             return [
@@ -140,16 +170,19 @@ class Rewiring:
             ]
 
         nodes = self._nodes
+        removed = {name: nodes[name] for name in targets('nodes', Action.REMOVE)}
         self._end_nodes(targets('nodes', Action.RECREATE))
+        self._end_nodes(name for name in removed if name in clashing)
         self._end_processes(targets('processes', Action.RECREATE))
         self._begin(targets('nodes', *_COMING), targets('processes', *_COMING))
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
             self._undo.append(partial(process.change, process.spec))
             process.change(self._new.spec.processes[name])
-        for full_name in targets('nodes', Action.REMOVE):
-            self._finish.append(partial(self._restarter.remove, full_name))
-            self._finish.append(partial(nodes[full_name].forget_all))
+        for full_name, node in removed.items():
+            if full_name in nodes:
+                self._finish.append(partial(self._restarter.remove, full_name))
+            self._finish.append(node.forget_all)
         for name in targets('processes', Action.REMOVE):
             self._finish.append(partial(self._processes.remove, name))
 
@@ -165,6 +198,8 @@ class Rewiring:
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
         vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
+        if node.parameters:
+            again.ros.set_parameters(node.ros.get_parameters(sorted(node.parameters.set_live)))
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
@@ -198,14 +233,10 @@ class Rewiring:
 
     def _change_nodes(self, plan: Plan) -> None:
         """Change what runs on: records, state, parameters and entities."""
-        changed = {each.target[0] for each in plan.operations if each.target[0]}
         for full_name, spec in self._after.items():
             node = self._nodes[full_name]
-            if node.spec is spec:
-                continue
-            if full_name in changed:
-                self._pause(node)
-            self._replace_record(node, spec)
+            if node.spec is not spec:
+                self._replace_record(node, spec)
         for kind in ENTITY_KINDS:
             for operation in plan.operations:
                 if operation.target[1] == kind.section:
@@ -214,17 +245,27 @@ class Rewiring:
             if operation.target[1] == 'nodes' and operation.action is Action.CHANGE:
                 self._change_node(self._nodes[operation.target[0]], operation)
 
-    def _pause(self, node: LiveNode) -> None:
-        """Let no behaviour of a node begin while its entities are exchanged."""
+    def _pause(self, full_names: Collection[str]) -> None:
+        """Let no behaviour of these nodes begin while their entities are exchanged.
+
+        Those that have just begun may still use what goes, so they are waited for, if they are
+        short.
+        """
+        nodes = [node for name in full_names if (node := self._nodes.get(name))]
 
         def go_on() -> None:
-            node.gate.is_paused = False
+            for node in nodes:
+                node.gate.is_paused = False
             self._handle.executor.wake()
 
-        node.gate.is_paused = True
         self._undo.append(go_on)
         # Before nodes are removed, which may take long.
         self._finish.insert(0, go_on)
+        for node in nodes:
+            node.gate.is_paused = True
+        deadline = monotonic() + _SETTLE_SEC
+        while any(map(_is_in_a_call, nodes)) and monotonic() < deadline:
+            sleep(_SETTLE_POLL_SEC)
 
     def _replace_record(self, node: LiveNode, spec: NodeSpec) -> None:
         """Let a node have another record, and the state that this declares."""
@@ -239,14 +280,22 @@ class Rewiring:
         }
         state.update(come)
         node.spec, node.functions = spec, self._new.functions
+        self._follow_files(node, self._new)
 
         def put_back() -> None:
             node.spec, node.functions = before, self._old.functions
+            self._follow_files(node, self._old)
             for key in come:
                 state.pop(key, None)
             state.update(gone)
 
         self._undo.append(put_back)
+
+    @staticmethod
+    def _follow_files(node: LiveNode, reading: Reading) -> None:
+        entries = reading.snapshot.overrides.get(node.full_name, {})
+        if entries or node.ros.from_files:
+            node.ros.follow_files(entries)
 
     def _change_node(self, node: LiveNode, operation: Operation) -> None:
         keys = {each.top_key for each in operation.changes}
@@ -258,7 +307,7 @@ class Rewiring:
         if 'log_level' in keys:
             self._undo.append(partial(set_level, old))
             set_level(node.spec)
-        if keys & {'on_parameters', 'with', 'on_error', 'warn_after'} and node.parameters:
+        if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
             self._undo.append(partial(node.parameters.ask, old.on_parameters))
             node.parameters.ask(node.spec.on_parameters)
         if keys & {'on_error', 'warn_after'}:
@@ -296,7 +345,7 @@ class Rewiring:
             self._undo.append(partial(entities.__setitem__, name, before))
             self._finish.append(before.destroy)
         if operation.action is Action.REMOVE:
-            del entities[name]
+            entities.pop(name, None)
             self._finish.append(partial(node.forget, operation.noun, name))
 
 
@@ -319,6 +368,15 @@ def wait_for_goals(
             was_told = True
             system_logger.info('reload: waiting for the goals in flight of actions that go…')
         sleep(_POLL_SEC)
+
+
+def _create_again(node: LiveNode, section: str, spec: Any) -> None:
+    node.entities[section][spec.name] = create_entity(node, section, spec)
+
+
+def _is_in_a_call(node: LiveNode) -> bool:
+    """Return whether a behaviour of a node runs that ends soon: no goal, and no coroutine."""
+    return any(call.thread is not None and call.progress is None for call in node.running.calls())
 
 
 def _set_sim_time(node: LiveNode, *, value: bool) -> None:

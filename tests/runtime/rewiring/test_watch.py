@@ -72,13 +72,13 @@ class Edited:
     """A running system, and edits of its files."""
 
     def __init__(self, folder, child):
-        self._folder = folder
+        self.folder = folder
         self.child = child
         self._reloads = 0
 
     def edit(self, old, new, name='system.yaml'):
         """Replace a text in a file, as editors do: write beside it, and rename."""
-        path = self._folder / name
+        path = self.folder / name
         text = path.read_text()
         assert old in text
         beside = path.with_suffix('.new')
@@ -146,6 +146,7 @@ def test_what_cannot_be_applied_changes_nothing(running):
         ('system.yaml', 'period: 0.05', 'perid: 0.05', "did you mean 'period'?"),
         ('system.yaml', 'timers:\n      say:', 'timers: [', 'error['),
         ('parts.py', 'import time\n', 'import time\n1 / 0\n', 'ZeroDivisionError'),
+        ('parts.py', 'import time\n', 'import time\nraise KeyboardInterrupt\n', 'raised Keyb'),
         ('parts.py', 'def say(node):', 'def say(node:', 'error['),
         (
             'system.yaml',
@@ -167,6 +168,51 @@ def test_what_cannot_be_applied_changes_nothing(running):
     assert 'Traceback' not in running.child.output.replace('Traceback', '', 1)
 
 
+def test_what_was_told_is_not_told_again(running):
+    child = running.child
+    running.edit(
+        '{words: std_msgs/msg/String}',
+        '{words: std_msgs/msg/String, more: {type: std_msgs/msg/String, external: true}}',
+    )
+    running.reloaded()
+    # The warning stays, in another line.
+    running.edit('nodes:', '# A comment.\nnodes:')
+    running.edit('{step: 1}', '{step: 2}')
+    running.reloaded()
+    running.edit('parts:hear', 'parts:her')
+    child.wait_for_line('not reloaded: ')
+    # The error stays, too, until there is another one.
+    running.edit('# A comment.', '# Another comment.')
+    time.sleep(0.5)
+    running.edit('{step: 2}', '{stepp: 2')
+    child.wait_for_line('not reloaded: ', times=2)
+    running.edit('{stepp: 2', '{step: 2}')
+    child.wait_for_line('not reloaded: ', times=3)
+    running.edit('parts:her', 'parts:hear')
+    child.wait_for_line('the files have no errors any more, and nothing has changed')
+    told = ('unused-publisher', 'unknown-behaviour', 'yaml-syntax')
+    assert [len(child.matching(each)) for each in told] == [1, 2, 1]
+
+
+def test_modules_are_executed_anew_wherever_they_are_imported(running):
+    """The package that has a module is as before; it must not keep the old one."""
+    package = running.folder / 'inner'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'words.py').write_text("WORD = 'two'\n")
+    running.edit("WORD = 'one'", 'from inner import words\n\nWORD = words.WORD', 'parts.py')
+    running.child.wait_for_line('heard two')
+    running.edit('two', 'three', 'inner/words.py')
+    running.child.wait_for_line('heard three')
+    # What cannot be read is not an empty module.
+    (package / 'words.py').unlink()
+    (package / 'words.py').mkdir()
+    running.child.wait_for_line('not reloaded: ')
+    (package / 'words.py').rmdir()
+    (package / 'words.py').write_text("WORD = 'four'\n")
+    running.child.wait_for_line('heard four')
+
+
 def test_removed_nodes_stop(running):
     running.edit('  listener:', '  brief:\n    on_stop: parts:farewell\n  listener:')
     running.reloaded()
@@ -185,6 +231,24 @@ def test_values_set_live_stay(running, peer, wait_for):
     wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == 10, 'steps of 10')
     running.edit('{step: 10}', '{step: {default: 10, description: how far}}')
     running.reloaded()
+
+
+def test_values_come_and_go_in_parameter_files(running, peer, wait_for):
+    counts = []
+    peer.node.create_subscription(
+        Int64, '/count', lambda message: counts.append(message.data), 1000
+    )
+
+    def wait_for_steps(step):
+        wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == step, f'steps of {step}')
+
+    values = running.folder / 'values.yaml'
+    values.write_text('counter: {ros__parameters: {step: 2}}')
+    running.edit('{step: 1}', '{step: 1}\n    parameter_files: [values.yaml]')
+    wait_for_steps(2)
+    for text, step in (('3', 3), ('', 1), ('4', 4)):
+        values.write_text(f'counter: {{ros__parameters: {{step: {text}}}}}' if text else '')
+        wait_for_steps(step)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
