@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
 from composer.inference.values import UNKNOWN, External, Primitive, Value
 from composer.python_source.modules import FunctionKind, ModuleSource
-from composer.python_source.syntax import BLOCKS
+from composer.python_source.syntax import BLOCKS, list_children, list_nodes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -65,7 +65,7 @@ class TopNames:
         for statement in self._body:
             if isinstance(statement, _BINDING):
                 continue
-            for node in ast.walk(statement):
+            for node in list_nodes([statement]):
                 match node:
                     case ast.Attribute(attr=name, ctx=ast.Store()):
                         found.add(name)
@@ -100,7 +100,7 @@ class TopNames:
 
     @cached_property
     def _nodes(self) -> list[ast.AST]:
-        return [each for statement in self._body for each in ast.walk(statement)]
+        return list_nodes(self._body)
 
 
 def _own(statement: ast.AST) -> Iterator[ast.AST]:
@@ -111,7 +111,7 @@ def _own(statement: ast.AST) -> Iterator[ast.AST]:
         yield node
         pending += [
             each
-            for each in ast.iter_child_nodes(node)
+            for each in list_children(node)
             if not isinstance(each, ast.stmt | ast.ExceptHandler | ast.match_case)
         ]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.values import UNKNOWN, Value, join
 from composer.python_source.local_names import list_arguments, nested_names, stored_names
+from composer.python_source.syntax import list_children
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def own_nodes(definition: ast.AST) -> Iterator[ast.AST]:
         node = pending.pop()
         yield node
         if not isinstance(node, _SCOPES):
-            pending.extend(ast.iter_child_nodes(node))
+            pending += list_children(node)
 
 
 def _patterns(nodes: Iterable[ast.AST]) -> set[str]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.inference.reading import SENDING_METHODS, USED_NOUNS
+from composer.python_source.syntax import list_children
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -80,4 +81,4 @@ def _unread(module: ModuleSource, followed: Collection[int]) -> Iterator[ast.AST
             is_unread = True
         if is_unread:
             yield node
-        pending += [(each, is_unread) for each in ast.iter_child_nodes(node)]
+        pending += [(each, is_unread) for each in list_children(node)]

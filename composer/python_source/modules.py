@@ -25,6 +25,8 @@ from composer.python_source.syntax import (
     FunctionNode,
     UnreadModuleError,
     count_tokens,
+    list_children,
+    list_nodes,
     parse_source,
 )
 from composer.records import record
@@ -125,7 +127,7 @@ class ModuleSource:
     @cached_property
     def import_statements(self) -> list[ast.Import | ast.ImportFrom]:
         """All statements that import something, also in functions."""
-        nodes = (node for statement in self.body for node in ast.walk(statement))
+        nodes = list_nodes(self.body)
         return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
 
     def place_of(self, line: int) -> Span:
@@ -187,7 +189,7 @@ def find_texts(body: list[ast.stmt], nodes: Iterable[ast.AST] | None = None) -> 
     if not texts:
         return {}
     if nodes is None:
-        nodes = (node for statement in body for node in ast.walk(statement))
+        nodes = list_nodes(body)
     stored = Counter(name.id for name in stored_names(nodes))
     return {name: text for name, text in texts.items() if stored[name] == 1}
 
@@ -256,10 +258,9 @@ class _ModuleReader:
             is_module = isinstance(node, ast.Attribute) and node.attr == 'modules'
             self.is_open |= is_open or is_module
             if not isinstance(node, _OWN_SCOPE):
-                inner = ast.iter_child_nodes(node)
                 pending += [
                     each
-                    for each in inner
+                    for each in list_children(node)
                     if not isinstance(each, ast.stmt | ast.ExceptHandler | ast.match_case)
                 ]
 
@@ -342,7 +343,7 @@ def _own_nodes(function: FunctionNode) -> list[ast.AST]:
         node = pending.pop()
         found.append(node)
         if not isinstance(node, _OWN_SCOPE):
-            pending.extend(ast.iter_child_nodes(node))
+            pending += list_children(node)
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import ENTITY_KINDS
@@ -190,7 +191,12 @@ class System:
     @property
     def snapshot(self) -> Snapshot:
         """What it runs as, as its files say it."""
-        return self._reading.snapshot
+        set_live = {
+            node.full_name: frozenset(node.parameters.set_live)
+            for node in list(self._nodes.values())
+            if node.parameters and node.parameters.set_live
+        }
+        return replace(self._reading.snapshot, set_live=set_live)
 
     def rewire(
         self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
@@ -204,7 +210,7 @@ class System:
         Raises:
             ComposerError: That failed, and the system is as it was.
         """
-        plan = compare(self._reading.snapshot, new.snapshot)
+        plan = compare(self.snapshot, new.snapshot)
         rewiring = Rewiring(
             self._nodes,
             self._processes,

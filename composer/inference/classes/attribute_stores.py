@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.python_source.syntax import list_children
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _walk(body: Iterable[ast.stmt]) -> Iterator[tuple[ast.AST, ast.ClassDef | No
             owner, method = node, None
         elif isinstance(node, _FUNCTIONS) and method is None:
             method = node
-        pending += [(each, owner, method) for each in ast.iter_child_nodes(node)]
+        pending += [(each, owner, method) for each in list_children(node)]
 
 
 def _is_first(target: ast.expr, method: _Method) -> bool:

@@ -232,6 +232,8 @@ class Rewiring:
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
         vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
+        if node.parameters:
+            again.ros.set_parameters(node.ros.get_parameters(sorted(node.parameters.set_live)))
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
@@ -312,14 +314,22 @@ class Rewiring:
         }
         state.update(come)
         node.spec, node.functions = spec, self._new.functions
+        self._follow_files(node, self._new)
 
         def put_back() -> None:
             node.spec, node.functions = before, self._old.functions
+            self._follow_files(node, self._old)
             for key in come:
                 state.pop(key, None)
             state.update(gone)
 
         self._undo.append(put_back)
+
+    @staticmethod
+    def _follow_files(node: LiveNode, reading: Reading) -> None:
+        entries = reading.snapshot.overrides.get(node.full_name, {})
+        if entries or node.ros.from_files:
+            node.ros.follow_files(entries)
 
     def _change_node(self, node: LiveNode, operation: Operation) -> None:
         keys = {each.top_key for each in operation.changes}
