@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.specs import ParameterSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
+from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
 from composer.records import record
 
@@ -155,7 +156,7 @@ class _Comparison:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
             further += compare_entries(*readings, 'state', old.state, new.state)
         own = list(self._compare(_NODES, (full_name, 'nodes', ''), old, new, further))
-        yield from own
+        yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
             return
         for kind in ENTITY_KINDS:
@@ -172,7 +173,9 @@ class _Comparison:
             further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
             target = (new.full_name, kind.section, name)
             entity = (before.get(name), after.get(name))
-            yield from self._compare(rules, target, *entity, further, (old, new))
+            for operation in self._compare(rules, target, *entity, further, (old, new)):
+                is_new = operation.action is Action.ADD
+                yield operation if is_new else with_notes(operation, old, self._old)
 
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""

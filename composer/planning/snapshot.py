@@ -16,7 +16,7 @@ from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import MergedFiles
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec, SystemSpec
@@ -39,6 +39,9 @@ class Snapshot:
         overrides: What the parameter files of nodes say of their parameters, by the nodes' full
             names and the parameters' names.
         prefixes: Where the interface packages are that were built for the system.
+        generators: The behaviours of timers that are generators.
+        set_live: The parameters that somebody has set while the system ran, by the nodes' full
+            names; `None` if it does not run.
     """
 
     spec: SystemSpec
@@ -48,6 +51,8 @@ class Snapshot:
     definitions: Mapping[tuple[str, str], str]
     overrides: Mapping[str, Mapping[str, ParameterEntry]]
     prefixes: tuple[str, ...] = ()
+    generators: Collection[str] = frozenset()
+    set_live: Mapping[str, Collection[str]] | None = None
 
     def stale_modules(self, other: Snapshot) -> set[str]:
         """Return the modules whose source, or what they import, differs from `other`'s."""
@@ -79,7 +84,21 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         definitions,
         _read_overrides(nodes),
         tuple(map(str, prefixes)),
+        frozenset(_find_generators(context)),
     )
+
+
+def _find_generators(context: CheckContext) -> Iterator[str]:
+    for node in context.spec.nodes.values():
+        for timer in node.timers.values():
+            if (behaviour := timer.behaviour) is None:
+                continue
+            module = context.modules.find(behaviour.module)
+            source = None
+            if not isinstance(module, MissingModule):
+                source = module.functions.get(behaviour.function)
+            if source is not None and source.kind is not None and source.kind.is_generator:
+                yield behaviour.name
 
 
 class _Sources:

@@ -51,6 +51,8 @@ def encode_snapshot(snapshot: Snapshot) -> dict[str, Any]:
         'values': places(snapshot.positions.values),
         'code': dict(snapshot.code),
         'prefixes': list(snapshot.prefixes),
+        'generators': sorted(snapshot.generators),
+        'set_live': {node: sorted(names) for node, names in (snapshot.set_live or {}).items()},
         'definitions': [
             [*at, hashlib.sha256(text.encode(errors='surrogatepass')).hexdigest()]
             for at, text in snapshot.definitions.items()
@@ -106,6 +108,8 @@ def _decode_snapshot(data: Mapping[str, Any]) -> Snapshot:
         {(package, name): digest for package, name, digest in data['definitions']},
         overrides,
         tuple(data['prefixes']),
+        frozenset(data['generators']),
+        dict(data['set_live']),
     )
 
 

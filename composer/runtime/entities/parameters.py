@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from contextlib import contextmanager
+from threading import get_ident
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -19,7 +21,7 @@ from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from composer.language.specs import BehaviourSpec, ParameterSpec
     from composer.runtime.nodes.live_node import LiveNode
@@ -31,6 +33,10 @@ _FLOAT_MAX = 1.7976931348623157e308
 class NodeParameters:
     """The declared parameters of a node.
 
+    Attributes:
+        specs: What they are declared as.
+        set_live: The names of those that somebody has set since they were declared.
+
     Raises:
         StartError: The command line or a parameter file gives one a value that its declaration
             refuses.
@@ -38,9 +44,14 @@ class NodeParameters:
 
     def __init__(self, node: LiveNode) -> None:
         self._node = node
-        self._refusing = lambda changes: _refuse_unless_chosen(node.spec.parameters, changes)
         self._asking: Callable[[list[Parameter]], SetParametersResult] | None = None
+        self.specs: dict[str, ParameterSpec] = {}
+        self.set_live: set[str] = set()
+        self._refusing = lambda changes: _refuse_unless_chosen(self.specs, changes)
+        # The thread that sets parameters to what the files say.
+        self._own_thread = 0
         node.ros.add_on_set_parameters_callback(self._refusing)
+        node.ros.add_post_set_parameters_callback(self._note)
         for spec in node.spec.parameters.values():
             self.declare(spec)
         self.ask(node.spec.on_parameters)
@@ -52,8 +63,10 @@ class NodeParameters:
             StartError: Its value is refused.
         """
         ros = self._node.ros
+        self.specs[spec.name] = spec
         try:
-            _declare(ros, spec)
+            with self._as_own():
+                _declare(ros, spec)
         except ParameterException as error:
             reason = str(error).removesuffix(f': {spec.name}')
             message = f"parameter '{spec.name}' from {_origin(ros, spec.name)}: {reason}"
@@ -64,6 +77,21 @@ class NodeParameters:
         ros = self._node.ros
         loosen_parameter(ros, name)
         ros.undeclare_parameter(name)
+        del self.specs[name]
+        self.set_live.discard(name)
+
+    def set(self, spec: ParameterSpec, value: Any) -> None:
+        """Set a parameter to a value of the files.
+
+        Raises:
+            StartError: It is refused.
+        """
+        parameter = Parameter(spec.name, type_of(spec), value)
+        with self._as_own():
+            (result,) = self._node.ros.set_parameters([parameter])
+        if not result.successful:
+            message = f"parameter '{spec.name}' of '{self._node.spec.key}': {result.reason}"
+            raise StartError(message)
 
     def ask(self, behaviour: BehaviourSpec | None) -> None:
         """Ask this behaviour about changes from now on; `None` for nobody."""
@@ -79,6 +107,23 @@ class NodeParameters:
             self._asking = _create_callback(self._node, behaviour)
             ros.add_on_set_parameters_callback(self._asking)
             ros.add_on_set_parameters_callback(self._refusing)
+
+    @contextmanager
+    def _as_own(self) -> Iterator[None]:
+        self._own_thread = get_ident()
+        try:
+            yield
+        finally:
+            self._own_thread = 0
+
+    def _note(self, changes: list[Parameter]) -> None:
+        if self._own_thread != get_ident():
+            self.set_live.update(each.name for each in changes)
+
+
+def type_of(spec: ParameterSpec) -> Parameter.Type:
+    """Return the type that rclpy knows a parameter by."""
+    return Parameter.Type[(spec.type or '').upper()]
 
 
 def loosen_parameter(ros: ComposedRosNode, name: str) -> None:
@@ -120,7 +165,7 @@ def _origin(ros: ComposedRosNode, name: str) -> str:
 
 
 def _declare(ros: ComposedRosNode, spec: ParameterSpec) -> None:
-    kind = Parameter.Type[(spec.type or '').upper()]
+    kind = type_of(spec)
     descriptor = create_descriptor(spec)
     entry = ros.from_files.get(spec.name)
     if entry is not None and entry.value == [] and not kind.name.endswith('_ARRAY'):
@@ -142,14 +187,18 @@ def _declare(ros: ComposedRosNode, spec: ParameterSpec) -> None:
         ros.declare_parameter(spec.name, spec.value, descriptor)
 
 
+def find_refusal(spec: ParameterSpec, value: Any) -> str:
+    """Return why a parameter may not have a value: it is none of its choices; empty if it may."""
+    if spec.choices is None or value in spec.choices:
+        return ''
+    return f"'{value}' is not one of {', '.join(map(str, spec.choices))}"
+
+
 def _refuse_unless_chosen(
     specs: Mapping[str, ParameterSpec], changes: list[Parameter]
 ) -> SetParametersResult:
     for change in changes:
-        spec = specs.get(change.name)
-        if spec and spec.choices is not None and change.value not in spec.choices:
-            options = ', '.join(map(str, spec.choices))
-            reason = f"'{change.value}' is not one of {options}"
+        if (spec := specs.get(change.name)) and (reason := find_refusal(spec, change.value)):
             return SetParametersResult(successful=False, reason=reason)
     return SetParametersResult(successful=True)
 

@@ -73,13 +73,24 @@ class LiveEntity(Protocol):
 
 
 class NodeParameters(Protocol):
-    """The declared parameters of a node that runs."""
+    """The declared parameters of a node that runs.
+
+    Attributes:
+        specs: What they are declared as.
+        set_live: The names of those that somebody has set since they were declared.
+    """
+
+    specs: dict[str, ParameterSpec]
+    set_live: set[str]
 
     def declare(self, spec: ParameterSpec) -> None:
         """Declare a parameter."""
 
     def undeclare(self, name: str) -> None:
         """Remove a parameter."""
+
+    def set(self, spec: ParameterSpec, value: Any) -> None:
+        """Set a parameter to a value of the files."""
 
     def ask(self, behaviour: BehaviourSpec | None) -> None:
         """Ask this behaviour about changes from now on."""

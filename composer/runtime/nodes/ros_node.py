@@ -110,6 +110,30 @@ class ComposedRosNode(Node):
         )
         return self._late_events
 
+    def follow_files(self, entries: Mapping[str, ParameterEntry]) -> None:
+        """Let parameters that are declared from now on have the values of parameter files.
+
+        Args:
+            entries: What the files say now; the command line wins over them.
+        """
+        overrides = self._parameter_overrides
+        for name in self.from_files:
+            overrides.pop(name, None)
+        self.from_files = {name: entries[name] for name in entries if name not in overrides}
+        overrides.update(
+            {
+                name: Parameter(name, Parameter.Type[entry.type.upper()], entry.value)
+                for name, entry in self.from_files.items()
+                # An empty list has no type.
+                if entry.type is not None
+            }
+        )
+
+    def find_override(self, name: str) -> Any:
+        """Return the value that a file or the command line gives a parameter; `None` for none."""
+        entry, override = self.from_files.get(name), self._parameter_overrides.get(name)
+        return entry.value if entry else override and override.value
+
     def start_parameter_services(self) -> None:
         """Create the parameter services, unless the node has them or the file turns them off."""
         if not self._lacks_services:

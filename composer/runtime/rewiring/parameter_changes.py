@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import ParameterException
-from rclpy.parameter import Parameter
 
 from composer.errors import ComposerError, StartError
 from composer.planning.plan import Action
-from composer.runtime.entities.parameters import create_descriptor, loosen_parameter
+from composer.runtime.entities.parameters import (
+    create_descriptor,
+    find_refusal,
+    loosen_parameter,
+    type_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,13 +50,15 @@ class ParameterChange:
         if before is None:
             parameters.declare(self._after.parameters[name])
             return lambda: parameters.undeclare(name)
-        value = node.behaviour_node.parameters[name]
+        value, was_set = node.behaviour_node.parameters[name], name in parameters.set_live
 
         def put_back() -> None:
             if node.ros.has_parameter(name):
                 parameters.undeclare(name)
             parameters.declare(before)
-            self._set(before, value)
+            self._change(before, value)
+            if was_set:
+                parameters.set_live.add(name)
 
         try:
             if after is None or operation.action is Action.RECREATE:
@@ -60,46 +66,30 @@ class ParameterChange:
                 if after is not None:
                     parameters.declare(after)
             else:
-                self._change(after, operation, value)
+                given = node.ros.find_override(name)
+                self._change(after, value if was_set else after.value if given is None else given)
         except ComposerError:
             put_back()
             raise
         return put_back
 
-    def _change(self, spec: ParameterSpec, operation: Operation, value: Any) -> None:
-        """Change the descriptor of a parameter, and its value if nobody has set it."""
-        ros = self._node.ros
-        changes = {each.key: each for each in operation.changes}
-        told = changes.get('value') or changes.get('default')
-        # The old limits may not fit the new value.
+    def _change(self, spec: ParameterSpec, value: Any) -> None:
+        """Change the descriptor of a parameter, and its value; `None` leaves that as it is."""
+        ros, parameters = self._node.ros, self._node.parameters
+        assert parameters is not None  # noqa: S101 - see above
+        # The old limits may not fit the new value, and nobody sets what is read-only.
         loosen_parameter(ros, spec.name)
-        if told is not None:
-            # Without a value in a parameter file, it is the default.
-            old, new = (
-                each if each is not None else record.value
-                for each, record in (
-                    (told.old, self._before.parameters[spec.name]),
-                    (told.new, spec),
-                )
-            )
-            if value == old:
-                self._set(spec, new)
+        parameters.specs[spec.name] = spec
+        # `1` and `1.0` are equal, and not the same.
+        if value is not None and repr(value) != repr(ros.get_parameter(spec.name).value):
+            parameters.set(spec, value)
         descriptor = create_descriptor(spec)
-        descriptor.type = _type_of(spec).value
+        descriptor.type = type_of(spec).value
+        reason = find_refusal(spec, ros.get_parameter(spec.name).value)
         try:
             ros.set_descriptor(spec.name, descriptor)
         except ParameterException as error:
-            message = f"parameter '{spec.name}' of '{self._node.spec.key}': {error}"
-            raise StartError(message, help='its value was set while the system ran') from error
-
-    def _set(self, spec: ParameterSpec, value: Any) -> None:
-        if value is None:
-            return
-        (result,) = self._node.ros.set_parameters([Parameter(spec.name, _type_of(spec), value)])
-        if not result.successful:
-            message = f"parameter '{spec.name}' of '{self._node.spec.key}': {result.reason}"
-            raise StartError(message)
-
-
-def _type_of(spec: ParameterSpec) -> Parameter.Type:
-    return Parameter.Type[(spec.type or '').upper()]
+            reason = str(error).removesuffix(f': {spec.name}')
+        if reason:
+            message = f"parameter '{spec.name}' of '{self._node.spec.key}': {reason}"
+            raise StartError(message, help='its value was set while the system ran')

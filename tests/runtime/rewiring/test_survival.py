@@ -6,6 +6,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from tests.running import wait_for
@@ -17,6 +19,11 @@ version: 1
 nodes:
   clock:
     state: {steps: [], once: 0}
+    parameters:
+      speed: {default: 1.0, minimum: 0.0, maximum: 10.0}
+      mode: {default: slow, choices: [slow, fast]}
+      size: 1
+    parameter_files: [sizes.yaml]
     publishers: {ticks: {type: std_msgs/msg/Int32, external: true}}
     timers:
       tick: {period: 0.02, publish: ticks, message: 3}
@@ -51,6 +58,7 @@ def once(node):
 def hear(node, message):
     node.state.heard = type(message).__name__
 """
+SIZES = '/clock: {ros__parameters: {size: 7}}'
 PROBES = """\
 import json
 
@@ -63,6 +71,7 @@ def probe(node, request):
 @pytest.fixture(scope='module')
 def running(shared_compose, shared_peer):
     (shared_compose.folder / 'probes.py').write_text(PROBES)
+    (shared_compose.folder / 'sizes.yaml').write_text(SIZES)
     shared_compose(SYSTEM, CODE).wait_until_ready()
     return Edited(shared_compose.folder, shared_peer)
 
@@ -83,13 +92,18 @@ class Edited:
         self._texts = {path.name: path.read_text() for path in folder.iterdir() if path.is_file()}
         self._clients = {}
 
-    def edit(self, replacements, name='system.yaml'):
-        """Replace texts in a file; return what was planned, and what was done."""
-        text = self._texts[name]
+    def edit(self, replacements):
+        """Replace texts in the files; return what was planned, and what was done."""
+        found = set()
+        texts = dict(self._texts)
         for old, new in replacements.items():
-            assert old in text
-            text = text.replace(old, new)
-        (self.folder / name).write_text(text)
+            for name, text in texts.items():
+                if old in text:
+                    found.add(old)
+                    texts[name] = text.replace(old, new)
+        assert found == set(replacements)
+        for name, text in texts.items():
+            (self.folder / name).write_text(text)
         return self.call(Trigger, '/_composer_system/plan').message, self.reload()
 
     def reload(self):
@@ -105,6 +119,25 @@ class Edited:
     def probe(self, node):
         """Return the state of a node."""
         return json.loads(self.call(Trigger, f'/{node}/probe').message)
+
+    def get(self, name):
+        """Return the value of a parameter of the clock."""
+        (value,) = self.call(GetParameters, '/clock/get_parameters', names=[name]).values
+        return parameter_value_to_python(value)
+
+    def set(self, name, value):
+        """Set a parameter of the clock; return why it was refused."""
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        answer = self.call(SetParameters, '/clock/set_parameters', parameters=parameters)
+        return answer.results[0].reason
+
+    def restart(self):
+        """Build the clock anew."""
+        parameters = [Parameter('node', value='/clock').to_parameter_msg()]
+        answer = self.call(
+            SetParametersAtomically, '/_composer_system/restart', parameters=parameters
+        )
+        assert answer.result.successful
 
     def call(self, service_class, name, /, **fields):
         if name not in self._clients:
@@ -162,7 +195,76 @@ def test_a_generator_goes_on_unless_its_code_is_new(edited):
     edited.edit({'steps: {period: 0.02': 'steps: {period: 0.01, warn_after: 2.0'})
     wait_for(lambda: len(edited.probe('clock')['steps']) > len(before) + 2, 'more steps')
     assert edited.probe('clock')['steps'][len(before)] == before[-1] + 1
-    edited.edit({'FIRST = 0': 'FIRST = 1000'}, 'parts.py')
+    edited.edit({'FIRST = 0': 'FIRST = 1000'})
     wait_for(lambda: edited.probe('clock')['steps'][-1] > 1000, 'steps of the new code')
     # One that has ended has nothing more to do.
     assert edited.probe('clock')['once'] == 1
+
+
+_STAYS = 'the value that was set while it ran stays'
+
+
+@pytest.mark.parametrize(
+    ('live', 'replacements', 'name', 'value', 'note'),
+    [
+        (None, {'speed: {default: 1.0': 'speed: {default: 2.0'}, 'speed', 2.0, ''),
+        (5.0, {'speed: {default: 1.0': 'speed: {default: 2.0'}, 'speed', 5.0, _STAYS),
+        # Also if it is the value that the file has.
+        (1.0, {'speed: {default: 1.0': 'speed: {default: 2.0'}, 'speed', 1.0, _STAYS),
+        (5.0, {'maximum: 10.0': 'maximum: 20.0'}, 'speed', 5.0, ''),
+        (5.0, {'default: 1.0, minimum: 0.0, maximum: 10.0': 'default: fast'}, 'speed', 'fast', ''),
+        (None, {'size: 7': 'size: 8'}, 'size', 8, ''),
+        (70, {'size: 7': 'size: 8'}, 'size', 70, _STAYS),
+        (None, {'{size: 7}': '{}'}, 'size', 1, ''),
+        (None, {'size: 1': 'size: 2'}, 'size', 7, ''),
+        (
+            None,
+            {'size: 1': 'size: 1\n      more: 1', 'size: 7': 'size: 7, more: 3'},
+            'more',
+            3,
+            '',
+        ),
+        (70, {'size: 1': 'size: 1.0', 'size: 7': 'size: 7.5'}, 'size', 7.5, ''),
+    ],
+)
+def test_parameters_follow_the_files_unless_somebody_has_set_them(
+    edited, live, replacements, name, value, note
+):
+    edited.restart()
+    if live is not None:
+        assert not edited.set(name, live)
+    planned, said = edited.edit(replacements)
+    assert said.startswith('reloaded in ')
+    assert edited.get(name) == value
+    assert (_STAYS in planned) == bool(note)
+
+
+@pytest.mark.parametrize(
+    ('name', 'live', 'replacements', 'reason'),
+    [
+        ('speed', 9.0, {'maximum: 10.0': 'maximum: 5.0'}, 'out of range'),
+        ('mode', 'fast', {'[slow, fast]': '[slow]'}, "'fast' is not one of slow"),
+    ],
+)
+def test_a_declaration_that_a_live_value_does_not_fit_is_refused(
+    edited, name, live, replacements, reason
+):
+    edited.restart()
+    assert not edited.set(name, live)
+    _, said = edited.edit({**replacements, 'size: 7': 'size: 9'})
+    assert said.startswith('not reloaded: ')
+    assert reason in said
+    assert (edited.get(name), edited.get('size')) == (live, 7)
+    # The old declaration holds, too.
+    assert not edited.set(name, live)
+    assert edited.set('mode', 'backwards') == "'backwards' is not one of slow, fast"
+
+
+def test_values_set_live_survive_a_new_node_that_cannot_start(edited):
+    edited.restart()
+    edited.set('speed', 4.0)
+    failing = {'  clock:': '  clock:\n    rosout: false\n    on_start: parts:nothing'}
+    code = {'FIRST = 0': 'FIRST = 0\n\n\ndef nothing(node):\n    raise OSError\n'}
+    _, said = edited.edit({**failing, **code})
+    assert said.startswith("not reloaded: node 'clock': on_start raised OSError")
+    assert edited.get('speed') == 4.0
