@@ -7,28 +7,35 @@ middleware is there, and its behaviours can be imported beside them.
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-import click
-
 from composer.errors import ComposerError
 from composer.processes.own_process import own_command, the_start
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from composer.runtime.system import System
 
+_LOOK_SEC = 0.2
+_CHUNK = 1 << 16
 OPTION = '--rehearse'
 
 
-def rehearse(system: System) -> None:
-    """Rehearse the start of a system that runs in this process; what that prints is printed.
+def rehearse(system: System, is_outdated: Callable[[], bool]) -> None:
+    """Rehearse the start of a system that runs in this process.
+
+    Args:
+        is_outdated: Returns whether there is a newer edit; asked again and again.
 
     Raises:
-        ComposerError: The start would fail, with what was printed, or the system stops.
+        ComposerError: The start would fail, with what was printed, or the system stops, or there
+            is a newer edit.
     """
     start = the_start()
     process = subprocess.Popen(  # noqa: S603 - ourselves
@@ -40,8 +47,6 @@ def rehearse(system: System) -> None:
         stderr=subprocess.PIPE,
         env=dict(start.variables),
         cwd=start.folder,
-        text=True,
-        errors='backslashreplace',
         # A signal of the terminal goes to Composer alone. What builds packages is in it, too.
         start_new_session=True,
     )
@@ -50,14 +55,24 @@ def rehearse(system: System) -> None:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
 
-    lines = []
+    printed = b''
     with process, system.ending(end) as goes_on:
         if not goes_on:
             end()
-        for line in process.stderr or ():
-            lines.append(line)
-            click.echo(line, nl=False, err=True)
+        while chunk := _read(process, is_outdated, end):
+            printed += chunk
         # Until then its ID is that of no other process.
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
     if process.returncode:
-        raise ComposerError(''.join(lines).strip() or 'the system stops')
+        text = printed.decode(errors='backslashreplace').strip()
+        raise ComposerError(text or 'the files have changed, or the system stops')
+
+
+def _read(
+    process: subprocess.Popen[bytes], is_outdated: Callable[[], bool], end: Callable[[], None]
+) -> bytes:
+    assert process.stderr is not None  # noqa: S101 - it is a pipe
+    while not select.select([process.stderr], [], [], _LOOK_SEC)[0]:
+        if is_outdated():
+            end()
+    return os.read(process.stderr.fileno(), _CHUNK)

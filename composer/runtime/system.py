@@ -199,11 +199,14 @@ class System:
         }
         return replace(self._reading.snapshot, set_live=set_live)
 
-    def rewire(self, new: Reading, aborts_goals: Callable[[], bool]) -> Plan:
+    def rewire(
+        self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> Plan:
         """Become the system of `new`; return what was done.
 
         Args:
             aborts_goals: Returns whether goals of actions that go are aborted, not waited for.
+            is_outdated: Returns whether there is a newer edit; then nothing is waited for.
 
         Raises:
             ComposerError: That failed, and the system is as it was.
@@ -219,11 +222,11 @@ class System:
             self._reading,
             new,
         )
-        rewiring.wait_for_goals(plan, aborts_goals)
+        rewiring.wait_for_goals(plan, aborts_goals, is_outdated)
         with self._restarter.lock:
             if self.stop_requested:
                 return plan
-            rewiring.apply(plan)
+            rewiring.apply(plan, is_outdated)
             self._reading = new
             self._follow(new.spec)
         return plan
@@ -247,14 +250,19 @@ class System:
         """Whether it stops to start again in this process."""
         return self._stop_request.starts_again
 
-    def start_again(self, aborts_goals: Callable[[], bool]) -> None:
+    def start_again(
+        self, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
         """Stop, and have this process start the system again as its files say it then.
 
         Goals in flight are waited for, or aborted as `rewire` does.
+
+        Raises:
+            StartError: There is a newer edit, and the system runs on.
         """
         nodes = list(self._nodes.values())
         actions: list[Any] = [each for node in nodes for each in node.entities['actions'].values()]
-        wait_for_goals(actions, self._stop_request, aborts_goals)
+        wait_for_goals(actions, self._stop_request, aborts_goals, is_outdated)
         self._stop_request.make(starts_again=True)
 
     def ending(self, end: Callable[[], None]) -> AbstractContextManager[bool]:
@@ -306,6 +314,7 @@ class System:
         self._parameter_services.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), timeout_sec)
+        ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
         # Processes end after the nodes: an `on_stop` may need them.
         none_killed = self._processes.stop()
         if self._guardian.mark:

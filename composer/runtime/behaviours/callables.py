@@ -26,6 +26,10 @@ class BehaviourImportError(ComposerError):
     """A behaviour's module cannot be imported, or has no such function."""
 
 
+class ImportAbandonedError(BaseException):
+    """Raised in a thread that imports, to end it."""
+
+
 def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
     """Return the function that a behaviour names.
 

@@ -21,6 +21,7 @@ from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
+from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -77,23 +78,33 @@ class Rewiring:
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
-    def wait_for_goals(self, plan: Plan, aborts: Callable[[], bool]) -> None:
+    def wait_for_goals(
+        self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
         """Wait until no goal is in flight of an action that goes; it accepts no more.
 
         Args:
-            aborts: Returns whether the goals are aborted; asked again and again.
+            aborts: Returns whether the goals are aborted; asked again and again, as the next.
+            is_outdated: Returns whether there is a newer edit.
+
+        Raises:
+            ComposerError: There is one, and everything is as before.
         """
         servers = list(self._going_actions(plan))
         for server in servers:
             self._undo.append(partial(server.retire, is_retired=False))
-        wait_for_goals(servers, self._handle.stop, aborts)
+        wait_for_goals(servers, self._handle.stop, aborts, is_outdated)
 
-    def apply(self, plan: Plan) -> None:
+    def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
         """Do all that a plan says.
+
+        Args:
+            is_outdated: Returns whether there is a newer edit, for which an `on_start` is left.
 
         Raises:
             ComposerError: Something failed, and everything is as before.
         """
+        self._handle.is_outdated = is_outdated
         try:
             self._read_as(self._new)
             clashing = find_clashing_ends(self._old.spec, self._new.spec)
@@ -108,6 +119,8 @@ class Rewiring:
         except BaseException:
             self._undo_all()
             raise
+        finally:
+            self._handle.is_outdated = never
         for finish in self._finish:
             finish()
 
@@ -125,6 +138,7 @@ class Rewiring:
             yield from actions.values() if section == 'nodes' else [actions[name]]
 
     def _undo_all(self) -> None:
+        self._handle.is_outdated = never
         self._read_as(self._old)
         for undo in reversed(self._undo):
             try:
@@ -219,8 +233,8 @@ class Rewiring:
 
         def remove_all() -> None:
             for name in node_names:
-                if name in self._nodes:
-                    self._restarter.remove(name)
+                if name in self._nodes and not self._restarter.remove(name):
+                    self._restarter.leave(name)
             for name in process_names:
                 if name in self._processes.by_name:
                     self._processes.remove(name)
@@ -350,17 +364,29 @@ class Rewiring:
 
 
 def wait_for_goals(
-    servers: Collection[ActionServer], stop: StopRequest, aborts: Callable[[], bool]
+    servers: Collection[ActionServer],
+    stop: StopRequest,
+    aborts: Callable[[], bool],
+    is_outdated: Callable[[], bool],
 ) -> None:
     """Let actions accept no more goals, and wait until none is in flight, or for a stop.
 
     Args:
         aborts: Returns whether the goals are aborted; asked again and again.
+        is_outdated: Returns whether there is a newer edit; asked again and again.
+
+    Raises:
+        StartError: There is; the actions accept goals again.
     """
     for server in servers:
         server.retire(is_retired=True)
     was_told = False
     while any(each.has_goals for each in servers) and not stop.is_set:
+        if is_outdated():
+            for server in servers:
+                server.retire(is_retired=False)
+            message = 'the files have changed while goals were waited for'
+            raise StartError(message)
         if aborts():
             for server in servers:
                 server.retire(is_retired=True, aborts=True)

@@ -81,7 +81,7 @@ def test_a_new_environment_starts_the_system_again(compose, edit, monkeypatch):
         told = [systemd.recv(1000).split(b'\n')[0] for _ in range(3)]
     assert told == [b'READY=1', b'RELOADING=1', b'READY=1']
     because = 'because of environment.MODE'
-    assert child.wait_for_line('must start again').endswith(because)
+    assert child.wait_for_line('must start again').endswith(f'{because}; rehearsing')
     child.wait_for_line('the system starts again: ±1 system')
     child.wait_for_line('child has second')
     first, second = (
@@ -199,5 +199,7 @@ def test_interface_packages_come_and_change(compose, edit, shared_cache, monkeyp
     child.wait_for_line("fields ['x']", times=len(child.matching('fields')) + 2)
     definition.write_text('int32 x\nfloat64 y\n')
     child.wait_for_line("fields ['x', 'y']")
-    assert child.wait_for_line('must start again').endswith('because of interfaces.new_defs')
+    assert child.wait_for_line('must start again').endswith(
+        'because of interfaces.new_defs; rehearsing'
+    )
     assert child.stop() == 0
