@@ -176,10 +176,11 @@ class Reloader:
         self._files.also_follow(_list_files(context))
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
-        with fresh_modules(stale, snapshot.sources, search_path):
+        with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
             reading = import_reading(context, snapshot, findings.extend)
             if reading is None:
                 raise ComposerError(_RUNS_ON)
+            import_rest()
             if _loses_parts(system.snapshot, snapshot) and not is_whole():
                 raise _HalfWrittenError
             plan = system.rewire(reading, self._aborts_goals.is_set)
