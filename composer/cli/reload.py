@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import Counter
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -30,9 +32,12 @@ if TYPE_CHECKING:
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
     from composer.runtime.health.system_state import Outcome
+    from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
 
 _RUNS_ON = 'the system runs on as it was'
+# How often files are looked at while something is waited for.
+_LOOK_SEC = 0.2
 _NO_CHANGE = 'nothing has changed'
 _GOOD_AGAIN = 'the files have no errors any more, and nothing has changed'
 
@@ -58,19 +63,22 @@ class Reloader:
     ) -> None:
         self._reader = reader
         self._prefixes = prefixes
-        self._files = WatchedFiles([*reader.paths, *_list_files(context)], begun_ns)
+        self._folder = Path.cwd()
+        self._paths = [self._folder / each for each in reader.paths]
+        self._files = WatchedFiles([*self._paths, *_list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
         self._warnings = _warnings_in(told)
         self._failure = ''
+        self._next_look = 0.0
 
     def reload(self, system: System) -> Outcome:
         """Read the files, and rewire the system; after errors it is as it was.
 
         What was done is logged, and errors are printed. Goals in flight of actions that go are
-        waited for.
+        waited for. If the files change meanwhile, all begins anew.
         """
-        return self._reload(system, lambda: True)
+        return self._reload(system, lambda: not self._files.list_changed())
 
     def _reload(self, system: System, is_whole: Callable[[], bool]) -> Outcome:
         """Do as `reload`.
@@ -170,6 +178,7 @@ class Reloader:
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
     ) -> Plan:
         from composer.runtime.rewiring.fresh_modules import fresh_modules
+        from composer.runtime.rewiring.patience import import_with_patience
 
         context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
@@ -177,29 +186,61 @@ class Reloader:
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
         with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
-            reading = import_reading(context, snapshot, findings.extend)
+
+            def import_all() -> Reading | None:
+                reading = import_reading(context, snapshot, findings.extend)
+                if reading is not None:
+                    import_rest()
+                return reading
+
+            reading = import_with_patience(
+                import_all,
+                lambda: system.stop_requested or self._is_outdated(),
+                snapshot.sources,
+            )
             if reading is None:
                 raise ComposerError(_RUNS_ON)
-            import_rest()
             if _loses_parts(system.snapshot, snapshot) and not is_whole():
                 raise _HalfWrittenError
-            plan = system.rewire(reading, self._aborts_goals.is_set)
+            plan = system.rewire(reading, self._aborts_goals.is_set, self._is_outdated)
             if system.stop_requested:
                 message = 'the system stops'
                 raise ComposerError(message)
-        self._files.follow([*self._reader.paths, *_list_files(context)])
+        self._files.follow([*self._paths, *_list_files(context)])
         return plan
+
+    def _is_outdated(self) -> bool:
+        """Return whether the files have changed since they were read; looks at them at times."""
+        now = monotonic()
+        if now < self._next_look:
+            return False
+        self._next_look = now + _LOOK_SEC
+        return bool(self._files.list_changed())
 
     def _check(self, findings: list[Diagnostic]) -> CheckContext:
         if any(str(path) == '-' for path in self._reader.paths):
             message = 'the system was read from standard input, which cannot be read again'
             raise ComposerError(message)
-        context, files, found = self._reader.read()
+        context, files, found = self._reader_here().read()
         findings += found
         self._files.also_follow([*files, *(_list_files(context) if context else ())])
         if context is None or has_errors(found):
             raise ComposerError(_RUNS_ON)
         return context
+
+    def _reader_here(self) -> SystemReader:
+        """Return what reads the files, also where a behaviour has changed the current folder."""
+        try:
+            folder = Path.cwd()
+        except FileNotFoundError:
+            # It was removed, and perhaps made anew.
+            try:
+                os.chdir(self._folder)
+            except OSError as error:
+                message = f"the folder '{self._folder}', where Composer was started, is gone"
+                raise ComposerError(message) from error
+            folder = self._folder
+        return self._reader if folder == self._folder else replace(self._reader, paths=self._paths)
 
     @contextmanager
     def watching(self, system: System) -> Iterator[None]:

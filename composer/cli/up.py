@@ -14,7 +14,7 @@ from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import SystemReader, import_reading
 from composer.diagnostics import has_errors
-from composer.errors import ExitCode
+from composer.errors import ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.planning.snapshot import take_snapshot
@@ -54,11 +54,15 @@ def up(  # noqa: PLR0913 - one for each option
     Raises:
         RosNotFoundError: There is no rclpy.
         StartError: The system could not start.
-        UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
+        UsageError: The arguments do not fit the file, or the ROS arguments are wrong; or standard
+            input is to be watched.
     """
     if ends_process and isinstance(sys.stdout, io.TextIOWrapper):
         # What behaviours print is shown at once, in a file, too.
         sys.stdout.reconfigure(line_buffering=True)
+    if watches and str(paths[0]) == '-':
+        message = '--watch cannot watch standard input, which is read once'
+        raise UsageError(message, help='give a file')
     reader = SystemReader(paths, words, set_values)
     begun_ns = time_ns()
     context, _files, told = reader.read()

@@ -198,11 +198,14 @@ class System:
         }
         return replace(self._reading.snapshot, set_live=set_live)
 
-    def rewire(self, new: Reading, aborts_goals: Callable[[], bool]) -> Plan:
+    def rewire(
+        self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> Plan:
         """Become the system of `new`; return what was done.
 
         Args:
             aborts_goals: Returns whether goals of actions that go are aborted, not waited for.
+            is_outdated: Returns whether there is a newer edit; then nothing is waited for.
 
         Raises:
             ComposerError: That failed, and the system is as it was.
@@ -218,11 +221,11 @@ class System:
             self._reading,
             new,
         )
-        rewiring.wait_for_goals(plan, aborts_goals)
+        rewiring.wait_for_goals(plan, aborts_goals, is_outdated)
         with self._restarter.lock:
             if self.stop_requested:
                 return plan
-            rewiring.apply(plan)
+            rewiring.apply(plan, is_outdated)
             self._reading = new
             self._follow(new.spec)
         return plan
@@ -281,6 +284,7 @@ class System:
         self._parameter_services.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), timeout_sec)
+        ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
         # Processes end after the nodes: an `on_stop` may need them.
         none_killed = self._processes.stop()
         if self._guardian.mark:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
+import select
 import time
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
+from composer.cli.running import answer_forms
 from composer.errors import ComposerError, RosNotFoundError, UsageError
 from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
 from composer.runtime.control import protocol
-from composer.runtime.control.name_claim import list_claims
+from composer.runtime.control.name_claim import find_address, list_claims
 from composer.runtime.environment import check_middleware, check_ros, check_shell
 from composer.runtime.health.system_state import Outcome
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from composer.planning.snapshot import Snapshot
 
@@ -38,12 +40,14 @@ class RunningSystem:
     Attributes:
         name: As it says itself.
         node: The full name of its control node.
-        status: What it says of itself; `None` if it does not answer.
+        status: What it says of itself; `None` if it says nothing that is understood.
+        problem: Why there is no status, in two words.
     """
 
     name: str
     node: str
     status: dict[str, Any] | None
+    problem: str = ''
 
 
 class Client:
@@ -94,12 +98,15 @@ class Client:
     def find_all(self) -> list[RunningSystem]:
         """Return the systems on this ROS graph, by their names; what is far may need a second."""
         self._search(lambda _found: False)
-        found = self._list_control_nodes()
-        systems = [
-            RunningSystem(str(status['name']) if status else _name_of(node), node, status)
-            for node, status in zip(found, self._ask_status(found), strict=True)
+        return self._ask_status(self._list_control_nodes())
+
+    def find_silent(self, found: Iterable[RunningSystem]) -> list[int]:
+        """Return the processes of systems on this host that were not found: they say nothing."""
+        known = {find_address(_last(each.node), self._domain_id) for each in found}
+        claims = list_claims(self._domain_id)
+        return [
+            each['pid'] for each in claims if 'name' not in each and each['address'] not in known
         ]
-        return sorted(systems, key=lambda each: (each.name, each.node))
 
     def find(self, name: str | None) -> RunningSystem:
         """Return the system of this name; without one, the only system that there is.
@@ -113,9 +120,11 @@ class Client:
             self._search(lambda found: any(_last(node) == wanted for node in found))
             for node in self._list_control_nodes():
                 if _last(node) == wanted:
-                    (status,) = self._ask_status([node])
-                    return RunningSystem(name, node, status)
-        systems = self.find_all()
+                    (system,) = self._ask_status([node])
+                    return replace(system, name=name)
+            systems = self._ask_status(self._list_control_nodes())
+        else:
+            systems = self.find_all()
         if name is None and len(systems) == 1:
             return systems[0]
         raise self._explain(name, [each.name for each in systems])
@@ -157,15 +166,23 @@ class Client:
             result = self._call(client, request, system, timeout_sec).result
             return Outcome(result.successful, result.reason)
 
-    def wait_until_gone(self, system: RunningSystem, timeout_sec: float) -> bool:
-        """Wait until a system has left the graph, and its process has ended if it is local."""
-        name = _last(system.node)
-        return self._wait(
-            lambda: (
-                system.node not in self._list_control_nodes() and name not in self._list_local()
-            ),
-            timeout_sec,
-        )
+    def stop(self, system: RunningSystem, timeout_sec: float) -> bool:
+        """Stop a system, and wait until it has left the graph; return whether it has.
+
+        One on this host has left with its process, of which the graph may hear late.
+        """
+        pid = self._list_local().get(_last(system.node))
+        process = None if pid is None else _open_process(pid)
+        try:
+            self.ask(system, protocol.DOWN, STATUS_SEC)
+            if process is None:
+                return self._wait(
+                    lambda: system.node not in self._list_control_nodes(), timeout_sec
+                )
+            return bool(select.select([process], [], [], timeout_sec)[0])
+        finally:
+            if process is not None:
+                os.close(process)
 
     @contextmanager
     def _client(self, service: Any, name: str) -> Iterator[Any]:
@@ -193,8 +210,8 @@ class Client:
                 raise ComposerError(message, help='it may do it yet; --timeout waits longer')
         return future.result()
 
-    def _ask_status(self, nodes: Iterable[str]) -> list[dict[str, Any] | None]:
-        """Return what systems say of themselves, asked all at the same time."""
+    def _ask_status(self, nodes: Sequence[str]) -> list[RunningSystem]:
+        """Return systems by their names with what they say, asked all at the same time."""
         from std_srvs.srv import Trigger
 
         names = [f'{node}/{protocol.STATUS}' for node in nodes]
@@ -204,10 +221,11 @@ class Client:
         deadline = time.monotonic() + STATUS_SEC
         for call in calls:
             self._executor.spin_until_future_complete(call, max(0.0, deadline - time.monotonic()))
-        answers = [call.result().message if call.done() else '' for call in calls]
+        texts = [call.result().message if call.done() else None for call in calls]
         for client in clients:
             self._node.destroy_client(client)
-        return [read_answer(each) if each else None for each in answers]
+        systems = [_read_status(node, text) for node, text in zip(nodes, texts, strict=True)]
+        return sorted(systems, key=lambda each: (each.name, each.node))
 
     def _search(self, is_enough: Callable[[list[str]], bool]) -> None:
         """Wait until systems had the time to be found."""
@@ -218,15 +236,19 @@ class Client:
             found = self._list_control_nodes()
             if is_enough(found):
                 return True
-            has_all = local <= {_last(node) for node in found}
+            has_all = local.keys() <= {_last(node) for node in found}
             return has_all and time.monotonic() > begun + _SEARCH_SEC
 
         self._wait(is_over, _LOCAL_SEARCH_SEC)
 
-    def _list_local(self) -> set[str]:
-        """Return the names of the control nodes of the systems on this host that can be asked."""
+    def _list_local(self) -> dict[str, int]:
+        """Return the control nodes and processes of the systems here that can be asked."""
         claims = list_claims(self._domain_id)
-        return {protocol.node_name(str(each['name'])) for each in claims if each.get('is_asked')}
+        return {
+            protocol.node_name(str(each['name'])): each['pid']
+            for each in claims
+            if each.get('is_asked')
+        }
 
     def _list_control_nodes(self) -> list[str]:
         services = (name for name, _ in self._node.get_service_names_and_types())
@@ -241,10 +263,13 @@ class Client:
         if name in [each.get('name') for each in claims if not each.get('is_asked', True)]:
             message = f"system '{name}' was started with --no-control, and cannot be asked"
             return ComposerError(message)
-        silent = [str(each['pid']) for each in claims if 'name' not in each]
+        silent = {each['address']: each['pid'] for each in claims if 'name' not in each}
+        address = find_address(protocol.node_name(name or ''), self._domain_id)
+        if name and address in silent:
+            return ComposerError(f"system '{name}' (pid {silent[address]}) does not answer")
         advice = suggest(name, names, 'there are') if name else None
         if silent:
-            advice = f'process {silent[0]} runs a system, and does not answer'
+            advice = f'process {min(silent.values())} runs a system, and does not answer'
         what = f"there is no system '{name}'" if name else 'no system runs'
         return ComposerError(f'{what} on this ROS graph ({domain})', help=advice)
 
@@ -266,28 +291,29 @@ def ask_snapshot(name: str) -> Snapshot:
     """
     with Client() as client:
         outcome = client.ask(client.find(name), protocol.SNAPSHOT, _SNAPSHOT_SEC)
-    return decode_snapshot(read_answer(outcome.text))
+    return decode_snapshot(answer_forms.read_answer(outcome.text))
 
 
-def read_answer(text: str) -> dict[str, Any]:
-    """Return the data of an answer.
-
-    Raises:
-        ComposerError: It is of another version of Composer, or of somebody else.
-    """
+def _read_status(node: str, text: str | None) -> RunningSystem:
+    """Return the system at a control node, which anybody may have created."""
+    name = _last(node).removeprefix(protocol.node_name(''))
+    if text is None:
+        return RunningSystem(name, node, None, 'no answer')
     try:
-        data = json.loads(text)
-    except ValueError:
-        data = None
-    if not isinstance(data, dict) or data.get('version') != protocol.VERSION:
-        message = 'a system answers in a form that this version of Composer does not know'
-        raise ComposerError(message, help='use the version that the system runs with')
-    return data
+        status = answer_forms.read_answer(text, answer_forms.STATUS)
+    except ComposerError:
+        return RunningSystem(name, node, None, 'unknown answer')
+    if protocol.node_name(status['name']) != _last(node):
+        return RunningSystem(name, node, None, 'wrong name')
+    return RunningSystem(status['name'], node, status)
+
+
+def _open_process(pid: int) -> int | None:
+    try:
+        return os.pidfd_open(pid)
+    except ProcessLookupError:
+        return None
 
 
 def _last(node: str) -> str:
     return node.rpartition('/')[2]
-
-
-def _name_of(node: str) -> str:
-    return _last(node).removeprefix(protocol.node_name(''))

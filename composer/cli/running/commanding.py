@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.running.client import STATUS_SEC, Client
+from composer.cli.running.client import Client
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.runtime.control import protocol
 from composer.spelling import suggest
@@ -38,8 +38,7 @@ def down(name: str | None, timeout_sec: float) -> int:
     """Stop a system, and wait until it has; return the exit code."""
     with Client() as client:
         system = client.find(name)
-        client.ask(system, protocol.DOWN, STATUS_SEC)
-        if not client.wait_until_gone(system, timeout_sec):
+        if not client.stop(system, timeout_sec):
             message = f"system '{system.name}' has not stopped within {timeout_sec:g} s"
             raise ComposerError(message, help='--timeout waits longer')
     click.echo(f'{escape(system.name)}: stopped')

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from socket import gethostname
 from typing import TYPE_CHECKING
 
 import click
@@ -24,28 +25,37 @@ def list_running(*, format_name: str) -> int:
     """Print the systems that run; return the exit code."""
     with Client() as client:
         systems = client.find_all()
+        silent = client.find_silent(systems)
+    # Those are stopped, say, and so no longer on the graph.
+    unnamed = [
+        {'name': '?', 'state': 'no answer', 'host': gethostname(), 'pid': each} for each in silent
+    ]
     if format_name == 'json':
         documents = [_document(each) for each in systems]
-        click.echo(json.dumps({'version': 1, 'systems': documents}, indent=2))
+        click.echo(json.dumps({'version': 1, 'systems': documents + unnamed}, indent=2))
         return ExitCode.DONE
-    if not systems:
+    if not systems and not unnamed:
         click.echo('no system runs on this ROS graph', err=True)
         return ExitCode.DONE
     notes = [note for each in systems for note in _notes(each)]
-    click.echo('\n'.join([*render_table(_HEADER, map(_row, systems)), *notes]))
+    rows = [
+        *map(_row, systems),
+        *([str(each.get(key.lower(), '')) for key in _HEADER] for each in unnamed),
+    ]
+    click.echo('\n'.join([*render_table(_HEADER, rows), *notes]))
     return ExitCode.DONE
 
 
 def _document(system: RunningSystem) -> dict[str, object]:
     if system.status is None:
-        return {'name': system.name, 'state': 'no answer'}
+        return {'name': system.name, 'state': system.problem}
     return {key: value for key, value in system.status.items() if key != 'version'}
 
 
 def _row(system: RunningSystem) -> tuple[str, ...]:
     status = system.status
     if status is None:
-        return (system.name, 'no answer', *[''] * (len(_HEADER) - 2))
+        return (system.name, system.problem, *[''] * (len(_HEADER) - 2))
     health, last = status['health'], status['last_reload']
     reload = ''
     if last is not None:

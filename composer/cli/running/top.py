@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.cli.running.client import STATUS_SEC, Client, read_answer
+from composer.cli.running import answer_forms
+from composer.cli.running.client import STATUS_SEC, Client
 from composer.cli.running.top_table import render_entities, select_entities
 from composer.errors import ComposerError, ExitCode
 from composer.runtime.control import protocol
@@ -61,7 +62,7 @@ def _print(document: dict[str, Any], view: View, format_name: str) -> None:
 def _read(outcome: Outcome) -> dict[str, Any]:
     if not outcome.succeeded:
         raise ComposerError(outcome.text)
-    return read_answer(outcome.text)
+    return answer_forms.read_answer(outcome.text, answer_forms.TOP)
 
 
 def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:

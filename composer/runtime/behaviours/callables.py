@@ -27,6 +27,10 @@ class BehaviourImportError(ComposerError):
     """A behaviour's module cannot be imported, or has no such function."""
 
 
+class ImportAbandonedError(BaseException):
+    """Raised in a thread that imports, to end it."""
+
+
 def import_module(name: str) -> ModuleType:
     """Return a module.
 

@@ -38,7 +38,7 @@ class NameClaim:
     """
 
     def __init__(self, node: str, domain_id: int) -> None:
-        self._address = _address(node, domain_id)
+        self._address = find_address(node, domain_id)
         self._socket: socket.socket | None = None
 
     def take(self, about: dict[str, Any]) -> dict[str, Any] | None:
@@ -82,15 +82,19 @@ class NameClaim:
 
 
 def list_claims(domain_id: int) -> list[dict[str, Any]]:
-    """Return what the systems on this host say of themselves that are on the same graph."""
-    prefix = f'@{_address("", domain_id)[1:]}'
+    """Return what the systems on this host say of themselves that are on the same graph.
+
+    The `address` of their socket and the `pid` are known even of those that say nothing.
+    """
+    prefix = f'@{find_address("", domain_id)[1:]}'
     try:
         text = Path('/proc/net/unix').read_text(encoding='utf-8', errors='replace')
     except OSError:
         return []
     names = {each for each in re.findall(r'@\S+$', text, re.MULTILINE) if each.startswith(prefix)}
-    found = [ask(f'\0{name[1:]}') for name in sorted(names)]
-    return [each for each in found if each]
+    addresses = [f'\0{name[1:]}' for name in sorted(names)]
+    asked = ((address, ask(address)) for address in addresses)
+    return [{**each, 'address': address} for address, each in asked if each]
 
 
 def ask(address: str) -> dict[str, Any] | None:
@@ -111,7 +115,8 @@ def ask(address: str) -> dict[str, Any] | None:
     return {**about, 'pid': pid} if isinstance(about, dict) else {'pid': pid}
 
 
-def _address(node: str, domain_id: int) -> str:
+def find_address(node: str, domain_id: int) -> str:
+    """Return the address of the socket of a control node; without one, how all addresses begin."""
     graph = '\0'.join(os.environ.get(name, '') for name in _GRAPH_VARIABLES)
     digests = [hashlib.sha256(each.encode()).hexdigest()[:16] for each in (graph, node) if each]
     own = digests[1] if node else ''

@@ -21,6 +21,7 @@ from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
+from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -76,11 +77,17 @@ class Rewiring:
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
-    def wait_for_goals(self, plan: Plan, aborts: Callable[[], bool]) -> None:
+    def wait_for_goals(
+        self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
         """Wait until no goal is in flight of an action that goes; it accepts no more.
 
         Args:
-            aborts: Returns whether the goals are aborted; asked again and again.
+            aborts: Returns whether the goals are aborted; asked again and again, as the next.
+            is_outdated: Returns whether there is a newer edit.
+
+        Raises:
+            ComposerError: There is one, and everything is as before.
         """
         servers = list(self._going_actions(plan))
         for server in servers:
@@ -88,6 +95,10 @@ class Rewiring:
             self._undo.append(partial(server.retire, is_retired=False))
         was_told = False
         while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
+            if is_outdated():
+                self._undo_all()
+                message = 'the files have changed while goals were waited for'
+                raise StartError(message)
             if aborts():
                 for server in servers:
                     server.retire(is_retired=True, aborts=True)
@@ -96,12 +107,16 @@ class Rewiring:
                 system_logger.info('reload: waiting for the goals in flight of actions that go…')
             sleep(_POLL_SEC)
 
-    def apply(self, plan: Plan) -> None:
+    def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
         """Do all that a plan says.
+
+        Args:
+            is_outdated: Returns whether there is a newer edit, for which an `on_start` is left.
 
         Raises:
             ComposerError: Something failed, and everything is as before.
         """
+        self._handle.is_outdated = is_outdated
         try:
             self._refuse_restart(plan)
             self._read_as(self._new)
@@ -117,6 +132,8 @@ class Rewiring:
         except BaseException:
             self._undo_all()
             raise
+        finally:
+            self._handle.is_outdated = never
         for finish in self._finish:
             finish()
 
@@ -141,6 +158,7 @@ class Rewiring:
                 raise StartError(message, help='stop the system, and start it again')
 
     def _undo_all(self) -> None:
+        self._handle.is_outdated = never
         self._read_as(self._old)
         for undo in reversed(self._undo):
             try:
@@ -235,8 +253,8 @@ class Rewiring:
 
         def remove_all() -> None:
             for name in node_names:
-                if name in self._nodes:
-                    self._restarter.remove(name)
+                if name in self._nodes and not self._restarter.remove(name):
+                    self._restarter.leave(name)
             for name in process_names:
                 if name in self._processes.by_name:
                     self._processes.remove(name)

@@ -150,10 +150,59 @@ def test_a_system_that_cannot_answer_is_told_of(compose, composer, monkeypatch):
     os.kill(child.pid, signal.SIGSTOP)
     try:
         code, _, errors = composer('reload', 'system')
+        listed = composer('ps')[1]
     finally:
         os.kill(child.pid, signal.SIGCONT)
     assert code == 1
-    assert errors.endswith(f'process {child.pid} runs a system, and does not answer\n')
+    assert errors == f"error: system 'system' (pid {child.pid}) does not answer\n"
+    assert listed.splitlines()[1].split() == [
+        *('?', 'no', 'answer', socket.gethostname(), str(child.pid))
+    ]
+
+
+def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
+    from std_srvs.srv import Trigger
+
+    def pretend(name, text):
+        def answer(_, response):
+            response.message = text
+            return response
+
+        peer.run(peer.node.create_service, Trigger, f'/_composer_{name}/status', answer)
+
+    known = {
+        'version': 1,
+        'name': 'third',
+        'file': '',
+        'host': '\x1b[31m',
+        'state': 'running',
+        'pid': 1,
+        'uptime_sec': 1,
+        'last_error': '',
+        'last_reload': None,
+        'health': None,
+    }
+    pretend('first', '{')
+    pretend('second', json.dumps({**known, 'nodes': []}))
+    pretend('third', json.dumps({**known, 'nodes': ['/a', '/b']}))
+    code, output, _ = composer('ps')
+    assert code == 0
+    assert [line.split()[:3] for line in output.splitlines()[1:]] == [
+        ['first', 'unknown', 'answer'],
+        ['second', 'wrong', 'name'],
+        ['third', 'running', '-'],
+    ]
+    assert '\x1b' not in output
+    assert composer('top', 'first', '--once')[0] == 1
+
+
+def test_a_system_that_is_ended_by_force_has_stopped(compose, composer):
+    text = SYSTEM.replace('  stuck:', '  stuck:\n    on_stop: parts:hang')
+    child = compose(text, CODE + '\ndef hang(node):\n    time.sleep(3600)\n')
+    child.wait_until_ready()
+    # The graph hears of its end only after 20 s.
+    assert composer('down', '--timeout', '15') == (0, 'system: stopped\n', '')
+    assert child.wait() == 1
 
 
 SLOW_ACTION = """
