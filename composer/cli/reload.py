@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from composer.planning.plan import Operation, Plan
     from composer.planning.snapshot import Snapshot
     from composer.runtime.health.system_state import Outcome
+    from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
 
 _RUNS_ON = 'the system runs on as it was'
@@ -198,9 +199,16 @@ class Reloader:
             snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
-        with fresh_modules(stale, snapshot.sources, search_path):
+        with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
+
+            def import_all() -> Reading | None:
+                reading = import_reading(context, snapshot, findings.extend)
+                if reading is not None:
+                    import_rest()
+                return reading
+
             reading = import_with_patience(
-                lambda: import_reading(context, snapshot, findings.extend),
+                import_all,
                 lambda: system.stop_requested or self._is_outdated(),
                 snapshot.sources,
             )
