@@ -72,6 +72,7 @@ class NodeRestarter:
 
     Attributes:
         lock: Held while a node is rebuilt, for nothing to stop an incomplete node.
+        left: The nodes that were removed although something in them hung.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class NodeRestarter:
         system: SystemHandle,
     ) -> None:
         self.lock = threading.Lock()
+        self.left: list[LiveNode] = []
         self._nodes = nodes
         self._starter = starter
         self._system = system
@@ -117,6 +119,14 @@ class NodeRestarter:
         if has_ended:
             del self._nodes[full_name]
         return has_ended
+
+    def leave(self, full_name: str) -> None:
+        """Remove a node that hangs; only the thread of what hangs is left."""
+        node = self._nodes.pop(full_name)
+        self.left.append(node)
+        node.gate.close()
+        self._system.executor.remove_node(node.ros)
+        node.destroy()
 
     def _build(self, old: LiveNode) -> None:
         (node,) = self._starter.create([old.spec])

@@ -40,6 +40,11 @@ class ServiceFailures:
             return self._times.get(service, float('-inf')) >= begun
 
 
+def never() -> bool:
+    """Return `False`."""
+    return False
+
+
 @dataclass(slots=True)
 class SystemHandle:
     """What nodes need of the system that they belong to.
@@ -57,6 +62,7 @@ class SystemHandle:
         without_parameter_services: The full names of the nodes that have none.
         stop_timeout_sec: What running behaviours get to end.
         health: The health of the system's entities.
+        is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
     """
 
     context: Context
@@ -72,3 +78,4 @@ class SystemHandle:
     without_parameter_services: frozenset[str]
     stop_timeout_sec: float
     health: HealthRegistry
+    is_outdated: Callable[[], bool] = never

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from typing import TYPE_CHECKING, Any
 
+from composer.runtime.behaviours.callables import import_module
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
@@ -55,8 +57,8 @@ def fresh_modules(
 ) -> Iterator[Callable[[], None]]:
     """Let imports make new modules in place of those that are stale.
 
-    Yields what puts the old modules back as if nothing had been imported, which is also done if
-    the block raises.
+    If the block raises, the old modules are back as if nothing had been imported. Yields what
+    imports those that functions import when they run, for the errors in them to be found now.
 
     Args:
         stale: The full names of the modules to execute anew.
@@ -76,11 +78,16 @@ def fresh_modules(
         for each in new_folders:
             sys.path.remove(each)
 
+    def import_rest() -> None:
+        for name in sorted(before.keys() & set(stale)):
+            if sources[name]:
+                import_module(name)
+
     finder: Any = _Finder(sources)
     sys.meta_path.insert(0, finder)
     importlib.invalidate_caches()
     try:
-        yield put_back
+        yield import_rest
     except BaseException:
         put_back()
         raise

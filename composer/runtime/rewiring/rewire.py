@@ -21,6 +21,7 @@ from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
+from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import NodeStarter
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
 _SETTLE_SEC = 0.05
@@ -76,34 +78,34 @@ class Rewiring:
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
-    def wait_for_goals(self, plan: Plan, aborts: Callable[[], bool]) -> None:
+    def wait_for_goals(
+        self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
         """Wait until no goal is in flight of an action that goes; it accepts no more.
 
         Args:
-            aborts: Returns whether the goals are aborted; asked again and again.
+            aborts: Returns whether the goals are aborted; asked again and again, as the next.
+            is_outdated: Returns whether there is a newer edit.
+
+        Raises:
+            ComposerError: There is one, and everything is as before.
         """
         servers = list(self._going_actions(plan))
         for server in servers:
-            server.retire(is_retired=True)
             self._undo.append(partial(server.retire, is_retired=False))
-        was_told = False
-        while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
-            if aborts():
-                for server in servers:
-                    server.retire(is_retired=True, aborts=True)
-            elif not was_told:
-                was_told = True
-                system_logger.info('reload: waiting for the goals in flight of actions that go…')
-            sleep(_POLL_SEC)
+        wait_for_goals(servers, self._handle.stop, aborts, is_outdated)
 
-    def apply(self, plan: Plan) -> None:
+    def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
         """Do all that a plan says.
+
+        Args:
+            is_outdated: Returns whether there is a newer edit, for which an `on_start` is left.
 
         Raises:
             ComposerError: Something failed, and everything is as before.
         """
+        self._handle.is_outdated = is_outdated
         try:
-            self._refuse_restart(plan)
             self._read_as(self._new)
             clashing = find_clashing_ends(self._old.spec, self._new.spec)
             at_first = self._are_in_the_way(plan, clashing)
@@ -117,6 +119,8 @@ class Rewiring:
         except BaseException:
             self._undo_all()
             raise
+        finally:
+            self._handle.is_outdated = never
         for finish in self._finish:
             finish()
         self._forget_health()
@@ -134,14 +138,8 @@ class Rewiring:
             actions: dict[str, Any] = node.entities['actions']
             yield from actions.values() if section == 'nodes' else [actions[name]]
 
-    def _refuse_restart(self, plan: Plan) -> None:
-        for operation in plan.operations:
-            if operation.noun == 'system' and operation.action is Action.RECREATE:
-                changes = ' and '.join(sorted({each.key for each in operation.changes}))
-                message = f'{changes} cannot change while the system runs: {operation.reason}'
-                raise StartError(message, help='stop the system, and start it again')
-
     def _undo_all(self) -> None:
+        self._handle.is_outdated = never
         self._read_as(self._old)
         for undo in reversed(self._undo):
             try:
@@ -238,8 +236,8 @@ class Rewiring:
 
         def remove_all() -> None:
             for name in node_names:
-                if name in self._nodes:
-                    self._restarter.remove(name)
+                if name in self._nodes and not self._restarter.remove(name):
+                    self._restarter.leave(name)
             for name in process_names:
                 if name in self._processes.by_name:
                     self._processes.remove(name)
@@ -366,6 +364,39 @@ class Rewiring:
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             self._finish.append(partial(node.forget, operation.noun, name))
+
+
+def wait_for_goals(
+    servers: Collection[ActionServer],
+    stop: StopRequest,
+    aborts: Callable[[], bool],
+    is_outdated: Callable[[], bool],
+) -> None:
+    """Let actions accept no more goals, and wait until none is in flight, or for a stop.
+
+    Args:
+        aborts: Returns whether the goals are aborted; asked again and again.
+        is_outdated: Returns whether there is a newer edit; asked again and again.
+
+    Raises:
+        StartError: There is; the actions accept goals again.
+    """
+    for server in servers:
+        server.retire(is_retired=True)
+    was_told = False
+    while any(each.has_goals for each in servers) and not stop.is_set:
+        if is_outdated():
+            for server in servers:
+                server.retire(is_retired=False)
+            message = 'the files have changed while goals were waited for'
+            raise StartError(message)
+        if aborts():
+            for server in servers:
+                server.retire(is_retired=True, aborts=True)
+        elif not was_told:
+            was_told = True
+            system_logger.info('reload: waiting for the goals in flight of actions that go…')
+        sleep(_POLL_SEC)
 
 
 def _create_again(node: LiveNode, section: str, spec: Any) -> None:
