@@ -232,6 +232,8 @@ def _set(data, owner, last, value):
     """Set or remove a key at a path; what stands in its way becomes its long form."""
     at = data
     for index, key in enumerate(owner):
+        if isinstance(at, list) and not isinstance(key, int):
+            return
         inner = at[key] if isinstance(at, list) else at.get(key)
         if not isinstance(inner, dict | list):
             names = [_LONG_FORMS[each] for each in owner[: index + 1] if each in _LONG_FORMS]
