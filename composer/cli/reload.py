@@ -11,13 +11,18 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
+import click
+
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import import_reading
+from composer.cli.rehearsal import rehearse
 from composer.cli.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
+from composer.interfaces.declared_packages import import_declared
+from composer.interfaces.search_paths import extend_variables
 from composer.language.paths import PathError, resolve_path
-from composer.planning.differences import compare
+from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
 from composer.python_source.module_finder import project_search_path
@@ -29,12 +34,14 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.cli.common.system_reader import SystemReader
     from composer.diagnostics import Diagnostic
-    from composer.planning.plan import Plan
+    from composer.planning.plan import Operation, Plan
     from composer.planning.snapshot import Snapshot
     from composer.runtime.health.system_state import Outcome
+    from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
 
 _RUNS_ON = 'the system runs on as it was'
+_STOPS = 'the system stops'
 # How often files are looked at while something is waited for.
 _LOOK_SEC = 0.2
 _NO_CHANGE = 'nothing has changed'
@@ -114,6 +121,8 @@ class Reloader:
             was_good = not self._failure
             self._show(findings)
             text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}' if plan else _NO_CHANGE
+            if system.starts_again:
+                text = f'the system starts again: {summarize(plan)}'
             if plan or not was_good:
                 system_logger.info(text if plan else _GOOD_AGAIN)
             system.state.note_reload(Outcome(succeeded=True, text=text))
@@ -182,11 +191,24 @@ class Reloader:
         context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
         self._files.also_follow(_list_files(context))
+        if cause := find_new_start(system.snapshot, snapshot):
+            self._start_again(system, cause, is_whole)
+            return compare(system.snapshot, snapshot)
+        if snapshot.definitions != system.snapshot.definitions:
+            self._add_packages(system, context)
+            snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
-        with fresh_modules(stale, snapshot.sources, search_path):
+        with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
+
+            def import_all() -> Reading | None:
+                reading = import_reading(context, snapshot, findings.extend)
+                if reading is not None:
+                    import_rest()
+                return reading
+
             reading = import_with_patience(
-                lambda: import_reading(context, snapshot, findings.extend),
+                import_all,
                 lambda: system.stop_requested or self._is_outdated(),
                 snapshot.sources,
             )
@@ -196,10 +218,41 @@ class Reloader:
                 raise _HalfWrittenError
             plan = system.rewire(reading, self._aborts_goals.is_set, self._is_outdated)
             if system.stop_requested:
-                message = 'the system stops'
-                raise ComposerError(message)
+                raise ComposerError(_STOPS)
         self._files.follow([*self._paths, *_list_files(context)])
         return plan
+
+    def _start_again(self, system: System, cause: Operation, is_whole: Callable[[], bool]) -> None:
+        """Have the whole system start again, if it can."""
+        from composer.runtime.logs import system_logger
+
+        changes = ' and '.join(sorted({each.key for each in cause.changes}))
+        if not system.can_start_again:
+            message = f'{changes} cannot change while the system runs: {cause.reason}'
+            raise ComposerError(
+                message, help='end the program that it runs in, and start that again'
+            )
+        if not is_whole():
+            raise _HalfWrittenError
+        system_logger.info(
+            f'reload: the system must start again, because of {changes}; rehearsing'
+        )
+        rehearse(system, self._is_outdated)
+        if not is_whole():
+            raise _HalfWrittenError
+        system.start_again(self._aborts_goals.is_set, self._is_outdated)
+        if not system.starts_again:
+            raise ComposerError(_STOPS)
+
+    def _add_packages(self, system: System, context: CheckContext) -> None:
+        """Build and import the interface packages that were not declared before."""
+        if system.can_start_again:
+            # Another process can be ended whatever it does.
+            rehearse(system, self._is_outdated)
+        self._prefixes = import_declared(
+            context.interfaces, lambda line: click.echo(line, err=True)
+        )
+        os.environ.update(extend_variables(os.environ, self._prefixes))
 
     def _is_outdated(self) -> bool:
         """Return whether the files have changed since they were read; looks at them at times."""

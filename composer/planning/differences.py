@@ -116,12 +116,18 @@ def compare(old: Snapshot, new: Snapshot) -> Plan:
     return Plan(new.spec.name, tuple(_Comparison(old, new).operations()))
 
 
+def find_new_start(old: Snapshot, new: Snapshot) -> Operation | None:
+    """Return why the whole system must start again to become that of `new`; `None` if not."""
+    found = _Comparison(old, new).compare_system()
+    return next((each for each in found if each.action is Action.RECREATE), None)
+
+
 class _Comparison:
     def __init__(self, old: Snapshot, new: Snapshot) -> None:
         self._old, self._new = old, new
 
     def operations(self) -> Iterator[Operation]:
-        yield from self._compare_system()
+        yield from self.compare_system()
         old, new = self._old.spec, self._new.spec
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
@@ -131,7 +137,7 @@ class _Comparison:
         for full_name in dict.fromkeys([*before, *after]):
             yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
 
-    def _compare_system(self) -> Iterator[Operation]:
+    def compare_system(self) -> Iterator[Operation]:
         old, new = self._reading(self._old), self._reading(self._new)
         changes = [*compare_fields(old, new, _OF_THE_SYSTEM), *self._changed_packages(old, new)]
         if changes:
@@ -141,12 +147,14 @@ class _Comparison:
 
     def _changed_packages(self, old: Reading, new: Reading) -> Iterator[Change]:
         """Yield the packages that are loaded, and are others now."""
-        before, after = self._old.definitions, self._new.definitions
-        loaded = {package for package, _ in before}
-        differing = {at[0] for at in {**before, **after} if before.get(at) != after.get(at)}
-        for package in sorted(loaded & differing):
+        loaded, present = self._old.definitions, self._new.definitions
+        packages = {package for package, _ in loaded}
+        differing = {at[0] for at in {**loaded, **present} if loaded.get(at) != present.get(at)}
+        for package in sorted(packages & differing):
             key = f'interfaces.{package}'
-            yield Change(key, None, None, old.find_span(key), new.find_span(key), is_code=True)
+            before, after = (each.record.interfaces.get(package) for each in (old, new))
+            spans = old.find_span(key), new.find_span(key)
+            yield Change(key, before, after, spans[0], spans[1], is_code=after is not None)
 
     def _compare_nodes(
         self, full_name: str, old: NodeSpec | None, new: NodeSpec | None

@@ -72,6 +72,7 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
     definitions = {
         (package.package, name): text
         for package in context.interfaces.definitions or ()
+        if package.package in context.interfaces.folders
         for name, text in package.sources.items()
     }
     reachable = sources.reachable(modules)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import NodeStarter
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
 _SETTLE_SEC = 0.05
@@ -91,21 +92,8 @@ class Rewiring:
         """
         servers = list(self._going_actions(plan))
         for server in servers:
-            server.retire(is_retired=True)
             self._undo.append(partial(server.retire, is_retired=False))
-        was_told = False
-        while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
-            if is_outdated():
-                self._undo_all()
-                message = 'the files have changed while goals were waited for'
-                raise StartError(message)
-            if aborts():
-                for server in servers:
-                    server.retire(is_retired=True, aborts=True)
-            elif not was_told:
-                was_told = True
-                system_logger.info('reload: waiting for the goals in flight of actions that go…')
-            sleep(_POLL_SEC)
+        wait_for_goals(servers, self._handle.stop, aborts, is_outdated)
 
     def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
         """Do all that a plan says.
@@ -118,7 +106,6 @@ class Rewiring:
         """
         self._handle.is_outdated = is_outdated
         try:
-            self._refuse_restart(plan)
             self._read_as(self._new)
             clashing = find_clashing_ends(self._old.spec, self._new.spec)
             at_first = self._are_in_the_way(plan, clashing)
@@ -136,6 +123,7 @@ class Rewiring:
             self._handle.is_outdated = never
         for finish in self._finish:
             finish()
+        self._forget_health()
 
     def _going_actions(self, plan: Plan) -> Iterable[ActionServer]:
         for operation in plan.operations:
@@ -150,13 +138,6 @@ class Rewiring:
             actions: dict[str, Any] = node.entities['actions']
             yield from actions.values() if section == 'nodes' else [actions[name]]
 
-    def _refuse_restart(self, plan: Plan) -> None:
-        for operation in plan.operations:
-            if operation.noun == 'system' and operation.action is Action.RECREATE:
-                changes = ' and '.join(sorted({each.key for each in operation.changes}))
-                message = f'{changes} cannot change while the system runs: {operation.reason}'
-                raise StartError(message, help='stop the system, and start it again')
-
     def _undo_all(self) -> None:
         self._handle.is_outdated = never
         self._read_as(self._old)
@@ -165,6 +146,11 @@ class Rewiring:
                 undo()
             except Exception as error:  # noqa: BLE001 - the rest must be undone
                 system_logger.error(f'reload: something could not be undone: {error}')
+        self._forget_health()
+
+    def _forget_health(self) -> None:
+        """Forget the health of behaviours that are gone, or were not to come after all."""
+        self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
 
     def _read_as(self, reading: Reading) -> None:
         """Let what is created from now on, and what errors tell of places, be of these files."""
@@ -204,7 +190,7 @@ class Rewiring:
             ]
 
         nodes = self._nodes
-        removed = {name: nodes[name] for name in targets('nodes', Action.REMOVE)}
+        removed = targets('nodes', Action.REMOVE)
         self._end_nodes(targets('nodes', Action.RECREATE))
         self._end_nodes(name for name in removed if name in clashing)
         self._end_processes(targets('processes', Action.RECREATE))
@@ -213,10 +199,9 @@ class Rewiring:
             process = self._processes.by_name[name]
             self._undo.append(partial(process.change, process.spec))
             process.change(self._new.spec.processes[name])
-        for full_name, node in removed.items():
+        for full_name in removed:
             if full_name in nodes:
                 self._finish.append(partial(self._restarter.remove, full_name))
-            self._finish.append(node.forget_all)
         for name in targets('processes', Action.REMOVE):
             self._finish.append(partial(self._processes.remove, name))
 
@@ -231,9 +216,7 @@ class Rewiring:
 
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
-        vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
-        if node.parameters:
-            again.ros.set_parameters(node.ros.get_parameters(sorted(node.parameters.set_live)))
+        again.take_over(node)
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
@@ -381,6 +364,39 @@ class Rewiring:
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             self._finish.append(partial(node.forget, operation.noun, name))
+
+
+def wait_for_goals(
+    servers: Collection[ActionServer],
+    stop: StopRequest,
+    aborts: Callable[[], bool],
+    is_outdated: Callable[[], bool],
+) -> None:
+    """Let actions accept no more goals, and wait until none is in flight, or for a stop.
+
+    Args:
+        aborts: Returns whether the goals are aborted; asked again and again.
+        is_outdated: Returns whether there is a newer edit; asked again and again.
+
+    Raises:
+        StartError: There is; the actions accept goals again.
+    """
+    for server in servers:
+        server.retire(is_retired=True)
+    was_told = False
+    while any(each.has_goals for each in servers) and not stop.is_set:
+        if is_outdated():
+            for server in servers:
+                server.retire(is_retired=False)
+            message = 'the files have changed while goals were waited for'
+            raise StartError(message)
+        if aborts():
+            for server in servers:
+                server.retire(is_retired=True, aborts=True)
+        elif not was_told:
+            was_told = True
+            system_logger.info('reload: waiting for the goals in flight of actions that go…')
+        sleep(_POLL_SEC)
 
 
 def _create_again(node: LiveNode, section: str, spec: Any) -> None:
