@@ -79,8 +79,8 @@ def fresh_modules(
             sys.path.remove(each)
 
     def import_rest() -> None:
-        for name in sorted(before.keys() & set(stale)):
-            if sources[name]:
+        for name in sorted(stale):
+            if before[name] is not None and sources.get(name):
                 import_module(name)
 
     finder: Any = _Finder(sources)

@@ -35,8 +35,10 @@ def loaded(tmp_path, monkeypatch):
 @contextmanager
 def stale(*names, **sources):
     texts = {**TEXTS, **{name.replace('__', '.'): text for name, text in sources.items()}}
-    with fresh_modules(names, {name: text for name, text in texts.items() if text is not None}):
+    found = {name: text for name, text in texts.items() if text is not None}
+    with fresh_modules(names, found) as import_rest:
         yield importlib.import_module('fresh_parts')
+        import_rest()
 
 
 def test_a_module_that_is_imported_from_its_package_is_a_new_one(loaded):
@@ -58,3 +60,10 @@ def test_a_module_that_is_gone_cannot_be_imported_and_comes_back_after_that(load
     assert {name: sys.modules.get(name) for name in TEXTS} == loaded
     assert loaded['fresh_pack'].inner is loaded['fresh_pack.inner']
     assert loaded['fresh_pack'].low is loaded['fresh_pack.low']
+
+
+def test_a_module_that_nothing_imports_any_more_is_forgotten(loaded):
+    with stale('fresh_parts', 'fresh_pack.low', fresh_parts='', fresh_pack__low=None):
+        pass
+    assert 'fresh_pack.low' not in sys.modules
+    assert not hasattr(loaded['fresh_pack'], 'low')
