@@ -209,8 +209,9 @@ class Rewiring:
         """End nodes that are recreated; to undo that, they begin again with their state."""
         for full_name in names:
             node = self._nodes[full_name]
-            if not self._restarter.remove(full_name):
-                message = f"node '{node.spec.key}' cannot be recreated, because it hangs"
+            if not self._restarter.make_way(full_name):
+                calls = ', '.join(str(call.owner) for call in node.running.calls())
+                message = f"node '{node.spec.key}' cannot be recreated, because it hangs: {calls}"
                 raise StartError(message)
             self._undo.append(partial(self._begin_again, node))
 
@@ -236,8 +237,8 @@ class Rewiring:
 
         def remove_all() -> None:
             for name in node_names:
-                if name in self._nodes and not self._restarter.remove(name):
-                    self._restarter.leave(name)
+                if name in self._nodes:
+                    self._restarter.remove(name)
             for name in process_names:
                 if name in self._processes.by_name:
                     self._processes.remove(name)
