@@ -11,6 +11,9 @@ from rclpy.logging import get_logger
 from composer.entity_kinds import ENTITY_KINDS
 from composer.runtime.nodes.behaviour_node import Node
 
+# What a process need not know while it runs.
+_NOT_OF_PROCESSES = ('path', 'wait_for', 'description')
+
 
 def describe(system):
     """Return all that a system is."""
@@ -139,7 +142,7 @@ def group_of(node, group):
 
 def describe_process(process):
     spec = process.spec
-    names = [each for each in spec.__dataclass_fields__ if each not in ('path', 'wait_for')]
+    names = [each for each in spec.__dataclass_fields__ if each not in _NOT_OF_PROCESSES]
     return {**{name: repr(getattr(spec, name)) for name in names}, 'state': process.state}
 
 

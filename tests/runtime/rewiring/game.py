@@ -16,7 +16,7 @@ from composer.planning.differences import compare
 from composer.planning.plan import Action
 from composer.runtime import system as system_module
 from composer.runtime.rewiring.rewire import Rewiring
-from tests.running import PATIENCE_SEC
+from tests.running import DEADLINE_SEC
 from tests.runtime.rewiring.descriptions import describe
 from tests.runtime.rewiring.edits import Project
 from tests.runtime.rewiring.fresh_start import (
@@ -199,7 +199,7 @@ class Game:
 
     def _check_graph(self, expected, done):
         """Wait until the observer sees what it should: what others do comes to it later."""
-        deadline = monotonic() + PATIENCE_SEC
+        deadline = monotonic() + DEADLINE_SEC
         while (seen := see_graph(self._observer.node)[0]) != expected:
             if monotonic() > deadline:
                 _check_same(expected, seen, done)

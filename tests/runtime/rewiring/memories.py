@@ -89,7 +89,9 @@ def _remember_entity(system, node, kind, name):
 
 
 def read_phase(timer):
-    """Return the time of a timer's next tick, its period, both in ns, and whether it ticks."""
+    """Return when a timer ticks next; `None` if simulated time tells."""
+    if getattr(timer.clock, 'ros_time_is_active', False):
+        return None
     while not timer.is_canceled():
         begun_ns = monotonic_ns()
         left_ns = timer.time_until_next_call()
@@ -144,7 +146,9 @@ def _is_same(old, new):
     if isinstance(old, dict):
         # State that was not there before is new.
         return all(new[key] == value for key, value in old.items() if key in new)
-    return old == new
+    if isinstance(old, Phase) and new is None:
+        return True
+    return old is None or old == new
 
 
 def _stays(key, operation):
