@@ -70,6 +70,8 @@ _LOST = {
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
 }
+# One that is recreated keeps it.
+_WITH_OWN_STATE = ('subscriptions', 'timers', 'services', 'actions')
 _ENTITIES = {
     kind.section: _PARAMETERS
     if kind.section == 'parameters'
@@ -211,6 +213,8 @@ class _Comparison:
             yield Operation(Action.ADD, rules.noun, target, _name(new), span)
         elif new is None:
             span, lost = self._old.positions.key(old.path), (rules.lost,)
+            if target[1] in _WITH_OWN_STATE:
+                lost = (*lost, 'own_state')
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
         elif old is not new:
             readings = (

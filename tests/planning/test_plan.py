@@ -197,6 +197,15 @@ EDITS = [
             "+ node '/far/listener' (15)",
         ],
     ),
+    (
+        '      say:',
+        '      tell:',
+        None,
+        [
+            "- timer 'say' of 'talker' (13); lost: its phase, own_state",
+            "+ timer 'tell' of 'talker' (13)",
+        ],
+    ),
     ('qos: near}', 'qos: near, topic: /words}', None, []),
     ('  listener:', '  listener:\n    description: It hears.', None, []),
     ('version: 1', '# nothing\nversion: 1', None, []),
