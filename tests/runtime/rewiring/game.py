@@ -59,6 +59,7 @@ class Game:
         self._plan = None
         self.applied = 0
         project.keep()
+        self._check_graph(see_graph(system._nodes[WITNESS].ros)[0], 'the start')
 
     def play(self, done=None):
         """Edit, reload, and compare; return the edits, and what came of them."""
