@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import import_reading
+from composer.cli.common.told_findings import ToldFindings, with_findings
 from composer.cli.rehearsal import rehearse
 from composer.cli.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
@@ -26,7 +26,6 @@ from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
 from composer.python_source.module_finder import project_search_path
-from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -74,8 +73,7 @@ class Reloader:
         self._files = WatchedFiles([*self._paths, *_list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
-        self._warnings = _warnings_in(told)
-        self._failure = ''
+        self._told = ToldFindings(told)
         self._next_look = 0.0
 
     def reload(self, system: System) -> Outcome:
@@ -106,7 +104,7 @@ class Reloader:
                     continue
                 except ComposerError as error:
                     text = f'not reloaded: {error}'
-                    if not system.stop_requested and self._show(findings, text):
+                    if not system.stop_requested and self._told.show(findings, text):
                         system_logger.error(text)
                     errors = [
                         f'{each.span or each.file}: {each.message}'
@@ -115,39 +113,18 @@ class Reloader:
                     ]
                     told = Outcome(succeeded=False, text='; '.join(errors) or text)
                     system.state.note_reload(told)
-                    return Outcome(succeeded=False, text=_with_findings(findings, text))
+                    return Outcome(succeeded=False, text=with_findings(findings, text))
                 break
             took_ms = (monotonic() - begun) * 1000
-            was_good = not self._failure
-            self._show(findings)
+            was_good = not self._told.failure
+            self._told.show(findings)
             text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}' if plan else _NO_CHANGE
             if system.starts_again:
                 text = f'the system starts again: {summarize(plan)}'
             if plan or not was_good:
                 system_logger.info(text if plan else _GOOD_AGAIN)
             system.state.note_reload(Outcome(succeeded=True, text=text))
-            return Outcome(succeeded=True, text=_with_findings(findings, text))
-
-    def _show(self, findings: Sequence[Diagnostic], failure: str = '') -> bool:
-        """Print what was not told before; return whether there are errors that were not.
-
-        Args:
-            failure: Why the system is not reloaded, if it is not.
-        """
-        told = self._warnings
-        # Errors hide some.
-        self._warnings = _warnings_in(findings) | (told if failure else set())
-        errors = [each for each in findings if has_errors([each])]
-        # Without errors in the files something was tried, and failed again.
-        failure = _with_findings(errors, failure) if errors else failure
-        is_new = not errors or failure != self._failure
-        self._failure = failure
-        show_findings(
-            each
-            for each in findings
-            if (is_new if has_errors([each]) else _key_of(each) not in told)
-        )
-        return is_new
+            return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def reload_now(self, system: System) -> Outcome:
         """Do as `reload`, but abort goals; also those that another reload waits for."""
@@ -167,9 +144,9 @@ class Reloader:
                 context = self._check(findings)
                 new = take_snapshot(context, self._prefixes)
             except ComposerError as error:
-                return Outcome(succeeded=False, text=_with_findings(findings, str(error)))
+                return Outcome(succeeded=False, text=with_findings(findings, str(error)))
             text = render_plan(compare(system.snapshot, new)).rstrip('\n')
-        return Outcome(succeeded=True, text=_with_findings(findings, text))
+        return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def _rewire(
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
@@ -326,20 +303,6 @@ def _loses_parts(old: Snapshot, new: Snapshot) -> bool:
         before.nodes.keys() - after.nodes.keys()
         or before.processes.keys() - after.processes.keys()
     )
-
-
-def _key_of(finding: Diagnostic) -> tuple[str, str, str]:
-    """Return what a finding is known by; its line changes with what is written above it."""
-    return str(finding.file), finding.rule, finding.message
-
-
-def _warnings_in(findings: Iterable[Diagnostic]) -> set[tuple[str, str, str]]:
-    return {_key_of(each) for each in findings if not has_errors([each])}
-
-
-def _with_findings(findings: list[Diagnostic], text: str) -> str:
-    """Return a text after the findings that belong to it."""
-    return '\n'.join([*(render_finding(each) + '\n' for each in findings), text])
 
 
 def summarize(plan: Plan) -> str:

@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.language.specs import ParameterSpec
+from composer.language.specs import ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
@@ -32,6 +32,8 @@ _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
     *(kind.section for kind in ENTITY_KINDS),
 }
+# These are part of a node, and what a process is started with.
+_ARGUMENTS = {'namespace', 'parameters', 'parameter_files'}
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
@@ -230,6 +232,8 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     """Return the fields of a class of records that are compared."""
     # ROS knows the description of a parameter; nobody asks for the others.
     skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
+    if kind is ProcessSpec:
+        skipped -= _ARGUMENTS
     return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 

@@ -103,7 +103,9 @@ class NodeRestarter:
             if self._system.stop.is_set or not self._end(old):
                 if self._system.stop.is_set:
                     return 'the system stops'
-                return f"node '{old.spec.key}' hangs, and is left as it is: {_list_calls(old)}"
+                text = f"node '{old.spec.key}' hangs, and is left as it is: {_list_calls(old)}"
+                system_logger.error(text)
+                return text
             try:
                 self._build(old)
             except ComposerError as error:
@@ -113,18 +115,33 @@ class NodeRestarter:
         system_logger.warning(f"node '{old.spec.key}' was restarted")
         return ''
 
-    def remove(self, full_name: str) -> bool:
-        """Stop and remove a node; return whether it is gone: one that hangs stays."""
-        has_ended = self._end(self._nodes[full_name])
-        if has_ended:
+    def remove(self, full_name: str) -> None:
+        """Stop and remove a node, also one that hangs."""
+        if self._end(self._nodes[full_name]):
             del self._nodes[full_name]
-        return has_ended
+        else:
+            self.leave(full_name)
+
+    def make_way(self, full_name: str) -> bool:
+        """Stop and remove a node for another one; return whether it is gone.
+
+        One whose behaviours hang stays as it is; one whose `on_stop` hangs could do no more.
+        """
+        node = self._nodes[full_name]
+        if self._end(node):
+            del self._nodes[full_name]
+        elif not node.gate.is_open:
+            self.leave(full_name)
+        return full_name not in self._nodes
 
     def leave(self, full_name: str) -> None:
         """Remove a node that hangs; only the thread of what hangs is left."""
+        if self._system.stop.is_set:
+            return
         node = self._nodes.pop(full_name)
         self.left.append(node)
         node.gate.close()
+        system_logger.error(f"node '{node.spec.key}' hangs, and is removed: {_list_calls(node)}")
         self._system.executor.remove_node(node.ros)
         node.destroy()
 
@@ -143,7 +160,6 @@ class NodeRestarter:
             return False
         if not has_ended:
             executor.wake()
-            system_logger.error(f"node '{name}' hangs, and is left as it is: {_list_calls(node)}")
             return False
         executor.remove_node(node.ros)
         node.destroy()

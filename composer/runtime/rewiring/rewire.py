@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from composer.planning.plan import Operation, Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.entities.actions import ActionServer
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 _POLL_SEC = 0.02
 _SETTLE_SEC = 0.05
+_GONE_SEC = 1.0
 _SETTLE_POLL_SEC = 0.0005
 _GOING = (Action.RECREATE, Action.REMOVE)
 _COMING = (Action.RECREATE, Action.ADD)
@@ -75,6 +76,7 @@ class Rewiring:
         self._old, self._new = old, new
         self._before = {node.full_name: node for node in old.spec.nodes.values()}
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
+        self._clashing: Collection[Target] = ()
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
@@ -107,7 +109,7 @@ class Rewiring:
         self._handle.is_outdated = is_outdated
         try:
             self._read_as(self._new)
-            clashing = find_clashing_ends(self._old.spec, self._new.spec)
+            self._clashing = clashing = find_clashing_ends(self._old.spec, self._new.spec)
             at_first = self._are_in_the_way(plan, clashing)
             if at_first:
                 self._end_clashing(plan, clashing)
@@ -123,6 +125,7 @@ class Rewiring:
             self._handle.is_outdated = never
         for finish in self._finish:
             finish()
+        self._forget_health()
 
     def _going_actions(self, plan: Plan) -> Iterable[ActionServer]:
         for operation in plan.operations:
@@ -145,6 +148,11 @@ class Rewiring:
                 undo()
             except Exception as error:  # noqa: BLE001 - the rest must be undone
                 system_logger.error(f'reload: something could not be undone: {error}')
+        self._forget_health()
+
+    def _forget_health(self) -> None:
+        """Forget the health of behaviours that are gone, or were not to come after all."""
+        self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
 
     def _read_as(self, reading: Reading) -> None:
         """Let what is created from now on, and what errors tell of places, be of these files."""
@@ -153,6 +161,18 @@ class Rewiring:
         handle.profiles = spec.qos
         handle.functions = reading.functions
         handle.without_parameter_services = spec.without_parameter_services
+
+    def _create(self, target: Target, node: LiveNode, spec: Any) -> LiveEntity:
+        """Create an entity; one whose topic gets another type when the old ends have gone."""
+        deadline = monotonic() + (_GONE_SEC if target in self._clashing else 0.0)
+        while True:
+            try:
+                return create_entity(node, target[1], spec)
+            except StartError:
+                # The middleware may still deliver to one of them.
+                if monotonic() > deadline:
+                    raise
+            sleep(_POLL_SEC)
 
     def _are_in_the_way(self, plan: Plan, clashing: Collection[Target]) -> bool:
         """Return whether nodes that come need what clashes to be gone."""
@@ -184,7 +204,7 @@ class Rewiring:
             ]
 
         nodes = self._nodes
-        removed = {name: nodes[name] for name in targets('nodes', Action.REMOVE)}
+        removed = targets('nodes', Action.REMOVE)
         self._end_nodes(targets('nodes', Action.RECREATE))
         self._end_nodes(name for name in removed if name in clashing)
         self._end_processes(targets('processes', Action.RECREATE))
@@ -193,10 +213,9 @@ class Rewiring:
             process = self._processes.by_name[name]
             self._undo.append(partial(process.change, process.spec))
             process.change(self._new.spec.processes[name])
-        for full_name, node in removed.items():
+        for full_name in removed:
             if full_name in nodes:
                 self._finish.append(partial(self._restarter.remove, full_name))
-            self._finish.append(node.forget_all)
         for name in targets('processes', Action.REMOVE):
             self._finish.append(partial(self._processes.remove, name))
 
@@ -204,16 +223,15 @@ class Rewiring:
         """End nodes that are recreated; to undo that, they begin again with their state."""
         for full_name in names:
             node = self._nodes[full_name]
-            if not self._restarter.remove(full_name):
-                message = f"node '{node.spec.key}' cannot be recreated, because it hangs"
+            if not self._restarter.make_way(full_name):
+                calls = ', '.join(str(call.owner) for call in node.running.calls())
+                message = f"node '{node.spec.key}' cannot be recreated, because it hangs: {calls}"
                 raise StartError(message)
             self._undo.append(partial(self._begin_again, node))
 
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
-        vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
-        if node.parameters:
-            again.ros.set_parameters(node.ros.get_parameters(sorted(node.parameters.set_live)))
+        again.take_over(node)
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
@@ -233,8 +251,8 @@ class Rewiring:
 
         def remove_all() -> None:
             for name in node_names:
-                if name in self._nodes and not self._restarter.remove(name):
-                    self._restarter.leave(name)
+                if name in self._nodes:
+                    self._restarter.remove(name)
             for name in process_names:
                 if name in self._processes.by_name:
                     self._processes.remove(name)
@@ -349,7 +367,7 @@ class Rewiring:
             return
         if operation.action in _COMING:
             node.drop_limits(operation.noun, name)
-            created = create_entity(node, section, spec)
+            created = self._create(operation.target, node, spec)
             self._undo.append(created.destroy)
             if section == 'timers':
                 self._finish.append(partial(_start_timer, created))

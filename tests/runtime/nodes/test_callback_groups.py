@@ -4,11 +4,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from running import wait_for
 from std_srvs.srv import Empty
 
 from composer.runtime.nodes.callback_groups import Gate, GatedReentrantGroup
 from composer.runtime.stop_request import StopRequest
+from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
 

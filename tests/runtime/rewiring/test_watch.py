@@ -236,8 +236,21 @@ def test_what_hangs_is_left_for_the_next_edit(running):
     assert not running.child.matching('did not end in time')
 
 
+def test_nodes_that_hang_in_on_stop_make_way(running):
+    running.edit('  listener:', '  brief:\n    on_stop: parts:hang\n  listener:')
+    running.reloaded()
+    running.edit('  brief:\n', '  brief:\n    rosout: false\n')
+    assert running.reloaded().endswith('±1 node')
+    running.edit('  brief:\n    rosout: false\n    on_stop: parts:hang\n', '')
+    assert running.reloaded().endswith('-1 node')
+    assert len(running.child.matching("node 'brief' hangs, and is removed: on_stop")) == 2
+    assert running.child.stop() == 1
+    assert not running.child.matching('did not end in time')
+
+
 def test_the_current_folder_may_change(running):
-    running.edit('import time\n', "import os\nimport time\n\nos.chdir('/')\n", 'parts.py')
+    """Also to one with a folder `sys`, which is no module."""
+    running.edit('import time\n', "import os, sys\nimport time\n\nos.chdir('/')\n", 'parts.py')
     running.reloaded()
     running.edit("WORD = 'one'", "WORD = 'two'", 'parts.py')
     running.edit('{step: 1}', '{step: 2}')

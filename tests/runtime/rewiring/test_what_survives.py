@@ -32,6 +32,14 @@ nodes:
     services:
       probe: {type: std_srvs/srv/Trigger, service: ~/probe, behaviour: probes:probe}
       read: {type: std_srvs/srv/Trigger, service: /read, behaviour: library.use:read}
+  caller:
+    state: {answers: []}
+    service_clients: {ask: {type: std_srvs/srv/Trigger, external: true}}
+    timers:
+      call: {period: 0.02, behaviour: parts:call}
+      call_async: {period: 0.02, behaviour: parts:call_async, group: other}
+    services:
+      probe: {type: std_srvs/srv/Trigger, service: ~/probe, group: own, behaviour: probes:probe}
   ear:
     state: {heard: ''}
     subscriptions:
@@ -53,6 +61,23 @@ def steps(node):
 
 def once(node):
     node.state.once += 1
+    yield
+
+
+def call(node):
+    try:
+        node.state.answers.append(node.call('ask', None, timeout=None).message)
+    except Exception as error:
+        node.state.answers.append(str(error))
+    yield
+
+
+async def call_async(node):
+    try:
+        response = await node.call_async('ask', None, timeout=None)
+        node.state.answers.append(response.message)
+    except Exception as error:
+        node.state.answers.append(str(error))
     yield
 
 
@@ -383,3 +408,13 @@ def test_a_module_that_raises_changes_nothing(edited, name):
     _, said = edited.edit({f"'old {name}'": f"'new {name}' if 1 / 0 else ''"})
     assert said.startswith('not reloaded: ')
     assert edited.read() == before | {'count': before['count'] + 1}
+
+
+def test_calls_end_when_their_client_goes_and_only_then(edited):
+    edited.edit({'period: 0.02, publish': 'period: 0.03, publish'})
+    assert edited.probe('caller')['answers'] == []
+    planned, _ = edited.edit({'ask: {type': 'ask: {service: other, type'})
+    assert 'lost: responses that calls wait for' in planned
+    wait_for(lambda: len(edited.probe('caller')['answers']) == 2, 'the ends of both calls')
+    (answer,) = set(edited.probe('caller')['answers'])
+    assert answer == "an edit took the client of '/ask' away, which this call waited for"
