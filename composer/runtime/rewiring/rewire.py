@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from composer.planning.plan import Operation, Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.entities.actions import ActionServer
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 _POLL_SEC = 0.02
 _SETTLE_SEC = 0.05
+_GONE_SEC = 1.0
 _SETTLE_POLL_SEC = 0.0005
 _GOING = (Action.RECREATE, Action.REMOVE)
 _COMING = (Action.RECREATE, Action.ADD)
@@ -75,6 +76,7 @@ class Rewiring:
         self._old, self._new = old, new
         self._before = {node.full_name: node for node in old.spec.nodes.values()}
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
+        self._clashing: Collection[Target] = ()
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
@@ -107,7 +109,7 @@ class Rewiring:
         self._handle.is_outdated = is_outdated
         try:
             self._read_as(self._new)
-            clashing = find_clashing_ends(self._old.spec, self._new.spec)
+            self._clashing = clashing = find_clashing_ends(self._old.spec, self._new.spec)
             at_first = self._are_in_the_way(plan, clashing)
             if at_first:
                 self._end_clashing(plan, clashing)
@@ -159,6 +161,18 @@ class Rewiring:
         handle.profiles = spec.qos
         handle.functions = reading.functions
         handle.without_parameter_services = spec.without_parameter_services
+
+    def _create(self, target: Target, node: LiveNode, spec: Any) -> LiveEntity:
+        """Create an entity; one whose topic gets another type when the old ends have gone."""
+        deadline = monotonic() + (_GONE_SEC if target in self._clashing else 0.0)
+        while True:
+            try:
+                return create_entity(node, target[1], spec)
+            except StartError:
+                # The middleware may still deliver to one of them.
+                if monotonic() > deadline:
+                    raise
+            sleep(_POLL_SEC)
 
     def _are_in_the_way(self, plan: Plan, clashing: Collection[Target]) -> bool:
         """Return whether nodes that come need what clashes to be gone."""
@@ -353,7 +367,7 @@ class Rewiring:
             return
         if operation.action in _COMING:
             node.drop_limits(operation.noun, name)
-            created = create_entity(node, section, spec)
+            created = self._create(operation.target, node, spec)
             self._undo.append(created.destroy)
             if section == 'timers':
                 self._finish.append(partial(_start_timer, created))

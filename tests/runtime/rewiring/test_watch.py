@@ -249,7 +249,8 @@ def test_nodes_that_hang_in_on_stop_make_way(running):
 
 
 def test_the_current_folder_may_change(running):
-    running.edit('import time\n', "import os\nimport time\n\nos.chdir('/')\n", 'parts.py')
+    """Also to one with a folder `sys`, which is no module."""
+    running.edit('import time\n', "import os, sys\nimport time\n\nos.chdir('/')\n", 'parts.py')
     running.reloaded()
     running.edit("WORD = 'one'", "WORD = 'two'", 'parts.py')
     running.edit('{step: 1}', '{step: 2}')
