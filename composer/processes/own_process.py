@@ -94,7 +94,7 @@ def finish(is_wanted: Callable[[], bool]) -> None:
 
 
 def start_again(is_wanted: Callable[[], bool], *endings: Callable[[], object]) -> None:
-    """Execute the program anew; return if that is not wanted.
+    """Execute the program anew; return if that is not wanted, for the process to end at once.
 
     Args:
         is_wanted: See `finish`.
@@ -103,21 +103,24 @@ def start_again(is_wanted: Callable[[], bool], *endings: Callable[[], object]) -
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
             stream.flush()
-    # Those that come from now on wait until the program can heed them again.
-    signal.pthread_sigmask(signal.SIG_BLOCK, signals.HANDLED)
-    if not is_wanted():
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, signals.HANDLED)
-        return
     for function in (*_endings, *endings):
         function()
     try:
-        _execute(the_start())
+        _prepare(the_start())
+        # From here on a signal ends the process, or waits until the program can heed it again.
+        for number in signals.HANDLED:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_BLOCK, signals.HANDLED)
+        if is_wanted():
+            os.execve(sys.executable, sys.orig_argv, dict(the_start().variables))  # noqa: S606 - ourselves
     except OSError as error:
         tell(f'[FATAL] [composer]: the system cannot start again: {error}')
         os._exit(ExitCode.FAILED)
 
 
-def _execute(start: Start) -> None:
+def _prepare(start: Start) -> None:
+    """Make this process what it was at its start."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
@@ -126,7 +129,6 @@ def _execute(start: Start) -> None:
             os.set_inheritable(descriptor, False)
     resource.setrlimit(RLIMIT_LOCKS, start.locks)
     os.chdir(start.folder)
-    os.execve(sys.executable, sys.orig_argv, dict(start.variables))  # noqa: S606 - ourselves
 
 
 def _descriptors() -> set[int]:

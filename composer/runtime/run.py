@@ -110,6 +110,8 @@ def run_system(
                 if ended:
                     own_process.finish(lambda: stop.starts_again)
                 own_process.start_again(lambda: stop.starts_again, guardian.send_away)
+                # A signal has come meanwhile.
+                _end_process(stop.code)
         except ComposerError as error:
             code, ended = ExitCode.FAILED, False
             if system.has_ended:

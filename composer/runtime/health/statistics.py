@@ -281,5 +281,5 @@ class HealthRegistry:
             longest[key] = max(longest.get(key, 0.0), (now_ns - call.since_ns) / 1e9)
         return {
             key: entity.report(period_sec, longest.get(key, 0.0))
-            for key, entity in list(self._entities.items())
+            for key, entity in self._entities.copy().items()
         }

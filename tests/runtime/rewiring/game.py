@@ -35,6 +35,8 @@ _OWN_REASONS = (
     'its value was set while the system ran',
     ': no',  # What `decide` returns.
 )
+# Topics of every node; that of its clock comes and goes with `use_sim_time`.
+_OF_NODES = ('/parameter_events', '/rosout', '/clock')
 # After steps of these a failure strikes.
 _STEPS = ('_begin', '_change_entity', '_change_node', '_replace_record', '_end_nodes')
 
@@ -59,6 +61,7 @@ class Game:
         self._plan = None
         self.applied = 0
         project.keep()
+        self._check_graph(see_graph(system._nodes[WITNESS].ros)[0], 'the start')
 
     def play(self, done=None):
         """Edit, reload, and compare; return the edits, and what came of them."""
@@ -187,7 +190,7 @@ class Game:
         now = see_graph(self._observer.node)[1]
         for (node, kind, topic), gids in self._gids.items():
             if node not in nodes and (node, kind) not in changed and topic[0] != '_':
-                if topic in ('/parameter_events', '/rosout') or '/_action/' in topic:
+                if topic in _OF_NODES or '/_action/' in topic:
                     continue
                 assert now.get((node, kind, topic)) == gids, (done, node, kind, topic)
 
