@@ -212,9 +212,9 @@ class _Comparison:
             span = self._new.positions.key(new.path)
             yield Operation(Action.ADD, rules.noun, target, _name(new), span)
         elif new is None:
-            span, lost = self._old.positions.key(old.path), (rules.lost,)
-            if target[1] in _WITH_OWN_STATE:
-                lost = (*lost, 'own_state')
+            span = self._old.positions.key(old.path)
+            own = ('own_state',) if target[1] in _WITH_OWN_STATE else ()
+            lost = (rules.lost, *own)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
         elif old is not new:
             readings = (
