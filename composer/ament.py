@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.programs import shell_environment
 from composer.spelling import count_edits, find_nearest
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def ament_prefixes() -> list[Path]:
 
     Those of packages that Composer built are left out: each system names its own.
     """
-    entries = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    entries = [*shell_environment().get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
     prefixes = dict.fromkeys(Path(entry) for entry in entries if entry)
     return [each for each in prefixes if not os.path.exists(each / BUILD_MANIFEST)]  # noqa: PTH110
 

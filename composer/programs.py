@@ -1,10 +1,10 @@
-"""Programs of external processes: where they are searched for, and why one cannot be run."""
+"""Programs and their environment: where they are searched for, and why one cannot be run."""
 
 from __future__ import annotations
 
 import os
 import sys
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +12,30 @@ from typing import TYPE_CHECKING
 from composer.spelling import count_edits, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
 # More edits than this are no typo.
 _MOST_EDITS = 2
+_shell: Mapping[str, str] | None = None
+
+
+def shell_environment() -> Mapping[str, str]:
+    """Return the variables that this process was started with, whatever a system sets.
+
+    A system that runs is read again in the environment that it was read in before.
+    """
+    return os.environ if _shell is None else _shell
+
+
+@contextmanager
+def shell_environment_kept() -> Iterator[None]:
+    """Keep the variables as they are now for `shell_environment`, until the block ends."""
+    global _shell  # noqa: PLW0603 - as `os.environ` is one of the whole process
+    before, _shell = _shell, dict(os.environ)
+    try:
+        yield
+    finally:
+        _shell = before
 
 
 def base_environment(variables: Mapping[str, str]) -> dict[str, str]:

@@ -29,10 +29,14 @@ _interrupts = False
 
 
 def end_at_signals() -> None:
-    """End the process at each signal from now on, but for those that it was started to ignore."""
+    """End the process at each signal from now on, but for those that it was started to ignore.
+
+    Those that came while a system started again in this process have waited.
+    """
     for number in HANDLED:
         if signal.getsignal(number) is not signal.SIG_IGN:
             previous[number] = signal.signal(number, _handle)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, HANDLED)
     # The first one to be registered is the last one to run. Python gives all signals their
     # default actions after it, which would end the process with another exit code.
     atexit.register(_ignore_signals)
@@ -72,6 +76,11 @@ def _handle(number: int, _frame: FrameType | None) -> None:
         os._exit(ExitCode.INTERRUPTED)
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)
+
+
+def heed_at_exit() -> None:
+    """Have the process not ignore signals when the other `atexit` functions have run."""
+    atexit.unregister(_ignore_signals)
 
 
 def _ignore_signals() -> None:

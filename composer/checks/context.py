@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -46,7 +47,10 @@ class CheckContext:
     @cached_property
     def behaviours(self) -> BehaviourReader:
         """What reads the behaviours."""
-        return BehaviourReader(self.modules, self.catalogue, self.has_real_type)
+        # A copy asks, so that no circle keeps this context until garbage is collected: for a
+        # large system that would stop its callbacks for long, after each edit.
+        asked = replace(self)
+        return BehaviourReader(self.modules, self.catalogue, asked.has_real_type)
 
     @cached_property
     def incomplete(self) -> set[DataPath]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from itertools import takewhile
 from pathlib import Path
@@ -13,7 +12,12 @@ from composer.checks.names import IS_EMPTY, check_rules
 from composer.input_limits import explain_missing
 from composer.language.paths import PathError, explain_absent, is_in_package, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
-from composer.programs import base_environment, find_program_problem, is_on_path
+from composer.programs import (
+    base_environment,
+    find_program_problem,
+    is_on_path,
+    shell_environment,
+)
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -135,7 +139,7 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
     if '/' in program and not (is_known or Path(program).is_absolute()):
         # Without `cwd` it is searched from where the system is started.
         return
-    variables = {**os.environ, **context.spec.environment}
+    variables = {**shell_environment(), **context.spec.environment}
     environment = {**base_environment(variables), **process.env}
     if program.startswith(_OF_ROS) and not is_on_path(_OF_ROS[0]):
         return

@@ -102,6 +102,8 @@ def cli(context: click.Context) -> int:
     flag_value=False,
     help="Leave out the services that 'composer reload', 'down' and the like use.",
 )
+# What a system that must start again asks of another process before.
+@click.option('--rehearse', 'rehearses', is_flag=True, hidden=True)
 @click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
@@ -115,6 +117,7 @@ def up_command(  # noqa: PLR0913 - one for each option
     watches: bool,
     detaches: bool,
     is_asked: bool,
+    rehearses: bool,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run its system until it is stopped.
@@ -148,6 +151,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         watches=watches,
         is_asked=is_asked,
         ends_process=True,
+        rehearses=rehearses,
     )
 
 

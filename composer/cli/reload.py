@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import Counter
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from composer.cli.common.output import show_findings
+import click
+
 from composer.cli.common.system_reader import import_reading
+from composer.cli.common.told_findings import ToldFindings, with_findings
+from composer.cli.rehearsal import rehearse
 from composer.cli.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
+from composer.interfaces.declared_packages import import_declared
+from composer.interfaces.search_paths import extend_variables
 from composer.language.paths import PathError, resolve_path
-from composer.planning.differences import compare
+from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
 from composer.python_source.module_finder import project_search_path
-from composer.reports.text import render_finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,12 +33,16 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.cli.common.system_reader import SystemReader
     from composer.diagnostics import Diagnostic
-    from composer.planning.plan import Plan
+    from composer.planning.plan import Operation, Plan
     from composer.planning.snapshot import Snapshot
     from composer.runtime.health.system_state import Outcome
+    from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
 
 _RUNS_ON = 'the system runs on as it was'
+_STOPS = 'the system stops'
+# How often files are looked at while something is waited for.
+_LOOK_SEC = 0.2
 _NO_CHANGE = 'nothing has changed'
 _GOOD_AGAIN = 'the files have no errors any more, and nothing has changed'
 
@@ -58,19 +68,21 @@ class Reloader:
     ) -> None:
         self._reader = reader
         self._prefixes = prefixes
-        self._files = WatchedFiles([*reader.paths, *_list_files(context)], begun_ns)
+        self._folder = Path.cwd()
+        self._paths = [self._folder / each for each in reader.paths]
+        self._files = WatchedFiles([*self._paths, *_list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
-        self._warnings = _warnings_in(told)
-        self._failure = ''
+        self._told = ToldFindings(told)
+        self._next_look = 0.0
 
     def reload(self, system: System) -> Outcome:
         """Read the files, and rewire the system; after errors it is as it was.
 
         What was done is logged, and errors are printed. Goals in flight of actions that go are
-        waited for.
+        waited for. If the files change meanwhile, all begins anew.
         """
-        return self._reload(system, lambda: True)
+        return self._reload(system, lambda: not self._files.list_changed())
 
     def _reload(self, system: System, is_whole: Callable[[], bool]) -> Outcome:
         """Do as `reload`.
@@ -92,7 +104,7 @@ class Reloader:
                     continue
                 except ComposerError as error:
                     text = f'not reloaded: {error}'
-                    if not system.stop_requested and self._show(findings, text):
+                    if not system.stop_requested and self._told.show(findings, text):
                         system_logger.error(text)
                     errors = [
                         f'{each.span or each.file}: {each.message}'
@@ -101,37 +113,18 @@ class Reloader:
                     ]
                     told = Outcome(succeeded=False, text='; '.join(errors) or text)
                     system.state.note_reload(told)
-                    return Outcome(succeeded=False, text=_with_findings(findings, text))
+                    return Outcome(succeeded=False, text=with_findings(findings, text))
                 break
             took_ms = (monotonic() - begun) * 1000
-            was_good = not self._failure
-            self._show(findings)
+            was_good = not self._told.failure
+            self._told.show(findings)
             text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}' if plan else _NO_CHANGE
+            if system.starts_again:
+                text = f'the system starts again: {summarize(plan)}'
             if plan or not was_good:
                 system_logger.info(text if plan else _GOOD_AGAIN)
             system.state.note_reload(Outcome(succeeded=True, text=text))
-            return Outcome(succeeded=True, text=_with_findings(findings, text))
-
-    def _show(self, findings: Sequence[Diagnostic], failure: str = '') -> bool:
-        """Print what was not told before; return whether there are errors that were not.
-
-        Args:
-            failure: Why the system is not reloaded, if it is not.
-        """
-        told = self._warnings
-        # Errors hide some.
-        self._warnings = _warnings_in(findings) | (told if failure else set())
-        errors = [each for each in findings if has_errors([each])]
-        # Without errors in the files something was tried, and failed again.
-        failure = _with_findings(errors, failure) if errors else failure
-        is_new = not errors or failure != self._failure
-        self._failure = failure
-        show_findings(
-            each
-            for each in findings
-            if (is_new if has_errors([each]) else _key_of(each) not in told)
-        )
-        return is_new
+            return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def reload_now(self, system: System) -> Outcome:
         """Do as `reload`, but abort goals; also those that another reload waits for."""
@@ -151,9 +144,9 @@ class Reloader:
                 context = self._check(findings)
                 new = take_snapshot(context, self._prefixes)
             except ComposerError as error:
-                return Outcome(succeeded=False, text=_with_findings(findings, str(error)))
+                return Outcome(succeeded=False, text=with_findings(findings, str(error)))
             text = render_plan(compare(system.snapshot, new)).rstrip('\n')
-        return Outcome(succeeded=True, text=_with_findings(findings, text))
+        return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def _rewire(
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
@@ -170,35 +163,106 @@ class Reloader:
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
     ) -> Plan:
         from composer.runtime.rewiring.fresh_modules import fresh_modules
+        from composer.runtime.rewiring.patience import import_with_patience
 
         context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
         self._files.also_follow(_list_files(context))
+        if cause := find_new_start(system.snapshot, snapshot):
+            self._start_again(system, cause, is_whole)
+            return compare(system.snapshot, snapshot)
+        if snapshot.definitions != system.snapshot.definitions:
+            self._add_packages(system, context)
+            snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
-        with fresh_modules(stale, snapshot.sources, search_path):
-            reading = import_reading(context, snapshot, findings.extend)
+        with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
+
+            def import_all() -> Reading | None:
+                reading = import_reading(context, snapshot, findings.extend)
+                if reading is not None:
+                    import_rest()
+                return reading
+
+            reading = import_with_patience(
+                import_all,
+                lambda: system.stop_requested or self._is_outdated(),
+                snapshot.sources,
+            )
             if reading is None:
                 raise ComposerError(_RUNS_ON)
             if _loses_parts(system.snapshot, snapshot) and not is_whole():
                 raise _HalfWrittenError
-            plan = system.rewire(reading, self._aborts_goals.is_set)
+            plan = system.rewire(reading, self._aborts_goals.is_set, self._is_outdated)
             if system.stop_requested:
-                message = 'the system stops'
-                raise ComposerError(message)
-        self._files.follow([*self._reader.paths, *_list_files(context)])
+                raise ComposerError(_STOPS)
+        self._files.follow([*self._paths, *_list_files(context)])
         return plan
+
+    def _start_again(self, system: System, cause: Operation, is_whole: Callable[[], bool]) -> None:
+        """Have the whole system start again, if it can."""
+        from composer.runtime.logs import system_logger
+
+        changes = ' and '.join(sorted({each.key for each in cause.changes}))
+        if not system.can_start_again:
+            message = f'{changes} cannot change while the system runs: {cause.reason}'
+            raise ComposerError(
+                message, help='end the program that it runs in, and start that again'
+            )
+        if not is_whole():
+            raise _HalfWrittenError
+        system_logger.info(
+            f'reload: the system must start again, because of {changes}; rehearsing'
+        )
+        rehearse(system, self._is_outdated)
+        if not is_whole():
+            raise _HalfWrittenError
+        system.start_again(self._aborts_goals.is_set, self._is_outdated)
+        if not system.starts_again:
+            raise ComposerError(_STOPS)
+
+    def _add_packages(self, system: System, context: CheckContext) -> None:
+        """Build and import the interface packages that were not declared before."""
+        if system.can_start_again:
+            # Another process can be ended whatever it does.
+            rehearse(system, self._is_outdated)
+        self._prefixes = import_declared(
+            context.interfaces, lambda line: click.echo(line, err=True)
+        )
+        os.environ.update(extend_variables(os.environ, self._prefixes))
+
+    def _is_outdated(self) -> bool:
+        """Return whether the files have changed since they were read; looks at them at times."""
+        now = monotonic()
+        if now < self._next_look:
+            return False
+        self._next_look = now + _LOOK_SEC
+        return bool(self._files.list_changed())
 
     def _check(self, findings: list[Diagnostic]) -> CheckContext:
         if any(str(path) == '-' for path in self._reader.paths):
             message = 'the system was read from standard input, which cannot be read again'
             raise ComposerError(message)
-        context, files, found = self._reader.read()
+        context, files, found = self._reader_here().read()
         findings += found
         self._files.also_follow([*files, *(_list_files(context) if context else ())])
         if context is None or has_errors(found):
             raise ComposerError(_RUNS_ON)
         return context
+
+    def _reader_here(self) -> SystemReader:
+        """Return what reads the files, also where a behaviour has changed the current folder."""
+        try:
+            folder = Path.cwd()
+        except FileNotFoundError:
+            # It was removed, and perhaps made anew.
+            try:
+                os.chdir(self._folder)
+            except OSError as error:
+                message = f"the folder '{self._folder}', where Composer was started, is gone"
+                raise ComposerError(message) from error
+            folder = self._folder
+        return self._reader if folder == self._folder else replace(self._reader, paths=self._paths)
 
     @contextmanager
     def watching(self, system: System) -> Iterator[None]:
@@ -239,20 +303,6 @@ def _loses_parts(old: Snapshot, new: Snapshot) -> bool:
         before.nodes.keys() - after.nodes.keys()
         or before.processes.keys() - after.processes.keys()
     )
-
-
-def _key_of(finding: Diagnostic) -> tuple[str, str, str]:
-    """Return what a finding is known by; its line changes with what is written above it."""
-    return str(finding.file), finding.rule, finding.message
-
-
-def _warnings_in(findings: Iterable[Diagnostic]) -> set[tuple[str, str, str]]:
-    return {_key_of(each) for each in findings if not has_errors([each])}
-
-
-def _with_findings(findings: list[Diagnostic], text: str) -> str:
-    """Return a text after the findings that belong to it."""
-    return '\n'.join([*(render_finding(each) + '\n' for each in findings), text])
 
 
 def summarize(plan: Plan) -> str:

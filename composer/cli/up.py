@@ -14,10 +14,12 @@ from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import SystemReader, import_reading
 from composer.diagnostics import has_errors
-from composer.errors import ExitCode
+from composer.errors import ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.planning.snapshot import take_snapshot
+from composer.processes.own_process import note_start
+from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.cli.reload import Reloader
+    from composer.diagnostics import Diagnostic
 
 
 def up(  # noqa: PLR0913 - one for each option
@@ -38,6 +41,7 @@ def up(  # noqa: PLR0913 - one for each option
     watches: bool = False,
     is_asked: bool = True,
     ends_process: bool = False,
+    rehearses: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
 
@@ -50,19 +54,28 @@ def up(  # noqa: PLR0913 - one for each option
         watches: Whether edits of the files change the running system.
         is_asked: Whether the system serves what `composer reload` and the like ask.
         ends_process: Whether the process exits afterwards.
+        rehearses: Whether to do only what comes before the system is created, and to print only
+            what keeps it from that.
 
     Raises:
         RosNotFoundError: There is no rclpy.
         StartError: The system could not start.
-        UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
+        UsageError: The arguments do not fit the file, or the ROS arguments are wrong; or standard
+            input is to be watched.
     """
     if ends_process and isinstance(sys.stdout, io.TextIOWrapper):
         # What behaviours print is shown at once, in a file, too.
         sys.stdout.reconfigure(line_buffering=True)
+    if watches and str(paths[0]) == '-':
+        message = '--watch cannot watch standard input, which is read once'
+        raise UsageError(message, help='give a file')
+    if ends_process:
+        note_start()
     reader = SystemReader(paths, words, set_values)
     begun_ns = time_ns()
     context, _files, told = reader.read()
-    show_findings(told)
+    report = _show_errors if rehearses else show_findings
+    report(told)
     if context is None or has_errors(told):
         return ExitCode.FAILED
     # These import nothing of ROS, which reads its environment when it is imported.
@@ -79,7 +92,7 @@ def up(  # noqa: PLR0913 - one for each option
     from composer.cli.reload import Reloader
 
     variables = context.spec.environment
-    with environment_set({**find_colour(), **variables}):
+    with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)
         check_log_folder(ros_arguments)
         check_middleware(os.environ)
@@ -91,10 +104,16 @@ def up(  # noqa: PLR0913 - one for each option
             watches=watches,
             is_asked=is_asked,
             ends_process=ends_process,
+            rehearses=rehearses,
         )
 
 
-def _run(
+def _show_errors(findings: list[Diagnostic]) -> None:
+    if has_errors(findings):
+        show_findings(findings)
+
+
+def _run(  # noqa: PLR0913 - as above
     context: CheckContext,
     create_reloader: Callable[[Sequence[Path]], Reloader],
     ros_arguments: Sequence[str],
@@ -103,7 +122,9 @@ def _run(
     watches: bool,
     is_asked: bool,
     ends_process: bool,
+    rehearses: bool,
 ) -> int:
+    from composer.executor.after_fork import flush_output
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.environment import environment_set
@@ -114,7 +135,12 @@ def _run(
         environment_set(extend_variables(os.environ, prefixes)),
         project_on_path(project_search_path(context.system.files)),
     ):
-        reading = import_reading(context, take_snapshot(context, prefixes))
+        report = _show_errors if rehearses else show_findings
+        reading = import_reading(context, take_snapshot(context, prefixes), report)
+        if rehearses:
+            # What modules of behaviours do at the exit is not for here.
+            flush_output()
+            os._exit(ExitCode.FAILED if reading is None else ExitCode.DONE)
         if reading is None:
             return ExitCode.FAILED
         reloader = create_reloader(prefixes)

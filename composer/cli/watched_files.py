@@ -115,12 +115,13 @@ class WatchedFiles:
         """Wait while a changed file is open for writing, as long as something is written."""
         until = monotonic() + _WRITTEN_SEC
         stamps: dict[Path, Stamp | None] = {}
-        while monotonic() < until and not ended.wait(_POLL_SEC):
-            changed = self.list_changed()
-            if not any(_is_being_written(each) for each in changed):
-                return
+        changed = self.list_changed()
+        while any(map(_is_being_written, changed)) and not ended.wait(_POLL_SEC):
             if stamps != (stamps := _stamps_of(changed)):
                 until = monotonic() + _WRITTEN_SEC
+            elif monotonic() > until:
+                return
+            changed = self.list_changed()
 
     def _find_trails(self) -> tuple[set[Path], dict[Path, Stamp]]:
         """Return the files and the links on the way to them, and the folders that these are in.

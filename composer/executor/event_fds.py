@@ -91,6 +91,7 @@ class EventFd:
 
     def remove(self, listener: Listener) -> None:
         """Have the middleware write no more for `listener`, if it can still be told."""
+        self._forget_gone()
         try:
             listener.watch(None)
         except (InvalidHandle, ExecutorError):
@@ -99,8 +100,11 @@ class EventFd:
 
     def is_unused(self) -> bool:
         """Tell whether nobody listens and the middleware writes nothing to it any more."""
-        self._leaving = [listener for listener in self._leaving if not listener.is_gone()]
+        self._forget_gone()
         return not (self.listeners or self._leaving)
+
+    def _forget_gone(self) -> None:
+        self._leaving = [listener for listener in self._leaving if not listener.is_gone()]
 
 
 class _OwnEventFds:

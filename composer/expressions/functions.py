@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import TemplateRuntimeError
 
 from composer.ament import explain_missing_package, find_share, list_packages
+from composer.programs import shell_environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -31,7 +31,7 @@ def read_environment(name: str, default: str | None = None) -> str:
     Raises:
         TemplateRuntimeError: There is neither.
     """
-    value = os.environ.get(name, default)
+    value = shell_environment().get(name, default)
     if value is None:
         advice = f"give a default, as in env('{name}', 'none')"
         message = f"the environment variable '{name}' is not set; {advice}"

@@ -29,6 +29,7 @@ from composer.expressions.functions import PackageError
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
 from composer.input_limits import MAX_FINDINGS
+from composer.programs import shell_environment
 from composer.spelling import find_nearest, suggest
 from composer.yaml_text.scalars import format_scalar
 
@@ -187,7 +188,7 @@ class TemplateEvaluator:
             if name == 'env' and name not in self._values:
                 called = {found for each in expressions for found in _ENV.findall(text[each])}
                 # A default is none of the environment's.
-                if not called or any(each in os.environ for each in called):
+                if not called or any(each in shell_environment() for each in called):
                     return f'env("{min(called)}")' if called else 'env(…)'
             elif (origin := origin_of(self._values.get(name))) is not None:
                 return origin

@@ -174,12 +174,15 @@ class BehaviourReader:
             return unknown_reading()
         self._modules.find(binding.behaviour.module)
         run = Run(facts, self._modules, self._types, self._steps_left)
+        evaluator = Evaluator(run)
         try:
-            _follow(run, module, binding, wire)
+            _follow(evaluator, module, binding, wire)
         except (TooLongError, RecursionError):
             return unknown_reading()
         finally:
             self._steps_left -= run.steps
+            # Its parts know it: it would keep all of this until garbage is collected.
+            vars(evaluator).clear()
         run.reading.settle()
         run.reading.kept_read = {name for topic, name in facts.log if topic == 'kept'}
         return run.reading
@@ -196,10 +199,9 @@ def _moves(name: str, keepers: abc.Iterable[tuple[Binding, Reading]]) -> bool:
     )
 
 
-def _follow(run: Run, module: ModuleSource, binding: Binding, wire: Wire) -> None:
+def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: Wire) -> None:
     """Read a behaviour, and check the payloads that it gives away."""
-    evaluator = Evaluator(run)
-    behaviour = binding.behaviour
+    run, behaviour = evaluator.run, binding.behaviour
     if not run.modules.has_name(module, behaviour.function):
         run.reading = missing_reading()
         return

@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.language.specs import ParameterSpec
+from composer.language.specs import ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
@@ -32,6 +32,8 @@ _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
     *(kind.section for kind in ENTITY_KINDS),
 }
+# These are part of a node, and what a process is started with.
+_ARGUMENTS = {'namespace', 'parameters', 'parameter_files'}
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
@@ -68,6 +70,8 @@ _LOST = {
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
 }
+# One that is recreated keeps it.
+_WITH_OWN_STATE = ('subscriptions', 'timers', 'services', 'actions')
 _ENTITIES = {
     kind.section: _PARAMETERS
     if kind.section == 'parameters'
@@ -116,12 +120,18 @@ def compare(old: Snapshot, new: Snapshot) -> Plan:
     return Plan(new.spec.name, tuple(_Comparison(old, new).operations()))
 
 
+def find_new_start(old: Snapshot, new: Snapshot) -> Operation | None:
+    """Return why the whole system must start again to become that of `new`; `None` if not."""
+    found = _Comparison(old, new).compare_system()
+    return next((each for each in found if each.action is Action.RECREATE), None)
+
+
 class _Comparison:
     def __init__(self, old: Snapshot, new: Snapshot) -> None:
         self._old, self._new = old, new
 
     def operations(self) -> Iterator[Operation]:
-        yield from self._compare_system()
+        yield from self.compare_system()
         old, new = self._old.spec, self._new.spec
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
@@ -131,7 +141,7 @@ class _Comparison:
         for full_name in dict.fromkeys([*before, *after]):
             yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
 
-    def _compare_system(self) -> Iterator[Operation]:
+    def compare_system(self) -> Iterator[Operation]:
         old, new = self._reading(self._old), self._reading(self._new)
         changes = [*compare_fields(old, new, _OF_THE_SYSTEM), *self._changed_packages(old, new)]
         if changes:
@@ -141,12 +151,14 @@ class _Comparison:
 
     def _changed_packages(self, old: Reading, new: Reading) -> Iterator[Change]:
         """Yield the packages that are loaded, and are others now."""
-        before, after = self._old.definitions, self._new.definitions
-        loaded = {package for package, _ in before}
-        differing = {at[0] for at in {**before, **after} if before.get(at) != after.get(at)}
-        for package in sorted(loaded & differing):
+        loaded, present = self._old.definitions, self._new.definitions
+        packages = {package for package, _ in loaded}
+        differing = {at[0] for at in {**loaded, **present} if loaded.get(at) != present.get(at)}
+        for package in sorted(packages & differing):
             key = f'interfaces.{package}'
-            yield Change(key, None, None, old.find_span(key), new.find_span(key), is_code=True)
+            before, after = (each.record.interfaces.get(package) for each in (old, new))
+            spans = old.find_span(key), new.find_span(key)
+            yield Change(key, before, after, spans[0], spans[1], is_code=after is not None)
 
     def _compare_nodes(
         self, full_name: str, old: NodeSpec | None, new: NodeSpec | None
@@ -200,7 +212,9 @@ class _Comparison:
             span = self._new.positions.key(new.path)
             yield Operation(Action.ADD, rules.noun, target, _name(new), span)
         elif new is None:
-            span, lost = self._old.positions.key(old.path), (rules.lost,)
+            span = self._old.positions.key(old.path)
+            own = ('own_state',) if target[1] in _WITH_OWN_STATE else ()
+            lost = (rules.lost, *own)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
         elif old is not new:
             readings = (
@@ -222,6 +236,8 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     """Return the fields of a class of records that are compared."""
     # ROS knows the description of a parameter; nobody asks for the others.
     skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
+    if kind is ProcessSpec:
+        skipped -= _ARGUMENTS
     return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 

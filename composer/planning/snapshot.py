@@ -12,8 +12,6 @@ from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
-from composer.ros_parameters.file_reader import read_parameter_file
-from composer.ros_parameters.overrides import MergedFiles
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -21,7 +19,8 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
-    from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
+    from composer.ros_parameters.file_reader import ParameterEntry
+    from composer.ros_parameters.overrides import MergedFiles
     from composer.yaml_text.positions import SourceMap
 
 
@@ -68,11 +67,12 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
     """
     spec = extend_processes(context.spec, prefixes)
     sources = _Sources(context.modules)
-    nodes = spec.nodes.values()
+    nodes = [*spec.nodes.values()]
     modules = {each.behaviour.module for node in nodes for each in node_bindings(node)}
     definitions = {
         (package.package, name): text
         for package in context.interfaces.definitions or ()
+        if package.package in context.interfaces.folders
         for name, text in package.sources.items()
     }
     reachable = sources.reachable(modules)
@@ -164,16 +164,18 @@ def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
         yield from ('.'.join([*parts, alias.name]) for alias in node.names)
 
 
-def _read_overrides(nodes: Iterable[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:
+def _read_overrides(nodes: Sequence[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:
+    if not any(node.parameter_files for node in nodes):
+        return {}
+    # Most systems have no parameter files.
+    from composer.ros_parameters.file_reader import read_parameter_file
+    from composer.ros_parameters.overrides import MergedFiles
+
     merged: dict[tuple[str, ...], MergedFiles] = {}
     overrides = {}
     for node in nodes:
         if files := node.parameter_files:
             if files not in merged:
-                merged[files] = MergedFiles(map(_read, files))
+                merged[files] = MergedFiles(read_parameter_file(Path(each)) for each in files)
             overrides[node.full_name] = merged[files].find_overrides(node.full_name)
     return overrides
-
-
-def _read(path: str) -> ParameterFile:
-    return read_parameter_file(Path(path))

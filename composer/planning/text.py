@@ -43,7 +43,8 @@ def describe_change(change: Change) -> str:
     """Return `period 0.5 → 1.0 (arm.yaml:12 → new.yaml:12)`."""
     places = _describe_places(change)
     if change.is_code:
-        return f'{change.key} has new code{places}'
+        what = 'other definitions' if change.top_key == 'interfaces' else 'new code'
+        return f'{change.key} has {what}{places}'
     values = [_show(each) for each in (change.old, change.new)]
     if change.old is None:
         return f'{change.key} = {values[1]}{places}'

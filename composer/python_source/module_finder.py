@@ -114,7 +114,11 @@ class ModuleFinder:
         if top not in self._is_own:
             file, folders = _locate(top, self._roots)
             found = [*([file] if file else []), *folders[:1]]
-            self._is_own[top] = any(each.parent in self._project for each in found)
+            # Python asks no folder for these, whatever is there.
+            is_built_in = top in sys.builtin_module_names
+            self._is_own[top] = not is_built_in and any(
+                each.parent in self._project for each in found
+            )
         return self._is_own[top]
 
     def _find(self, name: str) -> ModuleSource | MissingModule:

@@ -6,7 +6,7 @@ import ast
 import inspect
 from collections import Counter
 from contextlib import suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -83,7 +83,7 @@ class FunctionSource:
         return read_signature(self.definition.args) if self.definition else None
 
 
-@record
+@dataclass(eq=False)
 class ModuleSource:
     """The names that a module defines.
 

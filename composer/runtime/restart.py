@@ -72,6 +72,7 @@ class NodeRestarter:
 
     Attributes:
         lock: Held while a node is rebuilt, for nothing to stop an incomplete node.
+        left: The nodes that were removed although something in them hung.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class NodeRestarter:
         system: SystemHandle,
     ) -> None:
         self.lock = threading.Lock()
+        self.left: list[LiveNode] = []
         self._nodes = nodes
         self._starter = starter
         self._system = system
@@ -101,7 +103,9 @@ class NodeRestarter:
             if self._system.stop.is_set or not self._end(old):
                 if self._system.stop.is_set:
                     return 'the system stops'
-                return f"node '{old.spec.key}' hangs, and is left as it is: {_list_calls(old)}"
+                text = f"node '{old.spec.key}' hangs, and is left as it is: {_list_calls(old)}"
+                system_logger.error(text)
+                return text
             try:
                 self._build(old)
             except ComposerError as error:
@@ -111,12 +115,35 @@ class NodeRestarter:
         system_logger.warning(f"node '{old.spec.key}' was restarted")
         return ''
 
-    def remove(self, full_name: str) -> bool:
-        """Stop and remove a node; return whether it is gone: one that hangs stays."""
-        has_ended = self._end(self._nodes[full_name])
-        if has_ended:
+    def remove(self, full_name: str) -> None:
+        """Stop and remove a node, also one that hangs."""
+        if self._end(self._nodes[full_name]):
             del self._nodes[full_name]
-        return has_ended
+        else:
+            self.leave(full_name)
+
+    def make_way(self, full_name: str) -> bool:
+        """Stop and remove a node for another one; return whether it is gone.
+
+        One whose behaviours hang stays as it is; one whose `on_stop` hangs could do no more.
+        """
+        node = self._nodes[full_name]
+        if self._end(node):
+            del self._nodes[full_name]
+        elif not node.gate.is_open:
+            self.leave(full_name)
+        return full_name not in self._nodes
+
+    def leave(self, full_name: str) -> None:
+        """Remove a node that hangs; only the thread of what hangs is left."""
+        if self._system.stop.is_set:
+            return
+        node = self._nodes.pop(full_name)
+        self.left.append(node)
+        node.gate.close()
+        system_logger.error(f"node '{node.spec.key}' hangs, and is removed: {_list_calls(node)}")
+        self._system.executor.remove_node(node.ros)
+        node.destroy()
 
     def _build(self, old: LiveNode) -> None:
         (node,) = self._starter.create([old.spec])
@@ -133,7 +160,6 @@ class NodeRestarter:
             return False
         if not has_ended:
             executor.wake()
-            system_logger.error(f"node '{name}' hangs, and is left as it is: {_list_calls(node)}")
             return False
         executor.remove_node(node.ros)
         node.destroy()

@@ -60,7 +60,9 @@ class NodeStarter:
         call = node.reported_call(Owner('on_start'), hook.path, function, failures.append)
         _, ended = node.begin(call)
         while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
-            pass
+            if self._system.is_outdated():
+                message = f"node '{node.spec.key}': the files have changed during its on_start"
+                raise StartError(message)
         if failures:
             # `on_stop` is not called for it.
             node.has_begun = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
@@ -25,7 +25,7 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.rewiring.rewire import Rewiring
+from composer.runtime.rewiring.rewire import Rewiring, wait_for_goals
 from composer.runtime.start import NodeStarter
 from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
@@ -34,6 +34,7 @@ from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
+    from contextlib import AbstractContextManager
 
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
@@ -201,11 +202,14 @@ class System:
         }
         return replace(self._reading.snapshot, set_live=set_live)
 
-    def rewire(self, new: Reading, aborts_goals: Callable[[], bool]) -> Plan:
+    def rewire(
+        self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> Plan:
         """Become the system of `new`; return what was done.
 
         Args:
             aborts_goals: Returns whether goals of actions that go are aborted, not waited for.
+            is_outdated: Returns whether there is a newer edit; then nothing is waited for.
 
         Raises:
             ComposerError: That failed, and the system is as it was.
@@ -221,11 +225,11 @@ class System:
             self._reading,
             new,
         )
-        rewiring.wait_for_goals(plan, aborts_goals)
+        rewiring.wait_for_goals(plan, aborts_goals, is_outdated)
         with self._restarter.lock:
             if self.stop_requested:
                 return plan
-            rewiring.apply(plan)
+            rewiring.apply(plan, is_outdated)
             self._reading = new
             self._follow(new.spec)
         return plan
@@ -238,6 +242,35 @@ class System:
         self._processes.is_alone = not spec.nodes
         self._hang_watcher.follow(_limits(spec))
         self._control.follow(spec)
+
+    @property
+    def can_start_again(self) -> bool:
+        """Whether its process is its own."""
+        return self._guardian.owns_process
+
+    @property
+    def starts_again(self) -> bool:
+        """Whether it stops to start again in this process."""
+        return self._stop_request.starts_again
+
+    def start_again(
+        self, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
+        """Stop, and have this process start the system again as its files say it then.
+
+        Goals in flight are waited for, or aborted as `rewire` does.
+
+        Raises:
+            StartError: There is a newer edit, and the system runs on.
+        """
+        nodes = list(self._nodes.values())
+        actions: list[Any] = [each for node in nodes for each in node.entities['actions'].values()]
+        wait_for_goals(actions, self._stop_request, aborts_goals, is_outdated)
+        self._stop_request.make(starts_again=True)
+
+    def ending(self, end: Callable[[], None]) -> AbstractContextManager[bool]:
+        """Have `end` called if a stop is requested before the block ends; see `StopRequest`."""
+        return self._stop_request.waking(end)
 
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
@@ -284,6 +317,7 @@ class System:
         self._parameter_services.stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), timeout_sec)
+        ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
         # Processes end after the nodes: an `on_stop` may need them.
         none_killed = self._processes.stop()
         if self._guardian.mark:

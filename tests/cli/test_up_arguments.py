@@ -149,3 +149,11 @@ def test_a_dash_is_standard_input(run, monkeypatch):
     text = io.BytesIO(b'version: 1\nargs: {a: 1}\nnodes: {"rover_{{ a }}": {}}\n')
     monkeypatch.setattr(sys, 'stdin', io.TextIOWrapper(text))
     assert run('show', '-', 'a:=7')[:2] == (0, 'version: 1\nnodes:\n  rover_7: {}\n')
+
+
+def test_standard_input_cannot_be_watched(run):
+    assert run('up', '--watch', '-') == (
+        2,
+        '',
+        'error: --watch cannot watch standard input, which is read once\n  help: give a file\n',
+    )

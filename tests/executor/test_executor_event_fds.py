@@ -4,6 +4,7 @@ import errno
 import gc
 import os
 import resource
+import weakref
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,21 @@ def test_what_is_seldom_busy_shares_until_it_is_busy(poller):
     assert heard_of(poller, heard) == ['seldom first']
     second.write()
     assert heard_of(poller, heard) == ['seldom second']
+
+
+def test_what_shares_an_eventfd_is_forgotten_when_it_is_gone(poller):
+    heard: list[str] = []
+    staying, *leaving = attach(poller, heard, *(f'seldom {number}' for number in range(9)))
+    kept: list[weakref.ref[Listener]] = []
+    for each in leaving:
+        each.is_destroyed = True
+        poller.event_fds.detach(each)
+        kept.append(weakref.ref(each))
+    del leaving, each
+    # The last one goes when the next one does.
+    assert sum(reference() is not None for reference in kept) <= 1
+    staying.write()
+    assert heard_of(poller, heard) == ['seldom 0']
 
 
 def test_the_silent_make_room_for_the_busy(poller, monkeypatch):

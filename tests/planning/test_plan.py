@@ -126,6 +126,16 @@ EDITS = [
     ),
     (
         'required: true',
+        'required: true, namespace: /cab, parameters: {gear: 1}, parameter_files: [values.yaml]',
+        None,
+        [
+            "± process 'driver': namespace = /cab (19), parameters.gear = 1 (19), "
+            'parameter_files [] → ["values.yaml"] (19 → 19); '
+            'a process takes this when it starts; lost: the running process'
+        ],
+    ),
+    (
+        'required: true',
         'required: false',
         None,
         ["~ process 'driver': required true → false (19 → 19)"],
@@ -185,6 +195,15 @@ EDITS = [
         [
             "- node 'listener' (15); lost: its state, parameters set while it ran, all that is queued",
             "+ node '/far/listener' (15)",
+        ],
+    ),
+    (
+        '      say:',
+        '      tell:',
+        None,
+        [
+            "- timer 'say' of 'talker' (13); lost: its phase, own_state",
+            "+ timer 'tell' of 'talker' (13)",
         ],
     ),
     ('qos: near}', 'qos: near, topic: /words}', None, []),

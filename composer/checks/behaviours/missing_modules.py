@@ -143,7 +143,9 @@ class _Walk:
     def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
         """Check that a module exists; return whether it does."""
         modules = self.context.modules
-        if name in sys.modules or name in sys.stdlib_module_names:
+        # Those of the project may be gone since a running system has loaded them.
+        is_loaded = name in sys.modules and not self._is_of_project(name)
+        if is_loaded or name in sys.stdlib_module_names:
             return True
         self._searches += 1
         if modules.has(name):

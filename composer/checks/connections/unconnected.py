@@ -91,6 +91,7 @@ class _Partners:
         self._comparisons += len(names)
         if self._comparisons > _MOST_COMPARED:
             return None
-        near = find_nearest(channel.name.rpartition('/')[2], names)
+        same = names.get(find_nearest(channel.name.rpartition('/')[2], names) or '', ())
+        self._comparisons += len(same)
         # Of several, the one whose namespace is nearest.
-        return min(names.get(near or '', ()), key=partial(count_edits, channel.name), default=None)
+        return min(same, key=partial(count_edits, channel.name), default=None)

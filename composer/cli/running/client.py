@@ -207,7 +207,7 @@ class Client:
                 raise ComposerError(message)
             if time.monotonic() > deadline:
                 message = f"system '{system.name}' did not answer within {timeout_sec:g} s"
-                raise ComposerError(message, help='it may do it yet; --timeout waits longer')
+                raise ComposerError(message, help='it may do it yet')
         return future.result()
 
     def _ask_status(self, nodes: Sequence[str]) -> list[RunningSystem]:

@@ -54,7 +54,8 @@ def top_command(system: str | None, format_name: str, sort: str, text: str, *, o
 
     Calls in a second, callback times, the share of a processor, messages that wait in the queue;
     and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
-    runs, it need not be named. Where the output is no terminal, and as JSON, it is printed once.
+    runs, it need not be named. Where the output is no terminal that can draw, and
+    as JSON, it is printed once.
     """
     from composer.cli.running.top import top
 

@@ -7,7 +7,6 @@ import select
 import signal
 import socket
 import subprocess
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ import click
 
 from composer import signals
 from composer.errors import ComposerError, ExitCode
+from composer.processes.own_process import own_command
 from composer.runtime.control.readiness import VARIABLE
 from composer.runtime.environment import check_ros, find_log_folder
 
@@ -74,7 +74,7 @@ def _start(
         raise ComposerError(message) from error
     with stream:
         return subprocess.Popen(  # noqa: S603 - ourselves
-            [*_own_command(), 'up', *arguments],
+            [*own_command(), 'up', *arguments],
             stdin=None if str(path) == '-' else subprocess.DEVNULL,
             stdout=stream,
             stderr=stream,
@@ -96,13 +96,6 @@ def _wait(process: subprocess.Popen[bytes], ready: socket.socket) -> bool:
                 return False
     finally:
         os.close(ended)
-
-
-def _own_command() -> list[str]:
-    """Return the command by which this process was started, without its arguments."""
-    count = len(sys.argv) - 1
-    options = sys.orig_argv[1 : len(sys.orig_argv) - count]
-    return [sys.executable, *options]
 
 
 def _log_path(path: Path) -> Path:

@@ -34,21 +34,26 @@ def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
     Args:
         name: Of the system; `None` for the only one.
         view: What to show first.
-        once: Whether to print it once. So it is where the output is no terminal.
+        once: Whether to print it once. So it is where there is no screen.
         format_name: `text` or `json`; JSON is printed once.
 
     Raises:
         ComposerError: There is no such system, it measures nothing, or it ended.
     """
-    is_terminal = sys.stdout.isatty() and sys.stdin.isatty()
     with Client() as client:
         system = client.find(name)
         with client.asking(system, protocol.TOP) as ask:
-            if once or format_name == 'json' or not is_terminal:
+            if once or format_name == 'json' or not _has_screen():
                 document = _wait_for_all(ask)
                 _print(document, view, format_name)
                 return ExitCode.DONE
             return _watch(system, ask, view)
+
+
+def _has_screen() -> bool:
+    from composer.cli.running.top_screen import can_draw
+
+    return sys.stdout.isatty() and sys.stdin.isatty() and can_draw()
 
 
 def _print(document: dict[str, Any], view: View, format_name: str) -> None:

@@ -35,6 +35,15 @@ class Source(Protocol):
         """Why there are no more answers."""
 
 
+def can_draw() -> bool:
+    """Return whether the terminal can write anywhere: one that is `dumb` or unknown cannot."""
+    try:
+        curses.setupterm()
+    except curses.error:
+        return False
+    return curses.tigetstr('cup') is not None
+
+
 def show_screen(name: str, source: Source, view: View) -> None:
     """Show the health of a system until the user quits, or there are no more answers."""
     # A lone Escape is not the beginning of a key for long.

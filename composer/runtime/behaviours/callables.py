@@ -18,6 +18,7 @@ from composer.runtime.behaviours.tracebacks import summarize
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+    from types import ModuleType
 
     from composer.language.specs import BehaviourSpec
 
@@ -26,15 +27,18 @@ class BehaviourImportError(ComposerError):
     """A behaviour's module cannot be imported, or has no such function."""
 
 
-def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
-    """Return the function that a behaviour names.
+class ImportAbandonedError(BaseException):
+    """Raised in a thread that imports, to end it."""
+
+
+def import_module(name: str) -> ModuleType:
+    """Return a module.
 
     Raises:
-        BehaviourImportError: The import fails, whatever the module's code raises; there is no
-            such name in it; or it cannot be called.
+        BehaviourImportError: The import fails, whatever the module's code raises.
     """
     try:
-        module = importlib.import_module(spec.module)
+        return importlib.import_module(name)
     except BaseException as error:
         # Python raises Ctrl-C in the main thread; elsewhere it is the module that raises.
         if (
@@ -43,8 +47,18 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
         ):
             raise
         where = _innermost_place(error)
-        message = f"importing '{spec.module}' raised {summarize(error)}{where}"
+        message = f"importing '{name}' raised {summarize(error)}{where}"
         raise BehaviourImportError(message) from error
+
+
+def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
+    """Return the function that a behaviour names.
+
+    Raises:
+        BehaviourImportError: The import fails; there is no such name in the module; or it cannot
+            be called.
+    """
+    module = import_module(spec.module)
     function = getattr(module, spec.function, None)
     if function is None:
         message = f"{spec.module} has no function '{spec.function}'"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from dataclasses import field
 from time import monotonic
 from typing import TYPE_CHECKING, Any
+
+from rclpy.exceptions import InvalidHandle
 
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rclpy.task import Future
 
@@ -31,6 +35,10 @@ class Requests:
         unanswered: Returns the error for a request without an answer after so many seconds, and
             since a time of `time.monotonic`.
         forget: Takes the future of a request whose answer is no longer waited for.
+
+    Attributes:
+        waiting: The futures of requests whose answers are waited for.
+        ended: The error of requests if the client is gone.
     """
 
     waits: Waits
@@ -39,6 +47,14 @@ class Requests:
     unavailable: Callable[[float], ComposerError]
     unanswered: Callable[[float, float], ComposerError]
     forget: Callable[[Future], None] = _keep
+    waiting: set[Future] = field(default_factory=set)
+    ended: list[ComposerError] = field(default_factory=list)
+
+    def end(self, error: ComposerError) -> None:
+        """End all requests with an error, as their client goes."""
+        self.ended.append(error)
+        for future in list(self.waiting):
+            future.set_exception(error)
 
     def send(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
         """Send a request and return its answer.
@@ -52,31 +68,57 @@ class Requests:
             SystemStoppingError: A stop was requested while it waited.
         """
         begun = monotonic()
-        if not self.waits.until_true(self.is_available, timeout_sec, self.notice):
+        if not self.waits.until_true(self._has_server, timeout_sec, self.notice):
             raise self.unavailable(timeout_sec or 0.0)
-        future = send()
+        future = self._begin(send)
         try:
             if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
                 raise self.unanswered(timeout_sec or 0.0, begun)
         finally:
             if not future.done():
+                self.waiting.discard(future)
                 self.forget(future)
         return future.result()
 
     async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
         """As `send`, without holding a thread while it waits."""
         begun = monotonic()
-        is_there = self.waits.until_true_async(self.is_available, timeout_sec, self.notice)
+        is_there = self.waits.until_true_async(self._has_server, timeout_sec, self.notice)
         if not await is_there:
             raise self.unavailable(timeout_sec or 0.0)
-        future = send()
+        future = self._begin(send)
         try:
             if not await self.waits.until_done_async(future, _remaining(timeout_sec, begun)):
                 raise self.unanswered(timeout_sec or 0.0, begun)
         finally:
             if not future.done():
+                self.waiting.discard(future)
                 self.forget(future)
         return future.result()
+
+    def _has_server(self) -> bool:
+        with self._ending():
+            return self.is_available()
+
+    def _begin(self, send: Callable[[], Future]) -> Future:
+        with self._ending():
+            future = send()
+        self.waiting.add(future)
+        future.add_done_callback(self.waiting.discard)
+        if self.ended and not future.done():
+            future.set_exception(self.ended[0])
+        return future
+
+    @contextmanager
+    def _ending(self) -> Iterator[None]:
+        """Raise why the client is gone, if it is."""
+        try:
+            yield
+        except InvalidHandle:
+            if not self.ended:
+                raise
+        if self.ended:
+            raise self.ended[0]
 
 
 def _remaining(timeout_sec: float | None, begun: float) -> float | None:

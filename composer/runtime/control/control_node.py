@@ -7,6 +7,7 @@ when the system is up, or takes long to come up, and so delays no start.
 from __future__ import annotations
 
 import threading
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 # The node is created then even if the system is not up.
 _LATEST_SEC = 0.5
 _STOP_SEC = 1.0
+# How long an answer may take to whoever asked, before the node goes.
+_ANSWER_SEC = 0.1
 
 
 class ControlledSystem(Protocol):
@@ -97,6 +100,7 @@ class ControlNode:
         self._health = health
         self._period_sec = spec.diagnostics_period_sec
         self._diagnostics: DiagnosticsPublisher | None = None
+        self._answered = float('-inf')
         self._node: RosNode | None = None
         self._executor: SystemExecutor | None = None
         self._claim: NameClaim | None = None
@@ -148,6 +152,7 @@ class ControlNode:
         self._stop_diagnostics()
         if self._executor is not None:
             self._executor.stop(_STOP_SEC)
+            sleep(max(0.0, self._answered + _ANSWER_SEC - monotonic()))
         if self._node is not None:
             self._node.destroy_node()
 
@@ -239,6 +244,7 @@ class ControlNode:
             def callback(_request: Any, response: Any) -> Any:
                 outcome = _attempt(answer)
                 response.success, response.message = outcome.succeeded, outcome.text
+                self._answered = monotonic()
                 return response
 
             node.create_service(Trigger, f'~/{name}', callback, callback_group=group)

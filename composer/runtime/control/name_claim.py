@@ -110,7 +110,7 @@ def ask(address: str) -> dict[str, Any] | None:
         pid, _, _ = _CREDENTIALS.unpack(credentials)
         try:
             about = json.loads(peer.recv(_MOST_BYTES, socket.MSG_WAITALL))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             about = {}
     return {**about, 'pid': pid} if isinstance(about, dict) else {'pid': pid}
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import socket
+import time
 from contextlib import suppress
 
 VARIABLE = 'NOTIFY_SOCKET'
@@ -16,6 +17,12 @@ VARIABLE = 'NOTIFY_SOCKET'
 def take_notify_socket() -> str | None:
     """Return the socket to notify; the processes that this one starts do not inherit it."""
     return os.environ.pop(VARIABLE, None)
+
+
+def notify_reload(address: str | None) -> None:
+    """Tell that the system starts again, and will be up later."""
+    stamp = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+    notify(address, f'RELOADING=1\nMONOTONIC_USEC={stamp}')
 
 
 def notify(address: str | None, state: str) -> None:

@@ -52,6 +52,7 @@ class Rivals:
         self._begun = begun
         self._refused = refused
         self._refuses: set[str] = set()
+        self._is_refused = False
         qos = QoSProfile(depth=_DEPTH)
         node.create_subscription(String, _TOPIC, self._hear, qos, callback_group=group)
         self._publisher = node.create_publisher(
@@ -76,12 +77,13 @@ class Rivals:
             claim = json.loads(message.data)
             other, running_sec = str(claim['id']), float(claim['running_sec'])
             refuses, about = claim['refuses'], dict(claim['about'])
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             return  # Somebody else publishes there.
-        if other == self._id:
+        if other == self._id or self._is_refused:
             return
         if refuses == self._id:
             if other not in self._refuses or other < self._id:
+                self._is_refused = True
                 self._refused(about)
         elif not refuses and monotonic() - self._begun >= running_sec:
             self._refuses.add(other)

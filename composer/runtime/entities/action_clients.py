@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient as RosActionClient
@@ -56,6 +57,7 @@ class ActionClient:
             self._unanswered,
         )
         self._behaviours = _Behaviours(node, spec)
+        self._goals: WeakSet[Goal] = WeakSet()
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -76,6 +78,7 @@ class ActionClient:
             text = f"the server of '{self._name}' refused the goal"
             raise GoalRejectedError(text)
         goal.begin(handle)
+        self._goals.add(goal)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
 
@@ -86,6 +89,10 @@ class ActionClient:
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.at_destruction.remove(self._client.destroy)
+        error = ActionNotAvailableError(f"an edit took the action client of '{self._name}' away")
+        self._requests.end(error)
+        for goal in list(self._goals):
+            goal.lose(error)
         self._client.destroy()
         self._behaviours.destroy()
 
@@ -103,7 +110,7 @@ class ActionClient:
 
     def _take_result(self, goal: Goal, future: Future) -> None:
         goal.feedback_queue.put(None)
-        if future.done() and (response := future.result()) is not None:
+        if future.exception() is None and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
                 self._logger.warning(f"the goal of '{self._name}' was {goal.status}")
             self._behaviours.put('result', response.result)

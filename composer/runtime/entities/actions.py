@@ -51,7 +51,7 @@ class ActionServer(RosActionServer):
             node.ros,
             import_interface(spec.type),
             spec.action,
-            execute_callback=self._execution.execute,
+            execute_callback=self._execute_as_now,
             callback_group=node.serving,
             goal_callback=self._decide,
             handle_accepted_callback=self._add,
@@ -108,6 +108,10 @@ class ActionServer(RosActionServer):
             threading.Thread(
                 target=self._execute_here, args=(callback, goal_handle), daemon=True
             ).start()
+
+    async def _execute_as_now(self, goal: Any) -> Any:
+        # An edit may have put another one in its place.
+        return await self._execution.execute(goal)
 
     def _create_accept(self, spec: ActionSpec) -> BehaviourCall | None:
         if spec.accept is None:

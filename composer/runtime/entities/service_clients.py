@@ -91,6 +91,8 @@ class ServiceClient:
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
+        message = f"an edit took the client of '{self._service}' away, which this call waited for"
+        self._requests.end(ServiceNotAvailableError(message))
         self._node.ros.destroy_client(self._client)
 
     def _unavailable(self, timeout_sec: float) -> CallError:

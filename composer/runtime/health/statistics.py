@@ -16,7 +16,7 @@ from composer.runtime.behaviours.tracebacks import summarize
 from composer.runtime.health.missed import MissedCounts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
     from composer.runtime.behaviours.running_calls import Owner, RunningCall
 
@@ -255,16 +255,15 @@ class HealthRegistry:
         """
         return self._entities.setdefault((node, owner), EntityHealth())
 
-    def forget(self, node: str, owns: Callable[[Owner], bool]) -> None:
-        """Forget entities of a node that are gone.
+    def keep(self, owners: Mapping[str, Collection[Owner]]) -> None:
+        """Forget entities that are gone.
 
         Args:
-            node: The node's full name.
-            owns: Whether an owner's behaviours are among them.
+            owners: Whose behaviours are still there, by the full names of their nodes.
         """
-        for key in list(self._entities):
-            if key[0] == node and owns(key[1]):
-                del self._entities[key]
+        for node, owner in list(self._entities):
+            if owner not in owners.get(node, ()):
+                del self._entities[node, owner]
 
     def reports(
         self, period_sec: float, overdue: Iterable[tuple[str, RunningCall]], now_ns: int
@@ -282,5 +281,5 @@ class HealthRegistry:
             longest[key] = max(longest.get(key, 0.0), (now_ns - call.since_ns) / 1e9)
         return {
             key: entity.report(period_sec, longest.get(key, 0.0))
-            for key, entity in list(self._entities.items())
+            for key, entity in self._entities.copy().items()
         }

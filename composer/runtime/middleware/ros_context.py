@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
+from composer.processes import own_process
 from composer.runtime.middleware.shared_memory import remove_left_segments
 from composer.runtime.reserved_methods import reserve
 
@@ -86,10 +87,13 @@ def leave_graph_at_exit(context: Context, nodes: Any) -> bool:
     # The last one is called first, the first one with the exit code.
     for function in (libc._exit, libc.fcloseall, stop_all):  # noqa: SLF001 - a name of C
         libc.on_exit(function, None)
+    own_process.before_start_again(stop_all)
+    own_process.before_start_again(lambda: libc.fflush(None))
     return True
 
 
 def _find_stop_all() -> Any:
     """Return the function of Fast DDS that shuts it down; `None` if ROS does not use it."""
     found = re.search(r'/\S*/(libfastrtps|libfastdds)\.so\S*', Path('/proc/self/maps').read_text())
-    return found and getattr(ctypes.CDLL(found[0]), _STOP_ALL[found[1]], None)
+    # As in `PyDLL`: while it runs, no other thread may use what it shuts down.
+    return found and getattr(ctypes.PyDLL(found[0]), _STOP_ALL[found[1]], None)

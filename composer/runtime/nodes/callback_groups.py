@@ -8,6 +8,7 @@ The executor asks a group before it takes a message, so nothing is lost at a clo
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+from weakref import ref
 
 from rclpy.action import ActionServer
 from rclpy.callback_groups import (
@@ -84,6 +85,10 @@ class _GatedGroup(CallbackGroup):
     def __init__(self, gate: Gate) -> None:
         super().__init__()
         self._gate = gate
+
+    def add_entity(self, entity: Any) -> None:
+        """Add an entity until it is gone; the base class would keep a dead reference to it."""
+        self.entities.add(ref(entity, self.entities.discard))
 
     def can_execute(self, entity: Any) -> bool:
         """See the base class."""

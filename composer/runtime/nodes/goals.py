@@ -12,6 +12,7 @@ from composer.errors import GoalTimeoutError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from composer.errors import ComposerError
     from composer.runtime.behaviours.waits import Waits
 
 _STATUS_NAMES = {
@@ -44,9 +45,16 @@ class Goal:
         self._handle = handle
         self.result_future = handle.get_result_async()
 
+    def lose(self, error: ComposerError) -> None:
+        """Let who waits for the result have an error, as the client goes."""
+        if not self.result_future.done():
+            self.result_future.set_exception(error)
+
     @property
     def status(self) -> str:
         """The state of the goal: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
+        if self.result_future.exception() is not None:
+            return _STATUS_NAMES[GoalStatus.STATUS_UNKNOWN]
         if self.result_future.done():
             return _STATUS_NAMES[self.result_future.result().status]
         return 'executing'
@@ -79,6 +87,7 @@ class Goal:
 
         Raises:
             GoalTimeoutError: It did not end within `timeout` seconds.
+            ActionNotAvailableError: An edit took the action client away.
             SystemStoppingError: A stop was requested while it waited.
         """
         if not self._waits.until_done(self.result_future, timeout):

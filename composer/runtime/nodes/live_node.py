@@ -327,19 +327,21 @@ class LiveNode:
                 del self.limits[owner]
 
     def forget(self, noun: str, name: str) -> None:
-        """Forget what is known of an entity that is gone: its `own_state`, limits and health."""
+        """Forget what is known of an entity that is gone: its limits and `own_state`."""
+        self.drop_limits(noun, name)
+        for owner in list(self._views):
+            if (owner.kind, owner.name) == (noun, name):
+                del self._views[owner]
 
-        def owns(owner: Owner) -> bool:
-            return (owner.kind, owner.name) == (noun, name)
-
-        for known in (self.limits, self._views):
-            for owner in filter(owns, list(known)):
-                del known[owner]
-        self.system.health.forget(self.full_name, owns)
-
-    def forget_all(self) -> None:
-        """Forget the health of all its entities: it is gone for good."""
-        self.system.health.forget(self.spec.full_name, lambda _owner: True)
+    def take_over(self, old: LiveNode) -> None:
+        """Begin where a node that was the same ended: with its state and parameters."""
+        vars(self.behaviour_node.state).update(vars(old.behaviour_node.state))
+        for owner, view in old._views.items():
+            self._views[owner].own_state = view.own_state
+        for name in self.spec.parameters:
+            self.ros.put_parameter(*old.ros.copy_parameter(name))
+        if self.parameters and old.parameters:
+            self.parameters.set_live |= old.parameters.set_live
 
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""

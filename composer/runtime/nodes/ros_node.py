@@ -51,7 +51,7 @@ from composer.runtime.logs import has_rosout_publisher
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from rcl_interfaces.msg import ParameterEvent
+    from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent
     from rclpy.context import Context
     from rclpy.publisher import Publisher
 
@@ -142,6 +142,15 @@ class ComposedRosNode(Node):
         if self._late_events is not None:
             self._late_events.create()
         self._parameter_service = ParameterService(self)
+
+    def copy_parameter(self, name: str) -> tuple[Parameter, ParameterDescriptor]:
+        """Return a parameter and its descriptor, for `put_parameter`."""
+        return self._parameters[name], self._descriptors[name]
+
+    def put_parameter(self, parameter: Parameter, descriptor: ParameterDescriptor) -> None:
+        """Make a parameter what it was: nobody is asked, and nothing refuses it."""
+        self._parameters[parameter.name] = parameter
+        self._descriptors[parameter.name] = descriptor
 
     def wait_until_gone(self, timeout_sec: float) -> bool:
         """Wait until the destroyed node is gone; return whether it went in time.

@@ -41,6 +41,11 @@ class ServiceFailures:
             return self._times.get(service, float('-inf')) >= begun
 
 
+def never() -> bool:
+    """Return `False`."""
+    return False
+
+
 @dataclass(slots=True)
 class SystemHandle:
     """What nodes need of the system that they belong to.
@@ -60,6 +65,7 @@ class SystemHandle:
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
         services: Hands requests over between its nodes.
+        is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
     """
 
     context: Context
@@ -77,3 +83,4 @@ class SystemHandle:
     health: HealthRegistry
     topics: LocalTopics
     services: LocalServices
+    is_outdated: Callable[[], bool] = never

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from typing import TYPE_CHECKING, Any
 
+from composer.runtime.behaviours.callables import import_module
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
@@ -55,31 +57,37 @@ def fresh_modules(
 ) -> Iterator[Callable[[], None]]:
     """Let imports make new modules in place of those that are stale.
 
-    Yields what puts the old modules back as if nothing had been imported, which is also done if
-    the block raises.
+    If the block raises, the old modules are back as if nothing had been imported. Yields what
+    imports those that functions import when they run, for the errors in them to be found now.
 
     Args:
         stale: The full names of the modules to execute anew.
         sources: The texts of modules, by their names.
         search_path: Folders to search first from now on, as far as they are new.
     """
-    before = {name: module for name, module in sys.modules.items() if name in sources}
+    # A module that is gone has no source.
+    before = {name: sys.modules.get(name) for name in (*sources, *stale)}
     for name in stale:
         _put_back(name, None)
     new_folders = [each for each in map(str, search_path) if each not in sys.path]
     sys.path[:0] = new_folders
 
     def put_back() -> None:
-        for name in sources:
-            _put_back(name, before.get(name))
+        for name, module in before.items():
+            _put_back(name, module)
         for each in new_folders:
             sys.path.remove(each)
+
+    def import_rest() -> None:
+        for name in sorted(stale):
+            if before[name] is not None and sources.get(name):
+                import_module(name)
 
     finder: Any = _Finder(sources)
     sys.meta_path.insert(0, finder)
     importlib.invalidate_caches()
     try:
-        yield put_back
+        yield import_rest
     except BaseException:
         put_back()
         raise
@@ -91,8 +99,9 @@ def _put_back(name: str, module: ModuleType | None) -> None:
     """Make a module what this name means, in its package, too; `None` for no module."""
     package, _, last = name.rpartition('.')
     if module is None:
-        sys.modules.pop(name, None)
-        if package in sys.modules:
+        gone = sys.modules.pop(name, None)
+        # A package may have something else of this name.
+        if package in sys.modules and vars(sys.modules[package]).get(last) is gone:
             vars(sys.modules[package]).pop(last, None)
         return
     sys.modules[name] = module

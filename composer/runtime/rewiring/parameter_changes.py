@@ -52,21 +52,24 @@ class ParameterChange:
             return lambda: parameters.undeclare(name)
         value, was_set = node.behaviour_node.parameters[name], name in parameters.set_live
 
+        kept = node.ros.copy_parameter(name)
+
         def put_back() -> None:
-            if node.ros.has_parameter(name):
-                parameters.undeclare(name)
-            parameters.declare(before)
-            self._change(before, value)
+            # Nobody is asked: it has had this value.
+            node.ros.put_parameter(*kept)
+            parameters.specs[name] = before
             if was_set:
                 parameters.set_live.add(name)
 
+        given = node.ros.find_override(name)
+        # rclpy does not unset a parameter that has a type.
+        is_unset = not was_set and after is not None and after.value is None and given is None
         try:
-            if after is None or operation.action is Action.RECREATE:
+            if after is None or operation.action is Action.RECREATE or is_unset:
                 parameters.undeclare(name)
                 if after is not None:
                     parameters.declare(after)
             else:
-                given = node.ros.find_override(name)
                 self._change(after, value if was_set else after.value if given is None else given)
         except ComposerError:
             put_back()

@@ -21,6 +21,7 @@ from composer.planning.plan import Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.logs import set_level, system_logger
+from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -31,14 +32,16 @@ if TYPE_CHECKING:
     from composer.planning.plan import Operation, Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.entities.actions import ActionServer
-    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import NodeStarter
+    from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
 _SETTLE_SEC = 0.05
+_GONE_SEC = 1.0
 _SETTLE_POLL_SEC = 0.0005
 _GOING = (Action.RECREATE, Action.REMOVE)
 _COMING = (Action.RECREATE, Action.ADD)
@@ -73,39 +76,40 @@ class Rewiring:
         self._old, self._new = old, new
         self._before = {node.full_name: node for node in old.spec.nodes.values()}
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
+        self._clashing: Collection[Target] = ()
         self._undo: list[Callable[[], object]] = []
         self._finish: list[Callable[[], object]] = []
 
-    def wait_for_goals(self, plan: Plan, aborts: Callable[[], bool]) -> None:
+    def wait_for_goals(
+        self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
+    ) -> None:
         """Wait until no goal is in flight of an action that goes; it accepts no more.
 
         Args:
-            aborts: Returns whether the goals are aborted; asked again and again.
+            aborts: Returns whether the goals are aborted; asked again and again, as the next.
+            is_outdated: Returns whether there is a newer edit.
+
+        Raises:
+            ComposerError: There is one, and everything is as before.
         """
         servers = list(self._going_actions(plan))
         for server in servers:
-            server.retire(is_retired=True)
             self._undo.append(partial(server.retire, is_retired=False))
-        was_told = False
-        while any(each.has_goals for each in servers) and not self._handle.stop.is_set:
-            if aborts():
-                for server in servers:
-                    server.retire(is_retired=True, aborts=True)
-            elif not was_told:
-                was_told = True
-                system_logger.info('reload: waiting for the goals in flight of actions that go…')
-            sleep(_POLL_SEC)
+        wait_for_goals(servers, self._handle.stop, aborts, is_outdated)
 
-    def apply(self, plan: Plan) -> None:
+    def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
         """Do all that a plan says.
+
+        Args:
+            is_outdated: Returns whether there is a newer edit, for which an `on_start` is left.
 
         Raises:
             ComposerError: Something failed, and everything is as before.
         """
+        self._handle.is_outdated = is_outdated
         try:
-            self._refuse_restart(plan)
             self._read_as(self._new)
-            clashing = find_clashing_ends(self._old.spec, self._new.spec)
+            self._clashing = clashing = find_clashing_ends(self._old.spec, self._new.spec)
             at_first = self._are_in_the_way(plan, clashing)
             if at_first:
                 self._end_clashing(plan, clashing)
@@ -117,8 +121,11 @@ class Rewiring:
         except BaseException:
             self._undo_all()
             raise
+        finally:
+            self._handle.is_outdated = never
         for finish in self._finish:
             finish()
+        self._forget_health()
 
     def _going_actions(self, plan: Plan) -> Iterable[ActionServer]:
         for operation in plan.operations:
@@ -133,20 +140,19 @@ class Rewiring:
             actions: dict[str, Any] = node.entities['actions']
             yield from actions.values() if section == 'nodes' else [actions[name]]
 
-    def _refuse_restart(self, plan: Plan) -> None:
-        for operation in plan.operations:
-            if operation.noun == 'system' and operation.action is Action.RECREATE:
-                changes = ' and '.join(sorted({each.key for each in operation.changes}))
-                message = f'{changes} cannot change while the system runs: {operation.reason}'
-                raise StartError(message, help='stop the system, and start it again')
-
     def _undo_all(self) -> None:
+        self._handle.is_outdated = never
         self._read_as(self._old)
         for undo in reversed(self._undo):
             try:
                 undo()
             except Exception as error:  # noqa: BLE001 - the rest must be undone
                 system_logger.error(f'reload: something could not be undone: {error}')
+        self._forget_health()
+
+    def _forget_health(self) -> None:
+        """Forget the health of behaviours that are gone, or were not to come after all."""
+        self._handle.health.keep({name: node.limits for name, node in self._nodes.items()})
 
     def _read_as(self, reading: Reading) -> None:
         """Let what is created from now on, and what errors tell of places, be of these files."""
@@ -155,6 +161,18 @@ class Rewiring:
         handle.profiles = spec.qos
         handle.functions = reading.functions
         handle.without_parameter_services = spec.without_parameter_services
+
+    def _create(self, target: Target, node: LiveNode, spec: Any) -> LiveEntity:
+        """Create an entity; one whose topic gets another type when the old ends have gone."""
+        deadline = monotonic() + (_GONE_SEC if target in self._clashing else 0.0)
+        while True:
+            try:
+                return create_entity(node, target[1], spec)
+            except StartError:
+                # The middleware may still deliver to one of them.
+                if monotonic() > deadline:
+                    raise
+            sleep(_POLL_SEC)
 
     def _are_in_the_way(self, plan: Plan, clashing: Collection[Target]) -> bool:
         """Return whether nodes that come need what clashes to be gone."""
@@ -186,7 +204,7 @@ class Rewiring:
             ]
 
         nodes = self._nodes
-        removed = {name: nodes[name] for name in targets('nodes', Action.REMOVE)}
+        removed = targets('nodes', Action.REMOVE)
         self._end_nodes(targets('nodes', Action.RECREATE))
         self._end_nodes(name for name in removed if name in clashing)
         self._end_processes(targets('processes', Action.RECREATE))
@@ -195,10 +213,9 @@ class Rewiring:
             process = self._processes.by_name[name]
             self._undo.append(partial(process.change, process.spec))
             process.change(self._new.spec.processes[name])
-        for full_name, node in removed.items():
+        for full_name in removed:
             if full_name in nodes:
                 self._finish.append(partial(self._restarter.remove, full_name))
-            self._finish.append(node.forget_all)
         for name in targets('processes', Action.REMOVE):
             self._finish.append(partial(self._processes.remove, name))
 
@@ -206,16 +223,15 @@ class Rewiring:
         """End nodes that are recreated; to undo that, they begin again with their state."""
         for full_name in names:
             node = self._nodes[full_name]
-            if not self._restarter.remove(full_name):
-                message = f"node '{node.spec.key}' cannot be recreated, because it hangs"
+            if not self._restarter.make_way(full_name):
+                calls = ', '.join(str(call.owner) for call in node.running.calls())
+                message = f"node '{node.spec.key}' cannot be recreated, because it hangs: {calls}"
                 raise StartError(message)
             self._undo.append(partial(self._begin_again, node))
 
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
-        vars(again.behaviour_node.state).update(vars(node.behaviour_node.state))
-        if node.parameters:
-            again.ros.set_parameters(node.ros.get_parameters(sorted(node.parameters.set_live)))
+        again.take_over(node)
         self._start([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
@@ -351,7 +367,7 @@ class Rewiring:
             return
         if operation.action in _COMING:
             node.drop_limits(operation.noun, name)
-            created = create_entity(node, section, spec)
+            created = self._create(operation.target, node, spec)
             self._undo.append(created.destroy)
             if section == 'timers':
                 self._finish.append(partial(_start_timer, created))
@@ -363,6 +379,39 @@ class Rewiring:
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             self._finish.append(partial(node.forget, operation.noun, name))
+
+
+def wait_for_goals(
+    servers: Collection[ActionServer],
+    stop: StopRequest,
+    aborts: Callable[[], bool],
+    is_outdated: Callable[[], bool],
+) -> None:
+    """Let actions accept no more goals, and wait until none is in flight, or for a stop.
+
+    Args:
+        aborts: Returns whether the goals are aborted; asked again and again.
+        is_outdated: Returns whether there is a newer edit; asked again and again.
+
+    Raises:
+        StartError: There is; the actions accept goals again.
+    """
+    for server in servers:
+        server.retire(is_retired=True)
+    was_told = False
+    while any(each.has_goals for each in servers) and not stop.is_set:
+        if is_outdated():
+            for server in servers:
+                server.retire(is_retired=False)
+            message = 'the files have changed while goals were waited for'
+            raise StartError(message)
+        if aborts():
+            for server in servers:
+                server.retire(is_retired=True, aborts=True)
+        elif not was_told:
+            was_told = True
+            system_logger.info('reload: waiting for the goals in flight of actions that go…')
+        sleep(_POLL_SEC)
 
 
 def _create_again(node: LiveNode, section: str, spec: Any) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.checks.connections import topology
+from composer.checks.connections import topology, unconnected
 
 TALK = 'timers: {a: {period: 1, publish: out, message: hello}}'
 HEAR = 'behaviour: parts:hear'
@@ -268,6 +268,24 @@ def test_the_other_end_may_be_external(check):
         (6, 'no-server'),
         (7, 'no-server'),
     ]
+
+
+def test_names_in_many_namespaces_are_compared_within_a_limit(check, monkeypatch):
+    compared = []
+    count_edits = unconnected.count_edits
+    monkeypatch.setattr(
+        unconnected, 'count_edits', lambda *words: compared.append(words) or count_edits(*words)
+    )
+    nodes = f"""
+  'n{{{{ i }}}}':
+    foreach: {{i: '{{{{ range(100) }}}}'}}
+    publishers: {{p: std_msgs/msg/String}}
+    timers: {{t: {{period: 1, publish: p, message: x}}}}
+    subscriptions:
+      s: {{type: std_msgs/msg/String, topic: '/n{{{{ i }}}}/p', external: true, {HEAR}}}
+"""
+    assert len(check(nodes, CODE)) == 1
+    assert 0 < len(compared) <= unconnected._MOST_COMPARED
 
 
 def test_a_name_that_the_command_line_decides_meets_anything(check):

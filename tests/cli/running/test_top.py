@@ -153,3 +153,13 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
     terminal('send-keys', 'q')
     shows('exit code 0')
     assert child.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ('terminal', 'answer'), [('xterm', 'True'), ('dumb', 'False'), ('no-such-terminal', 'False')]
+)
+def test_there_is_a_screen_where_the_terminal_can_draw_one(monkeypatch, terminal, answer):
+    # A process learns about its terminal once.
+    monkeypatch.setenv('TERM', terminal)
+    command = 'from composer.cli.running.top_screen import can_draw; print(can_draw())'
+    assert subprocess.check_output([sys.executable, '-c', command], text=True) == f'{answer}\n'

@@ -11,6 +11,7 @@ pytest.importorskip('rclpy')
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
+from std_msgs.msg import String
 
 from composer.executor import ComposerExecutor
 from composer.runtime.control.name_claim import NameClaim, list_claims
@@ -106,6 +107,10 @@ class Host:
         Rivals(self._node, group, {'host': name}, begun, self.refused_by.append)
         self._executor.add_node(self._node)
         self._executor.create_task(lambda: None)
+        self._talker = self._node.create_publisher(String, '~/claims', 100)
+
+    def say(self, text):
+        self._talker.publish(String(data=text))
 
     def spin(self):
         self._executor.spin_once(0.01)
@@ -127,11 +132,14 @@ def test_of_systems_on_several_hosts_the_one_that_was_there_first_stays(domain_i
             return sum(not host.refused_by for host in hosts) == 1
 
         wait_for(one_is_left, 'two of three to be refused')
+        # Anybody may say anything there.
+        hosts[0].say('[' * 10_000)
         for _ in range(50):
             for host in hosts:
                 host.spin()
         left = [index for index, host in enumerate(hosts) if not host.refused_by]
         assert len(left) == 1
+        assert sum(len(host.refused_by) for host in hosts) == 2
         if max(ages):
             assert left == [ages.index(max(ages))]
     finally:

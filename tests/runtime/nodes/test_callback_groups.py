@@ -6,8 +6,9 @@ pytest.importorskip('rclpy')
 
 from std_srvs.srv import Empty
 
-from composer.runtime.nodes.callback_groups import Gate
+from composer.runtime.nodes.callback_groups import Gate, GatedReentrantGroup
 from composer.runtime.stop_request import StopRequest
+from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -130,3 +131,13 @@ def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(no
     assert not gate.allows_events()
     assert gate.allows(service)
     assert gate.allows_requests()
+
+
+def test_a_group_keeps_nothing_of_an_entity_that_is_gone(node):
+    group = GatedReentrantGroup(Gate(StopRequest()))
+    for _ in range(3):
+        service = node.create_service(Empty, 'served', print, callback_group=group)
+        assert group.has_entity(service)
+        node.destroy_service(service)
+    del service
+    wait_for(lambda: not group.entities, 'the entities to be gone')

@@ -1,331 +1,247 @@
-"""A system of every kind of entity, and random edits of it: of the file, and of its modules."""
+"""Random edits of a system's files: of each key of the schema, and of the modules."""
 
 import copy
 import json
 import random
+import re
 
-MODULE = """
-LEVEL = 1
+from tests.runtime.rewiring.base_system import (
+    DOCUMENTS,
+    MODULES,
+    PARAMETERS,
+    PROGRAM,
+    SHARE,
+    SYSTEM,
+    WITNESS_NODE,
+)
+from tests.runtime.rewiring.edit_values import NULL, VALUES
+from tests.runtime.rewiring.schema_keys import ANY, read_schema_keys
 
-
-def tick(node, text='x'):
-    node.own_state['n'] = node.own_state.get('n', 0) + 1
-    return text
-
-
-def steps(node):
-    while True:
-        yield 'a'
-        yield 'b'
-
-
-def hear(node, message, prefix=''):
-    return f'{prefix}{message.data}'
-
-
-async def hear_later(node, message):
-    return message.data
-
-
-def answer(node, request):
-    return {'success': True, 'message': 'yes'}
-
-
-def count(node, goal):
-    for number in range(goal.order):
-        yield {'sequence': [number]}
-    return {'sequence': [1]}
-
-
-def accept(node, goal):
-    return goal.order < 10
-
-
-def follow(node, feedback):
-    node.state.last = feedback
-
-
-def begin(node):
-    node.logger.debug('begun')
-
-
-def decide(node, changes):
-    return 'no' if changes.get('speed') == 99.0 else None
-"""
-
-PEER = """
-def tick(node, text='y'):
-    return text
-
-
-def hear(node, message, prefix='p'):
-    return None
-"""
-
-PARAMETERS = '/**:\n  ros__parameters:\n    limit: {limit}\n'
-
-SYSTEM = {
-    'version': 1,
-    'qos': {'near': {'depth': 3}},
-    'diagnostics': False,
-    'nodes': {
-        'talker': {
-            'parameters': {
-                'speed': {'default': 1.0, 'minimum': 0.0, 'maximum': 100.0},
-                'name': 'Alice',
-                'limit': 5,
-            },
-            'parameter_files': ['parameters.yaml'],
-            'state': {'begun': False, 'last': None},
-            'publishers': {
-                'out': {'type': 'std_msgs/msg/String', 'external': True},
-                'more': {'type': 'std_msgs/msg/String', 'topic': 'far', 'external': True},
-            },
-            'timers': {
-                'tick': {'period': 0.5, 'behaviour': 'parts:tick', 'publish': 'out'},
-                'steps': {'period': 0.7, 'behaviour': 'parts:steps', 'publish': 'more'},
-                'constant': {'rate': 2.0, 'publish': 'out', 'message': 'hello'},
-            },
-            'on_start': 'parts:begin',
-            'on_parameters': 'parts:decide',
-        },
-        'listener': {
-            'publishers': {'echo': {'type': 'std_msgs/msg/String', 'external': True}},
-            'subscriptions': {
-                'hear': {
-                    'type': 'std_msgs/msg/String',
-                    'topic': 'out',
-                    'behaviour': 'parts:hear',
-                    'publish': 'echo',
-                    'qos': 'near',
-                },
-                'later': {
-                    'type': 'std_msgs/msg/String',
-                    'topic': 'far',
-                    'behaviour': 'parts:hear_later',
-                    'publish': 'echo',
-                },
-            },
-            'services': {
-                'ask': {'type': 'std_srvs/srv/Trigger', 'behaviour': 'parts:answer'},
-            },
-            'actions': {
-                'count': {'type': 'test_msgs/action/Fibonacci', 'behaviour': 'parts:count'},
-            },
-        },
-        'user': {
-            'namespace': '/inner',
-            'service_clients': {'ask': {'type': 'std_srvs/srv/Trigger', 'service': '/ask'}},
-            'action_clients': {
-                'count': {
-                    'type': 'test_msgs/action/Fibonacci',
-                    'action': '/count',
-                    'feedback': 'parts:follow',
-                }
-            },
-        },
-    },
-    'processes': {'sleeper': {'command': ['sleep', '1000']}},
+# Of what the file may say in short: the key that it is short for.
+_LONG_FORMS = {
+    'args': 'default',
+    'parameters': 'default',
+    'publishers': 'type',
+    'service_clients': 'type',
+    'action_clients': 'type',
+    'on_start': 'behaviour',
+    'on_stop': 'behaviour',
+    'on_parameters': 'behaviour',
+    'diagnostics': None,
+    'qos': None,
 }
-
-_TYPES = ['std_msgs/msg/String', 'std_msgs/msg/Header', 'nowhere/msg/Wrong']
-_QOS = [None, 'near', 'sensor_data', {'depth': 7}, {'durability': 'transient_local'}, {'dept': 1}]
-_BEHAVIOURS = ['parts:hear', 'parts:hear_later', 'peer:hear', 'parts:nothing']
-_ON_ERROR = ['log', 'restart', 'shutdown']
-# By section: the keys of an entity, and values for them; `None` removes the key.
-_CHOICES = {
-    'parameters': {
-        'default': [0.5, 2.0, 99.0, 1000.0, 'fast'],
-        'maximum': [50.0, 100.0],
-        'description': ['how fast', None],
-        'read_only': [True, None],
-        'step': [0.5, None],
-    },
-    'publishers': {'type': _TYPES, 'topic': ['out', 'far', 'away', None], 'qos': _QOS},
-    'timers': {
-        'period': [0.1, 0.4, 3.0, -1.0],
-        'behaviour': ['parts:tick', 'parts:steps', 'peer:tick'],
-        'with': [{'text': 'z'}, {'txt': 'z'}, None],
-        'publish': ['out', 'more', 'nothing', None],
-        'clock': ['steady', 'system', None],
-        'group': ['reentrant', 'own', None],
-        'on_error': _ON_ERROR,
-        'warn_after': [0.1, 2.0, None],
-    },
-    'subscriptions': {
-        'type': _TYPES,
-        'topic': ['out', 'far', 'away'],
-        'behaviour': _BEHAVIOURS,
-        'with': [{'prefix': 'z'}, None],
-        'publish': ['echo', None],
-        'qos': _QOS,
-        'group': ['reentrant', 'own', None],
-        'on_error': _ON_ERROR,
-        'external': [True, None],
-    },
-    'services': {
-        'service': ['ask', 'tell'],
-        'behaviour': ['parts:answer', 'parts:anwser'],
-        'group': ['reentrant', None],
-        'warn_after': [0.2, None],
-    },
-    'service_clients': {'service': ['/ask', '/tell'], 'external': [True, None]},
-    'actions': {
-        'action': ['count', 'compute'],
-        'accept': ['parts:accept', None],
-        'concurrency': ['queue', 'reject', 'preempt', 'parallel'],
-    },
-    'action_clients': {
-        'action': ['/count', '/compute'],
-        'feedback': ['parts:follow', None],
-        'external': [True, None],
-    },
-}
-_NODE_CHOICES = {
-    'log_level': ['debug', 'error', None],
-    'use_sim_time': [True, None],
-    'rosout': [False, None],
-    'parameter_services': [False, None],
-    'on_error': _ON_ERROR,
-    'warn_after': [1.0, None],
-    'remap': [{'far': 'further'}, None],
-    'on_start': ['parts:begin', None],
-    'on_stop': ['parts:begin', None],
-    'on_parameters': ['parts:decide', None],
-    'description': ['a node', None],
-    'namespace': ['/inner', '/outer', None],
-    'colour': ['red', None],
-}
-_PROCESS_CHOICES = {
-    'command': [['sleep', '1000'], ['sleep', '2000'], ['slepe', '1']],
-    'required': [True, None],
-    'env': [{'A': 'b'}, None],
-    'restart': ['always', None],
-}
+_SECTIONS = ('parameters', 'publishers', 'subscriptions', 'timers', 'services', 'service_clients')
+_SECTIONS = (*_SECTIONS, 'actions', 'action_clients')
+_LINES = (
+    *('# {}', 'LEVEL_{} = 1', 'class Level{}:\n    pass', 'import nothing_{}', 'def broken_{}(:'),
+    *(
+        '1 / 0',
+        'import helper\nassert helper.WORD == {}',
+        'raise SystemExit({})',
+        'from . import x',
+    ),
+)
+_RENAMES = (('def tick(', 'def tock('), ('def hear(', 'def haer('), ('node, text=', 'node, txt='))
+_LIMITS = ('5', '8', '1.5', 'many', '[1', '[1, 2]')
 
 
 class Project:
     """The files of a system, and edits of them that a seed decides.
 
     Attributes:
-        data: What the system's file says.
+        path: The system's file.
+        edited: The keys of the schema that edits have given a value.
     """
 
     def __init__(self, folder, seed):
         self._folder = folder
         self._random = random.Random(seed)
-        self.data = copy.deepcopy(SYSTEM)
-        self._texts = {'parts.py': MODULE, 'peer.py': PEER}
+        self._places = read_schema_keys()
+        self._documents = copy.deepcopy(DOCUMENTS)
+        self._texts = dict(MODULES)
         self._texts['parameters.yaml'] = PARAMETERS.format(limit=7)
-        self._count = 0
+        self._texts['others.yaml'] = 'talker:\n  ros__parameters:\n    name: Carol\n'
+        self._texts[SHARE] = ''
+        self._texts[PROGRAM] = '#!/bin/sh\nexec sleep 1000\n'
+        self._number = 0
         self._valid = None
-        self._write()
+        self.edited = set()
 
     @property
     def path(self):
         return self._folder / 'system.yaml'
 
+    @property
+    def paths(self):
+        """The system's file and its layer."""
+        return [self.path, self._folder / 'layer.yaml']
+
     def edit(self):
         """Make one to three edits; return what they are."""
-        done = [
-            self._random.choice(self._edits())() for _ in range(self._random.choice([1, 1, 2, 3]))
-        ]
-        self._write()
-        return done
+        times = self._random.choice([1, 1, 1, 2, 2, 3])
+        return [self._edit() for _ in range(times)]
 
     def keep(self):
         """Remember the files as they are: they are valid."""
-        self._valid = copy.deepcopy((self.data, self._texts))
+        self._valid = copy.deepcopy((self._documents, self._texts))
 
     def go_back(self):
         """Make the files what they were when they were valid."""
-        self.data, self._texts = copy.deepcopy(self._valid)
-        self._write()
+        self._documents, self._texts = copy.deepcopy(self._valid)
 
-    def _write(self):
-        # JSON is YAML.
-        self.path.write_text(json.dumps(self.data, indent=1))
+    def write(self):
+        """Write all files."""
+        for name, data in self._documents.items():
+            # JSON is YAML.
+            (self._folder / name).write_text(json.dumps(data, indent=1))
         for name, text in self._texts.items():
-            (self._folder / name).write_text(text)
+            path = self._folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if text is None:
+                path.unlink(missing_ok=True)
+            else:
+                path.write_text(text)
+        (self._folder / PROGRAM).chmod(0o755)
 
-    def _edits(self):
-        edits = [self._edit_entity] * 10 + [self._edit_node, self._edit_module, self._edit_process]
-        return [*edits, self._edit_state, self._edit_limit, self._add_or_remove, self._rename]
+    def set_key(self, key, value):
+        """Give a key a value at one of its places; return where, `None` for nowhere."""
+        document = self._random.choice(['system.yaml'] * 8 + ['part.yaml', 'part.yaml'])
+        data = self._documents[document]
+        owners = [
+            (*found, place[-1])
+            for place in self._places[key]
+            for found in _find(data, place[:-1], ())
+            if 'witness' not in found
+        ]
+        if not owners:
+            return None
+        *owner, last = self._random.choice(owners)
+        _set(data, owner, last, copy.deepcopy(value))
+        self._documents['system.yaml'].setdefault('nodes', {})['witness'] = WITNESS_NODE
+        self.edited.add(key)
+        return f'{document}: {".".join(map(str, [*owner, last]))} = {value!r}'
 
-    def _choose(self, mapping):
-        return self._random.choice(sorted(mapping)) if mapping else None
+    def _edit(self):
+        """Make one edit; return what it is."""
+        modules = [self._edit_module] * 4
+        rest = [self._edit_layer, self._edit_limit, self._add_or_remove, self._rename, self._reset]
+        edits = [*[self._edit_key] * 15, *modules, *rest]
+        while (done := self._random.choice(edits)()) is None:
+            pass
+        return done
 
-    def _set(self, entry, choices):
-        key = self._choose(choices)
-        value = self._random.choice(choices[key])
-        entry.pop(key, None)
-        if value is not None:
-            entry[key] = copy.deepcopy(value)
-        return f'{key}={value}'
-
-    def _edit_entity(self):
-        node = self._choose(self.data['nodes'])
-        section = self._choose(set(self.data['nodes'][node]) & set(_CHOICES))
-        entries = self.data['nodes'][node].get(section)
-        name = self._choose(entries)
-        if name is None or not isinstance(entries[name], dict):
-            return 'nothing'
-        return f'{node}.{section}.{name}.{self._set(entries[name], _CHOICES[section])}'
-
-    def _edit_node(self):
-        node = self._choose(self.data['nodes'])
-        return f'{node}.{self._set(self.data["nodes"][node], _NODE_CHOICES)}'
-
-    def _edit_process(self):
-        processes = self.data.setdefault('processes', {})
-        name = self._random.choice(['sleeper', 'other'])
-        if name in processes and self._random.random() < 0.3:
-            del processes[name]
-            return f'no process {name}'
-        entry = processes.setdefault(name, {'command': ['sleep', '1000']})
-        return f'process {name}.{self._set(entry, _PROCESS_CHOICES)}'
+    def _edit_key(self):
+        key = self._random.choice(sorted(VALUES))
+        value = self._random.choice(VALUES[key])
+        return self.set_key(key, value)
 
     def _edit_module(self):
-        name = self._random.choice(['parts.py', 'peer.py'])
-        self._count += 1
-        line = self._random.choice(['LEVEL = {}', 'import nothing_{}', 'def broken(:', '# {}'])
-        self._texts[name] += line.format(self._count) + '\n'
+        name = self._random.choice(sorted(MODULES))
+        self._number += 1
+        text = self._texts[name]
+        what = self._random.random()
+        if text is None or what < 0.05:
+            self._texts[name] = MODULES[name] if text is None else None
+            return f'{name}: comes or goes'
+        if what < 0.6:
+            self._texts[name] = re.sub(r'(?<=TAG = )\d+', str(self._number), text, count=1)
+            return f'{name}: TAG = {self._number}'
+        if what < 0.7:
+            self._texts[name] = re.sub("(?<=WORD = ')w.*?(?=')", f'w{self._number}', text)
+            return f'{name}: WORD = w{self._number}'
+        if what < 0.8:
+            old, new = self._random.choice(_RENAMES)
+            self._texts[name] = text.replace(old, new)
+            return f'{name}: {old} -> {new}'
+        line = self._random.choice(_LINES).format(self._number)
+        self._texts[name] = f'{text}\n\n{line}\n'
         return f'{name}: {line}'
 
-    def _edit_state(self):
-        node = self._choose(self.data['nodes'])
-        state = self.data['nodes'][node].setdefault('state', {})
-        return (
-            f'{node}.state.{self._set(state, {"begun": [False, None], "extra": [1, [2], None]})}'
-        )
+    def _edit_layer(self):
+        layer = self._documents['layer.yaml'] = copy.deepcopy(DOCUMENTS['layer.yaml'])
+        nodes = self._documents['system.yaml']['nodes']
+        node = self._random.choice(sorted(nodes.keys() - {'witness'}) or ['nobody'])
+        key = self._random.choice(sorted(each for each in VALUES if each.startswith('node.')))
+        value = self._random.choice(VALUES[key])
+        layer['nodes'][node] = {key.partition('.')[2]: None if value == NULL else value}
+        if self._random.random() < 0.5:
+            layer['nodes'] = {}
+        return f'layer.yaml: {layer["nodes"]}'
 
     def _edit_limit(self):
-        limit = self._random.choice(['5', '8', '1.5', 'many'])
+        limit = self._random.choice(_LIMITS)
         self._texts['parameters.yaml'] = PARAMETERS.format(limit=limit)
         return f'parameters.yaml: {limit}'
 
     def _add_or_remove(self):
-        node = self._choose(self.data['nodes'])
-        section = self._choose(set(self.data['nodes'][node]) & set(_CHOICES))
-        entries = self.data['nodes'][node].get(section)
-        name = self._choose(entries)
-        if name is not None and self._random.random() < 0.5:
-            del entries[name]
+        nodes = self._documents['system.yaml']['nodes']
+        node = self._random.choice(sorted(nodes))
+        entries = nodes[node]
+        section = self._random.choice(_SECTIONS)
+        mine = entries.get(section)
+        if node == 'witness' or (mine is not None and not isinstance(mine, dict)):
+            return None
+        if mine and self._random.random() < 0.5:
+            name = self._random.choice(sorted(mine))
+            del mine[name]
             return f'no {node}.{section}.{name}'
-        origin = self._choose(SYSTEM['nodes'])
-        section = self._choose(set(SYSTEM['nodes'][origin]) & set(_CHOICES))
-        name = self._choose(SYSTEM['nodes'][origin][section])
-        self._count += 1
-        target = self.data['nodes'][node].setdefault(section, {})
-        target[name] = copy.deepcopy(SYSTEM['nodes'][origin][section][name])
+        origins = [each for each in SYSTEM['nodes'] if section in SYSTEM['nodes'][each]]
+        origin = self._random.choice(sorted(set(origins) - {'witness'}))
+        name = self._random.choice(sorted(SYSTEM['nodes'][origin][section]))
+        entry = copy.deepcopy(SYSTEM['nodes'][origin][section][name])
+        entries.setdefault(section, {})[name] = entry
         return f'{node}.{section}.{name} as of {origin}'
 
     def _rename(self):
-        nodes = self.data['nodes']
-        node = self._choose(nodes)
-        name = self._random.choice(['talker', 'listener', 'user', 'fourth', 'fifth'])
-        if self._random.random() < 0.5 and len(nodes) > 1:
-            del nodes[node]
+        nodes = self._documents['system.yaml']['nodes']
+        node = self._random.choice(sorted(nodes.keys() - {'witness'}) or ['nobody'])
+        name = self._random.choice(['talker', 'listener', 'user', 'fourth', '/full/fifth'])
+        if self._random.random() < 0.4:
+            nodes.pop(node, None)
             return f'no node {node}'
-        nodes[name] = copy.deepcopy(nodes[node])
+        origin = self._random.choice([SYSTEM['nodes'], nodes])
+        node = node if node in origin else 'talker'
+        nodes[name] = copy.deepcopy(origin.get(node, {}))
         return f'node {name} as {node}'
+
+    def _reset(self):
+        self._documents = copy.deepcopy(DOCUMENTS)
+        self._texts |= MODULES
+        self._texts['parameters.yaml'] = PARAMETERS.format(limit=7)
+        return 'all as at first'
+
+
+def _find(value, place, found):
+    """Yield the paths that a place stands for; what may be there and is not counts, too."""
+    if not place:
+        yield found
+        return
+    first, *rest = place
+    if first != ANY:
+        inner = value.get(first) if isinstance(value, dict) else None
+        yield from _find(inner, rest, (*found, first))
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _find(inner, rest, (*found, key))
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _find(inner, rest, (*found, index))
+
+
+def _set(data, owner, last, value):
+    """Set or remove a key at a path; what stands in its way becomes its long form."""
+    at = data
+    for index, key in enumerate(owner):
+        if isinstance(at, list) and not isinstance(key, int):
+            return
+        inner = at[key] if isinstance(at, list) else at.get(key)
+        if not isinstance(inner, dict | list):
+            names = [_LONG_FORMS[each] for each in owner[: index + 1] if each in _LONG_FORMS]
+            inner = at[key] = {names[-1]: inner} if names and names[-1] and inner else {}
+        at = inner
+    if not isinstance(at, dict):
+        return
+    if value is None:
+        at.pop(last, None)
+    else:
+        at[last] = None if value == NULL else value

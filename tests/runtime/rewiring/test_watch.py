@@ -13,6 +13,7 @@ pytestmark = pytest.mark.ros
 
 SYSTEM = """\
 version: 1
+executor: {shutdown_timeout: 1}
 nodes:
   counter:
     parameters: {step: 1}
@@ -211,6 +212,50 @@ def test_modules_are_executed_anew_wherever_they_are_imported(running):
     (package / 'words.py').rmdir()
     (package / 'words.py').write_text("WORD = 'four'\n")
     running.child.wait_for_line('heard four')
+
+
+def test_what_hangs_is_left_for_the_next_edit(running):
+    good = "WORD = 'one'\n"
+    for number, hang in enumerate(('while True:\n    pass\n', 'time.sleep(1000)\n')):
+        word = f"WORD = 'word{number}'\n"
+        running.edit(good, good + hang, 'parts.py')
+        said = len(running.child.matching('heard'))
+        running.child.wait_for_line('heard', times=said + 20)
+        running.edit(good + hang, word, 'parts.py')
+        running.child.wait_for_line(f'heard word{number} ')
+        good = word
+    late = '  late:\n    on_start: parts:hang\n  listener:'
+    running.edit('  listener:', late)
+    running.edit('{step: 1}', '{step: 2}')
+    time.sleep(0.3)
+    running.edit(late, '  listener:')
+    running.child.wait_for_line('~1 parameter')
+    assert not running.child.matching('not reloaded')
+    # As for any behaviour that does not end.
+    assert running.child.stop() == 1
+    assert not running.child.matching('did not end in time')
+
+
+def test_nodes_that_hang_in_on_stop_make_way(running):
+    running.edit('  listener:', '  brief:\n    on_stop: parts:hang\n  listener:')
+    running.reloaded()
+    running.edit('  brief:\n', '  brief:\n    rosout: false\n')
+    assert running.reloaded().endswith('±1 node')
+    running.edit('  brief:\n    rosout: false\n    on_stop: parts:hang\n', '')
+    assert running.reloaded().endswith('-1 node')
+    assert len(running.child.matching("node 'brief' hangs, and is removed: on_stop")) == 2
+    assert running.child.stop() == 1
+    assert not running.child.matching('did not end in time')
+
+
+def test_the_current_folder_may_change(running):
+    """Also to one with a folder `sys`, which is no module."""
+    running.edit('import time\n', "import os, sys\nimport time\n\nos.chdir('/')\n", 'parts.py')
+    running.reloaded()
+    running.edit("WORD = 'one'", "WORD = 'two'", 'parts.py')
+    running.edit('{step: 1}', '{step: 2}')
+    running.child.wait_for_line('heard two')
+    running.child.wait_for_line('~1 parameter')
 
 
 def test_removed_nodes_stop(running):

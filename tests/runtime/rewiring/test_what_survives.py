@@ -31,6 +31,15 @@ nodes:
       once: {period: 0.02, behaviour: parts:once}
     services:
       probe: {type: std_srvs/srv/Trigger, service: ~/probe, behaviour: probes:probe}
+      read: {type: std_srvs/srv/Trigger, service: /read, behaviour: library.use:read}
+  caller:
+    state: {answers: []}
+    service_clients: {ask: {type: std_srvs/srv/Trigger, external: true}}
+    timers:
+      call: {period: 0.02, behaviour: parts:call}
+      call_async: {period: 0.02, behaviour: parts:call_async, group: other}
+    services:
+      probe: {type: std_srvs/srv/Trigger, service: ~/probe, group: own, behaviour: probes:probe}
   ear:
     state: {heard: ''}
     subscriptions:
@@ -55,6 +64,23 @@ def once(node):
     yield
 
 
+def call(node):
+    try:
+        node.state.answers.append(node.call('ask', None, timeout=None).message)
+    except Exception as error:
+        node.state.answers.append(str(error))
+    yield
+
+
+async def call_async(node):
+    try:
+        response = await node.call_async('ask', None, timeout=None)
+        node.state.answers.append(response.message)
+    except Exception as error:
+        node.state.answers.append(str(error))
+    yield
+
+
 def hear(node, message):
     node.state.heard = type(message).__name__
 """
@@ -64,14 +90,86 @@ import json
 
 
 def probe(node, request):
-    return {'success': True, 'message': json.dumps(vars(node.state))}
+    return {'success': True, 'message': json.dumps(vars(node.state), default=repr)}
 """
+# Modules that import each other in each way that there is.
+LIBRARY = {
+    'library/use.py': """\
+import json
+
+import library.deep
+from library import circle
+from library.alone import Kept
+from library.base import Box, helper
+from library.star import *
+
+count = 0
+
+
+def read(node, request):
+    global count
+    from library import late
+
+    count += 1
+    state, base = node.state, library.base
+    state.box = getattr(state, 'box', None) or Box()
+    state.kept = getattr(state, 'kept', None) or Kept()
+    found = {
+        'helper': helper(),
+        'late': late.VALUE,
+        'deep': library.deep.VALUE + library.deep.inner.VALUE,
+        'circle': circle.around(),
+        'star': STAR,
+        'count': count,
+        'number': state.box.number,
+        'kept': isinstance(state.kept, Kept),
+        'extra': hasattr(base, 'EXTRA'),
+        'one': base.Box is Box,
+    }
+    return {'success': True, 'message': json.dumps(found)}
+""",
+    'library/base.py': """\
+EXTRA = 1
+
+
+class Box:
+    number = 1
+
+
+def helper():
+    return 'old helper'
+""",
+    'library/late.py': "VALUE = 'old late'\n",
+    'library/alone.py': 'class Kept:\n    pass\n',
+    'library/star.py': "STAR = 'old star'\n",
+    'library/circle.py': """\
+import library.back
+
+NAME = 'old circle'
+
+
+def around():
+    return library.back.say()
+""",
+    'library/back.py': """\
+import library.circle
+
+
+def say():
+    return library.circle.NAME
+""",
+    'library/deep/__init__.py': "from . import inner\n\nVALUE = 'old deep'\n",
+    'library/deep/inner.py': "VALUE = 'old inner'\n",
+}
 
 
 @pytest.fixture(scope='module')
 def running(shared_compose, shared_peer):
     (shared_compose.folder / 'probes.py').write_text(PROBES)
     (shared_compose.folder / 'sizes.yaml').write_text(SIZES)
+    (shared_compose.folder / 'library' / 'deep').mkdir(parents=True)
+    for name, text in LIBRARY.items():
+        (shared_compose.folder / name).write_text(text)
     shared_compose(SYSTEM, CODE).wait_until_ready()
     return Edited(shared_compose.folder, shared_peer)
 
@@ -89,7 +187,11 @@ class Edited:
     def __init__(self, folder, peer):
         self.folder = folder
         self._peer = peer
-        self._texts = {path.name: path.read_text() for path in folder.iterdir() if path.is_file()}
+        self._texts = {
+            str(path.relative_to(folder)): path.read_text()
+            for kind in ('*.py', '*.yaml')
+            for path in folder.rglob(kind)
+        }
         self._clients = {}
 
     def edit(self, replacements):
@@ -103,7 +205,8 @@ class Edited:
                     texts[name] = text.replace(old, new)
         assert found == set(replacements)
         for name, text in texts.items():
-            (self.folder / name).write_text(text)
+            if (self.folder / name).read_text() != text:
+                (self.folder / name).write_text(text)
         return self.call(Trigger, '/_composer_system/plan').message, self.reload()
 
     def reload(self):
@@ -111,14 +214,18 @@ class Edited:
         return response.message[response.message.rfind('\n') + 1 :]
 
     def go_back(self):
-        for path in self.folder.iterdir():
-            if path.is_file() and path.read_text() != self._texts.get(path.name):
-                path.write_text(self._texts[path.name])
+        for name, text in self._texts.items():
+            if (self.folder / name).read_text() != text:
+                (self.folder / name).write_text(text)
         self.reload()
 
     def probe(self, node):
         """Return the state of a node."""
         return json.loads(self.call(Trigger, f'/{node}/probe').message)
+
+    def read(self):
+        """Return what a behaviour finds in the modules of the library."""
+        return json.loads(self.call(Trigger, '/read').message)
 
     def get(self, name):
         """Return the value of a parameter of the clock."""
@@ -268,3 +375,46 @@ def test_values_set_live_survive_a_new_node_that_cannot_start(edited):
     _, said = edited.edit({**failing, **code})
     assert said.startswith("not reloaded: node 'clock': on_start raised OSError")
     assert edited.get('speed') == 4.0
+
+
+@pytest.mark.parametrize(
+    ('replacements', 'changes'),
+    [
+        (
+            {"'old helper'": "'new helper'", 'EXTRA = 1\n': ''},
+            {'helper': 'new helper', 'extra': False},
+        ),
+        ({"'old late'": "'new late'"}, {'late': 'new late'}),
+        ({"'old star'": "'new star'"}, {'star': 'new star'}),
+        ({"'old circle'": "'new circle'"}, {'circle': 'new circle'}),
+        ({"'old inner'": "'new inner'"}, {'deep': 'old deepnew inner'}),
+        ({"'old deep'": "'new deep'"}, {'deep': 'new deepold inner'}),
+        # What is kept is of the class that it was made of.
+        ({'number = 1': 'number = 2'}, {}),
+        ({'    pass\n': '    """New."""\n'}, {'kept': False}),
+    ],
+)
+def test_modules_are_new_with_all_that_import_them(edited, replacements, changes):
+    edited.restart()
+    before = edited.read()
+    _, said = edited.edit(replacements)
+    assert said.startswith('reloaded in '), said
+    assert edited.read() == before | changes | {'count': 1}
+
+
+@pytest.mark.parametrize('name', ['late', 'star', 'circle', 'inner', 'deep'])
+def test_a_module_that_raises_changes_nothing(edited, name):
+    before = edited.read()
+    _, said = edited.edit({f"'old {name}'": f"'new {name}' if 1 / 0 else ''"})
+    assert said.startswith('not reloaded: ')
+    assert edited.read() == before | {'count': before['count'] + 1}
+
+
+def test_calls_end_when_their_client_goes_and_only_then(edited):
+    edited.edit({'period: 0.02, publish': 'period: 0.03, publish'})
+    assert edited.probe('caller')['answers'] == []
+    planned, _ = edited.edit({'ask: {type': 'ask: {service: other, type'})
+    assert 'lost: responses that calls wait for' in planned
+    wait_for(lambda: len(edited.probe('caller')['answers']) == 2, 'the ends of both calls')
+    (answer,) = set(edited.probe('caller')['answers'])
+    assert answer == "an edit took the client of '/ask' away, which this call waited for"

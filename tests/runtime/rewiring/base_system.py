@@ -1,0 +1,333 @@
+"""The files of a system with every kind of entity, from which random edits begin.
+
+A behaviour notes in its `own_state` how often it has run, and on what code. The node `witness` is
+never edited itself: what it does must pass through all edits of others.
+"""
+
+PARTS = """
+import helper
+from pack import inner
+
+TAG = 0
+
+
+def note(node, name, **arguments):
+    node.own_state['ran'] = [name, TAG, helper.WORD, inner.TAG, arguments]
+    node.own_state['n'] = node.own_state.get('n', 0) + 1
+
+
+def tick(node, text='x'):
+    note(node, 'tick', text=text)
+    return text
+
+
+def steps(node, text='a'):
+    while True:
+        note(node, 'steps', text=text)
+        yield text
+
+
+def few_steps(node):
+    for number in range(3):
+        note(node, 'few_steps')
+        yield str(number)
+
+
+async def tick_later(node):
+    note(node, 'tick_later')
+    return 'later'
+
+
+async def steps_later(node):
+    while True:
+        note(node, 'steps_later')
+        yield 'b'
+
+
+class Ticking:
+    def __call__(self, node):
+        note(node, 'ticking')
+        return 'c'
+
+
+ticking = Ticking()
+
+
+def hear(node, message, prefix=''):
+    note(node, 'hear', prefix=prefix)
+    return f'{prefix}{message.data}'
+
+
+async def hear_later(node, message):
+    note(node, 'hear_later')
+    return message.data
+
+
+def answer(node, request, text='yes'):
+    note(node, 'answer', text=text)
+    return {'success': True, 'message': text}
+
+
+async def answer_later(node, request):
+    note(node, 'answer_later')
+    return {'success': True, 'message': 'later'}
+
+
+def count(node, goal, first=0):
+    for number in range(goal.order):
+        yield {'sequence': [number]}
+    note(node, 'count', first=first)
+    return {'sequence': [first]}
+
+
+def count_at_once(node, goal):
+    note(node, 'count_at_once')
+    return {'sequence': [2]}
+
+
+async def count_later(node, goal):
+    note(node, 'count_later')
+    return {'sequence': [3]}
+
+
+def accept(node, goal):
+    return goal.order < 10
+
+
+def follow(node, feedback):
+    node.logger.debug(f'{feedback}')
+
+
+def begin(node, text=''):
+    node.logger.debug(f'begun {text}')
+
+
+def fail_to_begin(node):
+    raise OSError('no such device')
+
+
+def end(node):
+    node.logger.debug('ended')
+
+
+def decide(node, changes, most=50.0):
+    return 'no' if changes.get('speed', 0.0) > most else None
+
+
+async def decide_later(node, changes):
+    return 'no' if changes.get('speed') == 7.0 else None
+"""
+
+PEER = """
+from helper import WORD
+
+TAG = 0
+
+
+def tick(node, text='y'):
+    node.own_state['ran'] = ['tick', TAG, WORD, None, {'text': text}]
+    node.own_state['n'] = node.own_state.get('n', 0) + 1
+    return text
+
+
+def hear(node, message, prefix='p'):
+    node.own_state['ran'] = ['hear', TAG, WORD, None, {'prefix': prefix}]
+    node.own_state['n'] = node.own_state.get('n', 0) + 1
+    return None
+"""
+
+WITNESS = """
+import time
+
+TAG = 0
+
+
+def count(node):
+    node.state.count += 1
+    return node.state.count
+
+
+def hear(node, message):
+    node.state.heard.append(message.data)
+
+
+def hold(node, message):
+    while not node.state.released:
+        time.sleep(0.005)
+    node.state.held.append(message.data)
+
+
+def answer(node, request):
+    while not node.state.released:
+        time.sleep(0.005)
+    return {'success': True, 'message': 'released'}
+
+
+def run(node, goal):
+    while not node.state.released:
+        time.sleep(0.005)
+        yield {'sequence': [1]}
+    return {'sequence': [goal.order]}
+"""
+
+PARAMETERS = '/**:\n  ros__parameters:\n    limit: {limit}\n'
+
+MODULES = {
+    'parts.py': PARTS,
+    'peer.py': PEER,
+    'helper.py': "WORD = 'w'\nTAG = 0\n",
+    'pack/__init__.py': 'TAG = 0\n',
+    'pack/inner.py': 'from .low import LOW\n\nTAG = 0\n',
+    'pack/low.py': 'LOW = 1\nTAG = 0\n',
+    'witness_parts.py': WITNESS,
+}
+
+# An installed package, as processes name one.
+SHARE = 'prefix/share/ament_index/resource_index/packages/sleeping'
+PROGRAM = 'prefix/lib/sleeping/sleeper'
+
+_STRING = 'std_msgs/msg/String'
+_FIBONACCI = 'test_msgs/action/Fibonacci'
+_TRIGGER = 'std_srvs/srv/Trigger'
+_OWN = {
+    'namespace': '/',
+    'log_level': 'info',
+    'use_sim_time': False,
+    'parameter_services': True,
+    'rosout': True,
+    'type_description_service': False,
+    'logger_services': False,
+    'on_error': 'log',
+    'warn_after': None,
+}
+
+WITNESS_NODE = {
+    **_OWN,
+    'parameters': {'level': 1},
+    'state': {'count': 0, 'heard': [], 'held': [], 'released': False},
+    'publishers': {'counts': {'type': 'std_msgs/msg/Int64', 'qos': 1000}},
+    'timers': {
+        'count': {
+            'period': 0.02,
+            'behaviour': 'witness_parts:count',
+            'publish': 'counts',
+            'warn_after': None,
+        }
+    },
+    'subscriptions': {
+        'counts': {
+            'type': 'std_msgs/msg/Int64',
+            'behaviour': 'witness_parts:hear',
+            'qos': 1000,
+        },
+        'held': {
+            'type': 'std_msgs/msg/Int64',
+            'behaviour': 'witness_parts:hold',
+            'group': 'held',
+            'qos': 1000,
+            'external': True,
+        },
+    },
+    'services': {
+        'slow': {'type': _TRIGGER, 'behaviour': 'witness_parts:answer', 'group': 'reentrant'}
+    },
+    'actions': {'long': {'type': _FIBONACCI, 'behaviour': 'witness_parts:run'}},
+}
+
+SYSTEM = {
+    'version': 1,
+    'args': {'speed': {'default': 1.0, 'type': 'double'}, 'where': 'far'},
+    'check': {'other': {'args': {'speed': 2.0}}},
+    'qos': {'near': {'depth': 3}},
+    'defaults': {'log_level': 'info'},
+    'include': {
+        'wheels_{{ side }}': {
+            'file': 'part.yaml',
+            'namespace': '/wheels/{{ side }}',
+            'foreach': {'side': ['left']},
+            'args': {'size': 2},
+        }
+    },
+    'nodes': {
+        'witness': WITNESS_NODE,
+        'talker': {
+            'parameters': {
+                'speed': {'default': '{{ speed }}', 'minimum': 0.0, 'maximum': 100.0},
+                'name': 'Alice',
+                'limit': 5,
+                'mode': {'default': 'slow', 'choices': ['slow', 'fast']},
+                'marks': {'type': 'integer_array', 'default': [1, 2]},
+            },
+            'parameter_files': ['parameters.yaml'],
+            'state': {'begun': False, 'last': None},
+            'publishers': {
+                'out': {'type': _STRING, 'external': True},
+                'more': {'type': _STRING, 'topic': '{{ where }}', 'external': True},
+            },
+            'timers': {
+                'tick': {'period': 0.02, 'behaviour': 'parts:tick', 'publish': 'out'},
+                'steps': {'period': 0.03, 'behaviour': 'parts:steps', 'publish': 'more'},
+                'later': {'period': 0.04, 'behaviour': 'parts:tick_later'},
+                'steps_later': {'period': 0.03, 'behaviour': 'parts:steps_later'},
+                'constant': {'rate': 20.0, 'publish': 'out', 'message': 'hello'},
+                'rare': {'period': 100.0, 'behaviour': 'parts:ticking'},
+            },
+            'on_start': 'parts:begin',
+            'on_parameters': 'parts:decide',
+        },
+        'listener': {
+            'publishers': {'echo': {'type': _STRING, 'external': True}},
+            'subscriptions': {
+                'hear': {
+                    'type': _STRING,
+                    'topic': 'out',
+                    'behaviour': 'parts:hear',
+                    'publish': 'echo',
+                    'qos': 'near',
+                },
+                'later': {
+                    'type': _STRING,
+                    'topic': 'far',
+                    'behaviour': 'parts:hear_later',
+                    'publish': 'echo',
+                },
+                'pass_on': {'type': _STRING, 'topic': 'far', 'publish': 'echo'},
+            },
+            'services': {'ask': {'type': _TRIGGER, 'behaviour': 'parts:answer'}},
+            'actions': {'count': {'type': _FIBONACCI, 'behaviour': 'parts:count'}},
+        },
+        'user': {
+            'namespace': '/inner',
+            'service_clients': {'ask': {'type': _TRIGGER, 'service': '/ask'}},
+            'action_clients': {
+                'count': {'type': _FIBONACCI, 'action': '/count', 'feedback': 'parts:follow'}
+            },
+        },
+    },
+    'processes': {
+        'sleeper': {'command': ['sleep', '1000']},
+        'packaged': {'package': 'sleeping', 'executable': 'sleeper', 'name': 'dreamer'},
+    },
+}
+
+PART = {
+    'version': 1,
+    'args': {'size': {'type': 'integer', 'default': 1}},
+    'nodes': {
+        'wheel_{{ i }}': {
+            'foreach': {'i': [1]},
+            'parameters': {'size': '{{ size * i }}'},
+            'publishers': {'turn': {'type': _STRING, 'topic': 'turns'}},
+            'timers': {'turn': {'period': 0.05, 'behaviour': 'peer:tick', 'publish': 'turn'}},
+        },
+        'hub': {
+            'subscriptions': {
+                'turns': {'type': _STRING, 'behaviour': 'peer:hear', 'group': 'own'}
+            },
+        },
+    },
+}
+
+LAYER = {'version': 1, 'nodes': {'talker': {'parameters': {'name': 'Bob'}}}}
+
+DOCUMENTS = {'system.yaml': SYSTEM, 'part.yaml': PART, 'layer.yaml': LAYER}

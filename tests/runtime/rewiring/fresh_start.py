@@ -1,0 +1,164 @@
+"""Starts systems afresh, each in a process of its own, and tells what they are.
+
+A parent that has imported everything forks for each of them: so a start takes no time for
+imports, and nothing of one start is left in the next.
+"""
+
+import importlib
+import os
+import pickle
+import struct
+import subprocess
+import sys
+import traceback
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tests.running import ROOT
+
+_LENGTH = struct.Struct('!q')
+STOP_SEC = 60.0
+
+
+class FreshStarter:
+    """Starts the systems of a project afresh, in a ROS domain of their own."""
+
+    def __init__(self, paths, domain_id):
+        self._paths = paths
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', __name__, *map(str, paths)],
+            cwd=paths[0].parent,
+            env={**os.environ, 'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(domain_id)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+
+    def begin(self, *, checks):
+        """Start the system as its files are now.
+
+        Args:
+            checks: Whether it is to be checked first, which takes as long as all the rest.
+        """
+        self._process.stdin.write(b'c' if checks else b'-')
+        self._process.stdin.flush()
+
+    def result(self):
+        """Return what it is, or a text that says why it did not start."""
+        (length,) = _LENGTH.unpack(self._process.stdout.read(_LENGTH.size))
+        return pickle.loads(self._process.stdout.read(length))
+
+    def close(self):
+        self._process.stdin.close()
+        self._process.wait()
+        self._process.stdout.close()
+
+
+def _read(reader):
+    from composer.checks.checker import create_context
+    from composer.cli.common.file_selection import load_given
+    from composer.interfaces.catalogue import InterfaceCatalogue
+
+    system = load_given(reader.paths, reader.words, reader.set_values)
+    return create_context(system, InterfaceCatalogue())
+
+
+@contextmanager
+def running_system(paths, *, checks=True):
+    """Start a system as `composer up` does; yield it with its reloader.
+
+    Raises:
+        ComposerError: It has errors, or cannot start.
+    """
+    from composer.cli.common.system_reader import SystemReader, import_reading
+    from composer.cli.reload import Reloader
+    from composer.errors import ComposerError
+    from composer.planning.snapshot import take_snapshot
+    from composer.processes.guardian_client import GuardianClient
+    from composer.runtime.behaviours.callables import project_on_path
+    from composer.runtime.environment import environment_set
+    from composer.runtime.logs import log_levels
+    from composer.runtime.system import System
+
+    reader = SystemReader(paths, [], [])
+    context = reader.check() if checks else _read(reader)
+    if context is None:
+        message = 'it has errors'
+        raise ComposerError(message)
+    with ExitStack() as stack:
+        stack.enter_context(environment_set(context.spec.environment))
+        stack.enter_context(project_on_path([paths[0].parent]))
+        reading = import_reading(context, take_snapshot(context))
+        if reading is None:
+            message = 'its behaviours have errors'
+            raise ComposerError(message)
+        stack.enter_context(log_levels(list(reading.spec.nodes.values()), []))
+        guardian = GuardianClient(STOP_SEC, STOP_SEC, owns_process=False)
+        stack.callback(guardian.send_away)
+        system = System(reading, guardian)
+        guardian.wait_until_begun()
+        stack.callback(system.stop)
+        system.start()
+        create_parameter_services(system)
+        yield system, Reloader(reader, context, [])
+
+
+def create_parameter_services(system):
+    """Create the parameter services that come in the background."""
+    system._parameter_services.stop()
+    for node in system._nodes.values():
+        node.ros.start_parameter_services()
+
+
+def _start_and_tell(paths, answers, *, checks):
+    from composer.errors import ComposerError
+    from composer.runtime import forked_children
+    from tests.runtime.rewiring.descriptions import describe
+    from tests.runtime.rewiring.observing import see_graph
+
+    # It is no child of a behaviour, which must end with it.
+    forked_children.in_child = False
+    try:
+        with running_system(paths, checks=checks) as (system, _):
+            node = next(iter(system._nodes.values())).ros
+            _send(answers, (describe(system), see_graph(node)[0]))
+    except ComposerError as error:
+        _send(answers, str(error))
+    except BaseException:  # noqa: BLE001 - the parent waits for an answer
+        _send(answers, traceback.format_exc())
+
+
+def _send(answers, answer):
+    data = pickle.dumps(answer)
+    answers.write(_LENGTH.pack(len(data)) + data)
+    answers.flush()
+
+
+def _serve(paths):
+    # What the systems print is no answer.
+    answers = os.fdopen(os.dup(1), 'wb')
+    os.dup2(2, 1)
+    sys.dont_write_bytecode = True
+    _import_all(paths)
+    while command := os.read(0, 1):
+        child = os.fork()
+        if child == 0:
+            _start_and_tell(paths, answers, checks=command == b'c')
+            os._exit(0)
+        os.waitpid(child, 0)
+
+
+def _import_all(paths):
+    from composer.cli.common.system_reader import SystemReader
+
+    for name in (
+        *('composer.cli.reload', 'composer.runtime.run', 'composer.runtime.system'),
+        *('std_msgs.msg', 'std_srvs.srv', 'test_msgs.action', 'diagnostic_msgs.msg'),
+        *('tests.runtime.rewiring.descriptions', 'tests.runtime.rewiring.observing'),
+    ):
+        importlib.import_module(name)
+    # What the check imports when it needs it.
+    SystemReader(paths, [], []).check()
+
+
+if __name__ == '__main__':
+    _serve([Path(argument) for argument in sys.argv[1:]])

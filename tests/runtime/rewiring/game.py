@@ -1,0 +1,265 @@
+"""A game: random edits of a running system, after each of which all of it is compared."""
+
+import os
+import random
+import sys
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from time import monotonic, sleep
+from unittest import mock
+
+import pytest
+from rclpy.parameter import Parameter
+
+from composer.errors import StartError
+from composer.planning.differences import compare
+from composer.planning.plan import Action
+from composer.runtime import system as system_module
+from composer.runtime.rewiring.rewire import Rewiring
+from tests.running import DEADLINE_SEC
+from tests.runtime.rewiring.descriptions import describe
+from tests.runtime.rewiring.edits import Project
+from tests.runtime.rewiring.fresh_start import (
+    FreshStarter,
+    create_parameter_services,
+    running_system,
+)
+from tests.runtime.rewiring.memories import find_lost, remember
+from tests.runtime.rewiring.observing import Observer, see_graph
+from tests.runtime.rewiring.running import check_runs
+from tests.runtime.rewiring.witness import WITNESS, Witness
+
+# What only a system that runs can have against an edit.
+_OWN_REASONS = (
+    'cannot change while the system runs',
+    'its value was set while the system ran',
+    ': no',  # What `decide` returns.
+)
+# Topics of every node; that of its clock comes and goes with `use_sim_time`.
+_OF_NODES = ('/parameter_events', '/rosout', '/clock')
+# After steps of these a failure strikes.
+_STEPS = ('_begin', '_change_entity', '_change_node', '_replace_record', '_end_nodes')
+
+
+class Game:
+    """A running system, its files, and all that it is compared with.
+
+    Attributes:
+        applied: How many edits have changed the system.
+    """
+
+    def __init__(self, project, seed, system, reloader, fresh, observer, checked):
+        self._project = project
+        self._random = random.Random(seed)
+        self._system = system
+        self._reloader = reloader
+        self._fresh = fresh
+        self._observer = observer
+        self._checked = checked
+        # What was set while the system ran, by its node and parameter.
+        self._live = {(WITNESS, 'level'): '7'}
+        self._plan = None
+        self.applied = 0
+        project.keep()
+        self._check_graph(see_graph(system._nodes[WITNESS].ros)[0], 'the start')
+
+    def play(self, done=None):
+        """Edit, reload, and compare; return the edits, and what came of them."""
+        done = self._project.edit() if done is None else done
+        self._project.write()
+        self._set_live(done)
+        self._before = describe(self._system)
+        self._kept = remember(self._system)
+        self._graph, self._gids = see_graph(self._observer.node)
+        self._old = self._system.snapshot
+        self._plan = None
+        with self._failing(done):
+            outcome = self._reloader.reload(self._system)
+        text = outcome.text.splitlines()[-1]
+        assert not self._system.stop_requested, done
+        create_parameter_services(self._system)
+        if 'a fault of the game' in text:
+            self._check_refused(done, text)
+            outcome = self._reloader.reload(self._system)
+            text = outcome.text.splitlines()[-1]
+        if not outcome.succeeded:
+            if self._plan is not None and not any(each in text for each in _OWN_REASONS):
+                self._fresh.begin(checks=True)
+                assert isinstance(self._fresh.result(), str), f'{done}: only refused: {text}'
+            self._check_refused(done, text)
+            self._project.go_back()
+            return done, text
+        plan = compare(self._old, self._system.snapshot)
+        # It has passed the check in this process, as it does in any other.
+        self._fresh.begin(checks=self._random.random() < self._checked)
+        try:
+            self._forget_live(plan)
+            self._check_untouched(plan.operations, done)
+            check_runs(self._system, self._observer, plan, done)
+        finally:
+            fresh = self._fresh.result()
+        if isinstance(fresh, str):
+            # It counts from the next start: this system would not survive one.
+            assert 'on_start raised' in fresh or 'waited' in fresh or 'wait' in fresh, (
+                done,
+                fresh,
+            )
+            self._project.go_back()
+            self._project.write()
+            assert self._reloader.reload(self._system).succeeded, done
+            return done, f'would not start: {fresh}'
+        self._check_equal(*fresh, done)
+        self.applied += bool(plan)
+        self._project.keep()
+        return done, text
+
+    @contextmanager
+    def _failing(self, done):
+        """Let one step of the reload fail now and then, after it was done; and see the plan."""
+        left = self._random.choice([0] * 20 + [1, 2, 3, 4, 5])
+
+        def counting(original):
+            def step(*arguments):
+                nonlocal left
+                result = original(*arguments)
+                left -= 1
+                if left == 0:
+                    message = 'a fault of the game'
+                    raise StartError(message)
+                return result
+
+            return step
+
+        def seeing(old, new):
+            self._plan = compare(old, new)
+            return self._plan
+
+        if left:
+            done.append(f'(fails at step {left})')
+        with ExitStack() as stack:
+            stack.enter_context(mock.patch.object(system_module, 'compare', seeing))
+            for name in _STEPS if left else ():
+                step = counting(getattr(Rewiring, name))
+                stack.enter_context(mock.patch.object(Rewiring, name, step))
+            yield
+
+    def _set_live(self, done):
+        """Set a parameter or a value of the state now and then."""
+        nodes = [node for name, node in self._system._nodes.items() if name != WITNESS]
+        if not nodes or self._random.random() < 0.7:
+            return
+        node = self._random.choice(nodes)
+        if vars(node.behaviour_node.state):
+            key = self._random.choice(sorted(vars(node.behaviour_node.state)))
+            setattr(node.behaviour_node.state, key, f'live {self.applied}')
+        names = sorted(node.spec.parameters)
+        name = self._random.choice(names) if names else None
+        value = self._random.choice([0.5, 3.0, 6, 'fast', 'Dora'])
+        if name is None or node.ros._descriptors[name].read_only:
+            return
+        (result,) = node.ros.set_parameters([Parameter(name, value=value)])
+        if result.successful:
+            self._live[node.full_name, name] = repr(value)
+            done.append(f'(set {node.full_name} {name} = {value!r})')
+
+    def _forget_live(self, plan):
+        for operation in plan.operations:
+            node, section, name = operation.target
+            if section == 'nodes' and operation.action is not Action.CHANGE:
+                self._live = {key: each for key, each in self._live.items() if key[0] != node}
+            elif operation.action is not Action.CHANGE:
+                self._live.pop((node, name), None)
+
+    def _check_refused(self, done, text):
+        operations = self._plan.operations if self._plan else ()
+        begun_again = [
+            each
+            for each in operations
+            if each.target[1] in ('nodes', 'processes') and each.action is Action.RECREATE
+        ]
+        _check_same(self._before, describe(self._system), (done, text))
+        self._check_graph(self._graph, (done, text))
+        self._check_untouched(begun_again, (done, text))
+
+    def _check_untouched(self, operations, done):
+        lost = find_lost(self._kept, remember(self._system), operations)
+        assert not lost, f'{done} changed also {lost}'
+        touched = {each.target for each in operations if each.action is not Action.CHANGE}
+        nodes = {target[0] for target in touched if target[1] == 'nodes'}
+        changed = {target[:2] for target in touched}
+        now = see_graph(self._observer.node)[1]
+        for (node, kind, topic), gids in self._gids.items():
+            if node not in nodes and (node, kind) not in changed and topic[0] != '_':
+                if topic in _OF_NODES or '/_action/' in topic:
+                    continue
+                assert now.get((node, kind, topic)) == gids, (done, node, kind, topic)
+
+    def _check_equal(self, fresh, fresh_graph, done):
+        for (full_name, name), value in self._live.items():
+            fresh['nodes'][full_name]['parameters'][name]['value'] = value
+        _check_same(fresh, describe(self._system), done)
+        self._check_graph(fresh_graph, done)
+
+    def _check_graph(self, expected, done):
+        """Wait until the observer sees what it should: what others do comes to it later."""
+        deadline = monotonic() + DEADLINE_SEC
+        while (seen := see_graph(self._observer.node)[0]) != expected:
+            if monotonic() > deadline:
+                _check_same(expected, seen, done)
+            sleep(0.01)
+
+
+def _check_same(expected, found, done):
+    different = _differences(expected, found)
+    if different:
+        pytest.fail(f'after {done}:\n' + '\n'.join(map(str, different)))
+
+
+def _differences(expected, found, path=()):
+    """Yield what differs, with the path to it."""
+    if not isinstance(expected, dict) or not isinstance(found, dict):
+        return [] if expected == found else [(path, expected, found)]
+    return [
+        difference
+        for key in {**expected, **found}
+        for difference in _differences(expected.get(key), found.get(key), (*path, key))
+    ]
+
+
+@contextmanager
+def playing(folder, seed, domains, checked=0.1):
+    """Yield a game in a folder.
+
+    Args:
+        domains: Two ROS domains; the second is for fresh starts.
+        checked: The share of the fresh starts that are checked first.
+    """
+    project = Project(folder, seed)
+    project.write()
+    environment = {
+        'ROS_DOMAIN_ID': str(domains[0]),
+        'AMENT_PREFIX_PATH': f'{folder / "prefix"}:{os.environ.get("AMENT_PREFIX_PATH", "")}',
+    }
+    with ExitStack() as stack:
+        stack.enter_context(mock.patch.dict(os.environ, environment))
+        stack.enter_context(mock.patch.object(sys, 'dont_write_bytecode', True))
+        modules = {*sys.modules}
+        stack.callback(_forget_modules, folder, modules)
+        before = Path.cwd()
+        os.chdir(folder)
+        stack.callback(os.chdir, before)
+        fresh = FreshStarter(project.paths, domains[1])
+        stack.callback(fresh.close)
+        system, reloader = stack.enter_context(running_system(project.paths))
+        observer = Observer(domains[0])
+        stack.callback(observer.close)
+        witness = Witness(system, observer)
+        stack.callback(witness.release)
+        yield Game(project, seed, system, reloader, fresh, observer, checked)
+        witness.check()
+
+
+def _forget_modules(folder, before):
+    for name in {*sys.modules} - before:
+        if str(getattr(sys.modules[name], '__file__', '')).startswith(str(folder)):
+            del sys.modules[name]
