@@ -25,19 +25,11 @@ processes:
     command: [sh, -c, "trap '' INT; echo deaf; while true; do sleep 0.1; done"]
     stop: {timeout: 900}
 """
-AFTER = """
-version: 1
-executor: {threads: 3, shutdown_timeout: 0.3}
-diagnostics: {period: 900}
-nodes:
-  one: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
-  two: {timers: {meet: {period: 0.05, behaviour: parts:meet}}}
-  hanging: {subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hang}}}
-processes:
-  deaf:
-    command: [sh, -c, "trap '' INT; echo deaf; while true; do sleep 0.1; done"]
-    stop: {timeout: 0.2}
-"""
+AFTER = (
+    BEFORE.replace('threads: 1, shutdown_timeout: 900', 'threads: 3, shutdown_timeout: 0.3')
+    .replace('diagnostics: false', 'diagnostics: {period: 900}')
+    .replace('timeout: 900}', 'timeout: 0.2}')
+)
 CODE = """
 import threading
 
