@@ -80,12 +80,19 @@ class LocalPublisher:
 
 
 class LocalSubscription:
-    """A subscription of the system."""
+    """A subscription of the system.
 
-    def __init__(self, ros: RosSubscription, inbox: Inbox, reason: str) -> None:
+    Attributes:
+        read_only: Whether it shares messages with others.
+    """
+
+    def __init__(
+        self, ros: RosSubscription, inbox: Inbox, reason: str, *, read_only: bool
+    ) -> None:
         self.ros = ros
         self.inbox = inbox
         self.reason = reason
+        self.read_only = read_only
 
 
 class _Topic:
@@ -116,17 +123,35 @@ class LocalTopics:
 
     def add_publisher(self, ros: RosPublisher, *, is_local: bool = True) -> LocalPublisher:
         """Take in a publisher."""
-        reason = _why_sent(ros.qos_profile) if is_local else 'local_delivery: false'
-        publisher = LocalPublisher(ros, reason)
+        publisher = LocalPublisher(ros, _own_reason(ros, is_local=is_local))
         self._change(ros, lambda topic: topic.publishers.append(publisher))
         return publisher
 
-    def add_subscription(self, node: Any, ros: RosSubscription) -> LocalSubscription:
+    def change_publisher(self, publisher: LocalPublisher, *, is_local: bool) -> None:
+        """Let a publisher hand messages over, or only send them."""
+
+        def change(_: _Topic) -> None:
+            publisher.own_reason = _own_reason(publisher.ros, is_local=is_local)
+
+        self._change(publisher.ros, change)
+
+    def add_subscription(
+        self, node: Any, ros: RosSubscription, *, read_only: bool = False
+    ) -> LocalSubscription:
         """Take in a subscription of `node`."""
         inbox = self._executor.open_inbox(node, ros, queue_depth(ros.qos_profile))
-        subscription = LocalSubscription(ros, inbox, _why_sent(ros.qos_profile))
+        reason = _why_sent(ros.qos_profile)
+        subscription = LocalSubscription(ros, inbox, reason, read_only=read_only)
         self._change(ros, lambda topic: topic.subscriptions.append(subscription))
         return subscription
+
+    def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:
+        """Let a subscription share messages with others, or have its own."""
+
+        def change(_: _Topic) -> None:
+            subscription.read_only = read_only
+
+        self._change(subscription.ros, change)
 
     def remove_publisher(self, publisher: LocalPublisher) -> None:
         """Forget a publisher."""
@@ -218,6 +243,10 @@ def queue_depth(profile: QoSProfile) -> int | None:
 def _are_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
     compatibility, _ = qos_check_compatible(offered, requested)
     return bool(compatibility != QoSCompatibility.ERROR)
+
+
+def _own_reason(ros: RosPublisher, *, is_local: bool) -> str:
+    return _why_sent(ros.qos_profile) if is_local else 'local_delivery: false'
 
 
 def _why_sent(profile: QoSProfile) -> str:
