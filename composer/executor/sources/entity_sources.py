@@ -280,12 +280,21 @@ class ServiceSource(EventSource):
     rank = 3
     ask = staticmethod(Readiness.has_requests)
     watch_entity = staticmethod(c_bindings.watch_service)
-    __slots__ = ()
+    __slots__ = ('_serves_sent',)
+
+    def open(self) -> None:
+        """See the base class."""
+        self._serves_sent = False
+        super().open()
 
     def run(self) -> Any:
         """See the base class."""
-        if self.inbox is not None and self.inbox.messages:
-            return self._serve_local(self.inbox)
+        inbox = self.inbox
+        if inbox is not None and inbox.messages:
+            # In turn, if others have sent requests, too.
+            self._serves_sent = not self._serves_sent and self.pending >= len(inbox.messages)
+            if not self._serves_sent:
+                return self._serve_local(inbox)
         revision = self.revision
         service = self.entity
         try:
@@ -295,7 +304,8 @@ class ServiceSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            self._note_nothing_taken(revision)
+            if inbox is None or not inbox.messages:
+                self._note_nothing_taken(revision)
             return NOTHING
         self._note_taken()
         callback = service.callback
@@ -312,19 +322,22 @@ class ServiceSource(EventSource):
         try:
             request: LocalRequest = inbox.messages.popleft()
         except IndexError:
-            return NOTHING
+            return NOTHING  # Another thread took it, or it was pushed out.
         callback = service.callback
-        response = callback(request.message, service.srv_type.Response())
-        if self.parts.executor.is_forked:
-            end_child()
         if self._is_async(callback):
-            return self._respond_locally(response, request)
-        request.respond(response)
+            return self._respond_locally(callback, request)
+        # The response is in no variable: what nobody refers to need not be copied.
+        request.respond(self._answer(callback, request.message))
         return None
 
-    @staticmethod
-    async def _respond_locally(response: Any, request: LocalRequest) -> None:
-        request.respond(await response)
+    def _answer(self, callback: Any, message: Any) -> Any:
+        response = callback(message, self.entity.srv_type.Response())
+        if self.parts.executor.is_forked:
+            end_child()
+        return response
+
+    async def _respond_locally(self, callback: Any, request: LocalRequest) -> None:
+        request.respond(await self._answer(callback, request.message))
 
     async def _respond(self, response: Any, header: Any) -> None:
         self.entity.send_response(await response, header)
