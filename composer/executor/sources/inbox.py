@@ -52,4 +52,4 @@ class Inbox:
     def is_drained(self) -> bool:
         """Tell whether the middleware has nothing more for the entity."""
         source = self.source
-        return source is None or not source.has_data()
+        return source is not None and not source.has_data()

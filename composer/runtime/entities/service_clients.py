@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
     from composer.language.specs import ServiceClientSpec
-    from composer.runtime.messages.local_delivery import LocalService
+    from composer.runtime.messages.local_services import LocalService
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
