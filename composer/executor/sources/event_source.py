@@ -1,5 +1,7 @@
 """What all kinds of sources share: a source listens to one entity, takes what came and runs it."""
 
+from __future__ import annotations
+
 import inspect
 from typing import TYPE_CHECKING, Any, ClassVar
 

@@ -38,7 +38,9 @@ class Publisher:
             event_callbacks=self._endpoint.publisher_events(),
         )
         node.endpoints.append(self._endpoint)
-        self._local = node.system.topics.add_publisher(self._ros, is_local=spec.local_delivery)
+        self._local = node.system.topics.add_publisher(
+            node.ros, self._ros, is_local=spec.local_delivery
+        )
         send, convert = self._local.publish, converter_for(message_class).convert
 
         def publish(payload: Payload, unheld: int = UNHELD_ARGUMENT) -> None:

@@ -42,7 +42,7 @@ class ServiceClient:
             qos_profile=create_qos_profile(spec.qos, node.system.profiles),
             callback_group=node.background,
         )
-        self._local = node.system.services.add_client(self._client, self._service)
+        self._local = node.system.services.add_client(node.ros, self._client, self._service)
         self._local.allow(is_allowed=spec.local_delivery)
         self._requests = Requests(
             node.waits,

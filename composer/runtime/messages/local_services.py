@@ -12,11 +12,11 @@ from collections import defaultdict
 from sys import getrefcount
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from rclpy.qos import DurabilityPolicy, QoSCompatibility, qos_check_compatible
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.task import Future
 
-from composer.runtime.messages.local_delivery import queue_depth
+from composer.runtime.messages.local_delivery import queue_depth, why_sent
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
@@ -32,14 +32,12 @@ if TYPE_CHECKING:
 # The name in the graph, and the type.
 _Key: TypeAlias = 'tuple[str, type]'
 
-# Longer durations are no limit.
-_LONGEST_NS = 2**62
-
 
 class LocalEnd:
     """A service or a client of the system.
 
     Args:
+        node: The rclpy node that it belongs to.
         name: Its name in the graph.
         connect: Called with the key when it may be connected otherwise.
 
@@ -48,8 +46,9 @@ class LocalEnd:
     """
 
     def __init__(
-        self, ros: RosService | RosClient, name: str, connect: Callable[[_Key], None]
+        self, node: Any, ros: RosService | RosClient, name: str, connect: Callable[[_Key], None]
     ) -> None:
+        self.node = node
         self.ros = ros
         self.key: _Key = (name, ros.srv_type)
         self._connect = connect
@@ -61,9 +60,8 @@ class LocalEnd:
     @property
     def is_local(self) -> bool:
         """Whether its requests may be handed over."""
-        may_expire = 0 < self.ros.qos_profile.lifespan.nanoseconds < _LONGEST_NS
-        is_volatile = self.ros.qos_profile.durability == DurabilityPolicy.VOLATILE
-        return self._is_allowed and is_volatile and not may_expire and not self._is_introspected
+        is_sent = self._is_introspected or bool(why_sent(self.ros.qos_profile))
+        return self._is_allowed and not is_sent
 
     def allow(self, *, is_allowed: bool) -> None:
         """Let its requests be handed over, or have all of them sent."""
@@ -84,9 +82,14 @@ class LocalService(LocalEnd):
     """
 
     def __init__(
-        self, ros: RosService, name: str, connect: Callable[[_Key], None], inbox: Inbox
+        self,
+        node: Any,
+        ros: RosService,
+        name: str,
+        connect: Callable[[_Key], None],
+        inbox: Inbox,
     ) -> None:
-        super().__init__(ros, name, connect)
+        super().__init__(node, ros, name, connect)
         self._inbox = inbox
         self._requests = ownership_of(ros.srv_type.Request)
         self._responses = ownership_of(ros.srv_type.Response)
@@ -150,16 +153,16 @@ class LocalServices:
         self._lock = threading.Lock()
 
     def add_server(self, node: Any, ros: RosService, name: str) -> LocalService:
-        """Take in a service of `node`, which `allow` connects."""
+        """Take in a service of an rclpy node, which `allow` connects."""
         inbox = self._executor.open_inbox(node, ros, queue_depth(ros.qos_profile))
-        server = LocalService(ros, name, self._connect, inbox)
+        server = LocalService(node, ros, name, self._connect, inbox)
         with self._lock:
             self._servers[server.key].append(server)
         return server
 
-    def add_client(self, ros: RosClient, name: str) -> LocalClient:
-        """Take in a service client, which `allow` connects."""
-        client = LocalClient(ros, name, self._connect)
+    def add_client(self, node: Any, ros: RosClient, name: str) -> LocalClient:
+        """Take in a service client of an rclpy node, which `allow` connects."""
+        client = LocalClient(node, ros, name, self._connect)
         with self._lock:
             self._clients[client.key].append(client)
         return client
@@ -174,6 +177,16 @@ class LocalServices:
         """Forget a service client."""
         with self._lock:
             self._clients[client.key].remove(client)
+
+    def forget(self, node: Any) -> None:
+        """Forget all that belongs to an rclpy node."""
+        with self._lock:
+            gone = [each for known in self._servers.values() for each in known]
+            gone = [each for each in gone if each.node is node]
+            for clients in self._clients.values():
+                clients[:] = [each for each in clients if each.node is not node]
+        for server in gone:
+            self.remove_server(server)
 
     def _connect(self, key: _Key) -> None:
         """Find out to which server each client of a name and a type hands its requests."""
