@@ -109,7 +109,7 @@ class EventLoop:
                 self._notify()
         return is_more
 
-    def _execute_ready(self, me: Worker) -> bool:
+    def _execute_ready(self, me: Worker) -> bool:  # noqa: C901 - one loop
         """Execute about what is ready now; False if there is no more, or `me` was replaced."""
         workers, scheduler = self.workers, self._parts.scheduler
         registry, execute = self._registry, self._runner.execute

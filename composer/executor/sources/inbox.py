@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from composer.executor.sources.event_source import EventSource
+from typing import Any
 
 
 class Inbox:
@@ -20,7 +17,7 @@ class Inbox:
 
     Attributes:
         messages: The oldest first.
-        source: What takes them, while an executor listens to the entity.
+        source: The `EventSource` that takes them, while an executor listens to the entity.
         overruns: How many were pushed out.
     """
 
@@ -29,7 +26,7 @@ class Inbox:
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque()
-        self.source: EventSource | None = None
+        self.source: Any = None
         self.overruns = 0
 
     def put(self, message: Any) -> None:

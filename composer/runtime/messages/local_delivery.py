@@ -57,10 +57,10 @@ class LocalPublisher:
 
     Args:
         node: The rclpy node that it belongs to.
-        is_local: Whether it may hand messages over.
         returns: Whether it hands over again after it has sent.
 
     Attributes:
+        is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
     """
@@ -68,8 +68,9 @@ class LocalPublisher:
     def __init__(self, node: Any, ros: RosPublisher, *, is_local: bool, returns: bool) -> None:
         self.node = node
         self.ros = ros
+        self.is_local = is_local
         self.reason = ''
-        self._own_reason = why_sent(ros.qos_profile) if is_local else 'local_delivery: false'
+        self._own_reason = why_sent(ros.qos_profile)
         self._returns = returns
         self._ownership = ownership_of(ros.msg_type)
         self._count: Callable[[], int] = ros.handle.get_subscription_count
@@ -96,7 +97,10 @@ class LocalPublisher:
         self._inboxes = tuple(inbox for each, inbox in inboxes if not each.read_only)
         self._shared = tuple(inbox for each, inbox in inboxes if each.read_only)
         self._limited = tuple(inbox for _, inbox in inboxes if inbox.depth is None)
-        reasons = [self._own_reason, *(each.reason for each in matched)]
+        turned_off = '' if self.is_local else 'local_delivery: false'
+        reasons = [turned_off, self._own_reason, *(each.reason for each in matched)]
+        # What it has sent until now may not have been taken yet.
+        self._has_sent = self._has_sent or bool(self.reason)
         self.reason = next(filter(None, reasons), '')
         self._size = len(matched)
 
@@ -194,6 +198,12 @@ class LocalTopics:
             publisher.connect(topic.subscriptions)
         return publisher
 
+    def change_publisher(self, publisher: LocalPublisher, *, is_local: bool) -> None:
+        """Let a publisher hand messages over, or only send them."""
+        with self._lock:
+            publisher.is_local = is_local
+            publisher.connect(self._topic(publisher.ros).subscriptions)
+
     def add_subscription(
         self, node: Any, ros: RosSubscription, *, read_only: bool = False
     ) -> LocalSubscription:
@@ -207,6 +217,12 @@ class LocalTopics:
             topic.subscriptions.append(subscription)
             topic.connect()
         return subscription
+
+    def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:
+        """Let a subscription share messages with others, or have its own."""
+        with self._lock:
+            subscription.read_only = read_only
+            self._topic(subscription.ros).connect()
 
     def remove_publisher(self, publisher: LocalPublisher) -> None:
         """Forget a publisher."""
