@@ -54,12 +54,13 @@ def plan(
     if len(paths) > 2:  # noqa: PLR2004
         message = f'a plan compares two files, not {len(paths)}'
         raise UsageError(message, help='give layers with --layer')
-    contexts = []
+    contexts: list[CheckContext | None] = []
     findings: list[Diagnostic] = []
     hidden: dict[str, str] = {}
     for path in paths:
         is_new = path is paths[-1]
-        context, found = _read([path, *layers], words, set_values, checks=is_new)
+        before = next(filter(None, contexts), None)
+        context, found = _read([path, *layers], words, set_values, before, checks=is_new)
         contexts.append(context)
         # Both may have one, as of a layer.
         findings += [each for each in found if each not in findings]
@@ -93,9 +94,14 @@ def _compare_with_running(context: CheckContext) -> Plan:
 
 
 def _read(
-    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], *, checks: bool
+    paths: Sequence[Path],
+    words: Sequence[str],
+    set_values: Sequence[str],
+    before: CheckContext | None,
+    *,
+    checks: bool,
 ) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
     """Return the context of a system, and what was found in it."""
-    system = load_given(paths, words, set_values)
-    context = create_context(system, InterfaceCatalogue())
+    system = load_given(paths, words, set_values, before.system if before else None)
+    context = create_context(system, InterfaceCatalogue(), before)
     return context, check_in_context(system, context) if checks else system.diagnostics

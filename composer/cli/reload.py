@@ -70,6 +70,7 @@ class Reloader:
         self._prefixes = prefixes
         self._folder = Path.cwd()
         self._paths = [self._folder / each for each in reader.paths]
+        self._read_before = replace(context)
         self._files = WatchedFiles([*self._paths, *_list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
@@ -243,11 +244,13 @@ class Reloader:
         if any(str(path) == '-' for path in self._reader.paths):
             message = 'the system was read from standard input, which cannot be read again'
             raise ComposerError(message)
-        context, files, found = self._reader_here().read()
+        context, files, found = self._reader_here().read(self._read_before)
         findings += found
         self._files.also_follow([*files, *(_list_files(context) if context else ())])
         if context is None or has_errors(found):
             raise ComposerError(_RUNS_ON)
+        # A copy, without what its checks have found out.
+        self._read_before = replace(context)
         return context
 
     def _reader_here(self) -> SystemReader:

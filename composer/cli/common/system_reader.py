@@ -52,14 +52,20 @@ class SystemReader:
         report(findings)
         return None if has_errors(findings) else context
 
-    def read(self) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
+    def read(
+        self, before: CheckContext | None = None
+    ) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
         """Return a system, if there is one, the files that it names, and what is wrong with it.
+
+        Args:
+            before: What was read before: what is the same in it is kept.
 
         Raises:
             UsageError: The arguments do not fit the file.
         """
-        system = load_given(self.paths, self.words, self.set_values)
-        context = create_context(system, InterfaceCatalogue())
+        system_before = before.system if before else None
+        system = load_given(self.paths, self.words, self.set_values, system_before)
+        context = create_context(system, InterfaceCatalogue(), before)
         files = [*self.paths, *system.files, *system.named]
         return context, files, check_in_context(system, context)
 

@@ -267,7 +267,7 @@ class Rewiring:
         """Change what runs on: records, state, parameters and entities."""
         for full_name, spec in self._after.items():
             node = self._nodes[full_name]
-            if node.spec is not spec:
+            if node.spec is not spec or node.functions is not self._new.functions:
                 self._replace_record(node, spec)
         for kind in ENTITY_KINDS:
             for operation in plan.operations:
