@@ -57,9 +57,6 @@ class ControlledSystem(Protocol):
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
 
-    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
-        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
-
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew."""
 
@@ -85,6 +82,7 @@ class ControlNode:
 
     Args:
         health: The health of the system's entities.
+        overdue_calls: Returns the calls that exceed their `warn_after`.
         commands: `None` if the system is not to be asked over ROS.
     """
 
@@ -93,11 +91,13 @@ class ControlNode:
         system: ControlledSystem,
         spec: SystemSpec,
         health: HealthRegistry,
+        overdue_calls: Callable[[], list[tuple[str, RunningCall]]],
         commands: Commands | None,
     ) -> None:
         self._system = system
         self._commands = commands
         self._health = health
+        self._overdue_calls = overdue_calls
         self._period_sec = spec.diagnostics_period_sec
         self._diagnostics: DiagnosticsPublisher | None = None
         self._answered = float('-inf')
@@ -205,9 +205,8 @@ class ControlNode:
         elif self._diagnostics is not None:
             self._diagnostics.change_period(period_sec)
         elif self._node is not None:
-            system = self._system
             diagnostics = DiagnosticsPublisher(
-                system.state, period_sec, self._health, system.overdue_calls
+                self._system.state, period_sec, self._health, self._overdue_calls
             )
             try:
                 diagnostics.start(self._node)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
-    from composer.runtime.start import NodeStarter
+    from composer.runtime.start import Starter
     from composer.runtime.stop_request import StopRequest
 
 _POLL_SEC = 0.02
@@ -51,19 +51,17 @@ class Rewiring:
     """One plan on its way into a running system.
 
     Args:
-        start: Starts nodes and processes that were created.
         old: What the system runs as.
         new: What it is to run as.
     """
 
-    def __init__(  # noqa: PLR0913, PLR0917 - the parts of a system
+    def __init__(
         self,
         nodes: dict[str, LiveNode],
         processes: ProcessSupervisor,
         handle: SystemHandle,
-        starter: NodeStarter,
+        starter: Starter,
         restarter: NodeRestarter,
-        start: Callable[[Collection[LiveNode], Collection[ExternalProcess]], None],
         old: Reading,
         new: Reading,
     ) -> None:
@@ -72,7 +70,6 @@ class Rewiring:
         self._handle = handle
         self._starter = starter
         self._restarter = restarter
-        self._start = start
         self._old, self._new = old, new
         self._before = {node.full_name: node for node in old.spec.nodes.values()}
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
@@ -232,7 +229,7 @@ class Rewiring:
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
         again.take_over(node)
-        self._start([again], [])
+        self._starter.start_more([again], [])
 
     def _end_processes(self, names: Iterable[str]) -> None:
         for name in names:
@@ -242,7 +239,7 @@ class Rewiring:
 
     def _start_process(self, spec: Any) -> None:
         self._processes.by_name[spec.name] = process = ExternalProcess(spec)
-        self._start([], [process])
+        self._starter.start_more([], [process])
 
     def _begin(self, node_names: list[str], process_names: list[str]) -> None:
         """Create and start nodes and processes; each waits for what its `wait_for` names."""
@@ -261,7 +258,7 @@ class Rewiring:
         nodes = self._starter.create(self._after[name] for name in node_names)
         processes = [ExternalProcess(self._new.spec.processes[name]) for name in process_names]
         self._processes.by_name.update({each.spec.name: each for each in processes})
-        self._start(nodes, processes)
+        self._starter.start_more(nodes, processes)
 
     def _change_nodes(self, plan: Plan) -> None:
         """Change what runs on: records, state, parameters and entities."""
