@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from composer.planning.plan import Operation, Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.entities.actions import ActionServer
-    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
+    from composer.runtime.nodes.live_entity import LiveEntity
+    from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
