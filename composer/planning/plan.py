@@ -25,6 +25,11 @@ class Action(Enum):
     REMOVE = '-'
 
 
+# After these there is no more of what was there, and after those there is something new.
+GOING = (Action.RECREATE, Action.REMOVE)
+COMING = (Action.RECREATE, Action.ADD)
+
+
 @record
 class Change:
     """One value that differs.

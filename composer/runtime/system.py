@@ -24,7 +24,8 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.rewiring.rewire import Rewiring, wait_for_goals
+from composer.runtime.rewiring.goals_in_flight import wait_for_goals
+from composer.runtime.rewiring.rewire import Rewiring
 from composer.runtime.start import Starter
 from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
