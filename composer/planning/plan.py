@@ -93,6 +93,14 @@ class Plan:
         """Tell whether there is anything to do."""
         return bool(self.operations)
 
+    def summarize(self) -> str:
+        """Return `~1 timer, +2 subscriptions`."""
+        counts = Counter((each.action, each.noun) for each in self.operations)
+        return ', '.join(
+            f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
+            for (action, noun), count in counts.items()
+        )
+
     def counts(self) -> dict[Action, int]:
         """Return how many operations there are of each kind, in the order of `Action`."""
         counter = Counter(each.action for each in self.operations)
