@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
     from composer.processes.guardian_client import GuardianClient
-    from composer.runtime.control.control_node import Commands
+    from composer.runtime.control.control_services import Commands
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
 
