@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.planning.plan import Plan
 
+_SNAPSHOT_SEC = 30.0
+
 
 def plan(
     paths: Sequence[Path],
@@ -82,12 +84,17 @@ def plan(
 
 
 def _compare_with_running(context: CheckContext) -> Plan:
-    from composer.cli.running.client import ask_snapshot
+    from composer.cli.running.answer_forms import read_answer
+    from composer.cli.running.client import Client
+    from composer.cli.running.discovery import Discovery
+    from composer.runtime.control import protocol
     from composer.runtime.environment import environment_set
 
     # They say on which graph it runs.
-    with environment_set(context.spec.environment):
-        old = ask_snapshot(context.spec.name)
+    with environment_set(context.spec.environment), Client() as client:
+        system = Discovery(client).find(context.spec.name)
+        answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
+    old = decode_snapshot(read_answer(answer.text))
     new = take_snapshot(context, [Path(each) for each in old.prefixes])
     # What was left out of the one is left out of the other.
     return compare(old, decode_snapshot(encode_snapshot(new)))
