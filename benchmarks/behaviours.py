@@ -8,9 +8,10 @@ import time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import AsyncIterator, Iterator
 
     from std_msgs.msg import Empty, Int64
+    from std_srvs.srv import SetBool
 
     from composer import Node
 
@@ -49,6 +50,38 @@ def count_round_trips(node: Node, seconds: float) -> Iterator[None]:
         yield
     rate = (node.state.count - before) / (time.monotonic() - begin)
     print(json.dumps({'rate': rate}), flush=True)
+    node.shutdown()
+
+
+def comply(_node: Node, request: SetBool.Request) -> dict[str, object]:
+    """Agree to what was asked for."""
+    return {'success': request.data}
+
+
+def call_often(node: Node, seconds: float) -> Iterator[None]:
+    """Call a service over and over for `seconds`, tell how often, and stop the system."""
+    begin = time.monotonic()
+    count = 0
+    while time.monotonic() - begin < seconds:
+        node.call('ask', {'data': True})
+        count += 1
+    _tell_rate(node, count, begin)
+    yield
+
+
+async def call_often_async(node: Node, seconds: float) -> AsyncIterator[None]:
+    """As `call_often`, without holding a thread."""
+    begin = time.monotonic()
+    count = 0
+    while time.monotonic() - begin < seconds:
+        await node.call_async('ask', {'data': True})
+        count += 1
+    _tell_rate(node, count, begin)
+    yield
+
+
+def _tell_rate(node: Node, count: int, begin: float) -> None:
+    print(json.dumps({'rate': count / (time.monotonic() - begin)}), flush=True)
     node.shutdown()
 
 

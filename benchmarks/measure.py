@@ -28,6 +28,7 @@ class Subject:
 
 SUBJECTS = {
     'round_trips': Subject('benchmarks.round_trips', 2.0),
+    'calls': Subject('benchmarks.calls', 2.0),
     'overhead': Subject('benchmarks.message_overhead'),
     'forty': Subject('benchmarks.forty'),
     'further_node': Subject('benchmarks.further_node'),

@@ -89,6 +89,16 @@ def _round_trips() -> list[Row]:
     return [*rows, Row(what, beside, without, times, '>=', 0.9)]
 
 
+def _calls() -> list[Row]:
+    other = _side('calls', 'events', 0, 'rate')
+
+    def row(what: str, side: str) -> Row:
+        what = f"{what} calls/s to a local server, against rclpy's call_async on EventsExecutor"
+        return Row(what, _side('calls', side, 0, 'rate'), other, times, '>=', 3)
+
+    return [row('node.call', 'composer'), row('node.call_async', 'composer_async')]
+
+
 def _overhead() -> list[Row]:
     ours = _side('overhead', 'composer', 15, 'composed_us')
     by_hand = _side('overhead', 'composer', 15, 'plain_us')
@@ -234,6 +244,7 @@ def _soak() -> list[Row]:
 
 ROWS: list[Row] = [
     *_round_trips(),
+    *_calls(),
     *_overhead(),
     *_forty(),
     *_further_node(),

@@ -93,6 +93,23 @@ def rally(seconds: float) -> dict[str, Any]:
     }
 
 
+def callers(seconds: float, *, is_async: bool) -> dict[str, Any]:
+    """Return two nodes: one calls the other, prints how many calls a second, and stops."""
+    behaviour = f'benchmarks.behaviours:call_often{"_async" if is_async else ""}'
+    service = 'std_srvs/srv/SetBool'
+    return {
+        'calling': {
+            'service_clients': {'ask': service},
+            'timers': {
+                'call': {'period': 0.2, 'behaviour': behaviour, 'with': {'seconds': seconds}}
+            },
+        },
+        'serving': {
+            'services': {'ask': {'type': service, 'behaviour': 'benchmarks.behaviours:comply'}},
+        },
+    }
+
+
 def stream(seconds: float, rate: int) -> dict[str, Any]:
     """Return two nodes: `rate` messages a second from one to the other, which prints the count."""
     numbers = 'std_msgs/msg/Int64'

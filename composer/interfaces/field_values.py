@@ -199,7 +199,8 @@ def _string_reader(expected: FieldType) -> Reader:
             raise FieldError(message, rule='field-text', help=advice)
         if bound is not None or not value.isascii():
             _check_text(expected, value)
-        return value
+        # The text alone, of a string of another class.
+        return value if type(value) is str else str.__str__(value)
 
     return read
 

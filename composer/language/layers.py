@@ -210,7 +210,10 @@ _IN_NODE = 3
 _IN_ENTITY = 5
 _OF_THE_USER = ('parameters', 'remap', 'state')
 # The keys that say how a node runs, and give it nothing to do.
-_CHANGES = {each.name for each in fields(NodeSpec)} - WORK_KEYS | {'warn_after', 'when', 'foreach'}
+_CHANGES = {
+    *({each.name for each in fields(NodeSpec)} - WORK_KEYS),
+    *('warn_after', 'local_delivery', 'when', 'foreach'),
+}
 
 
 def _is_in_entity(path: DataPath) -> bool:

@@ -2,6 +2,7 @@
 
 Every record carries the path of its data, under which a `SourceMap` knows where it was written.
 `warn_after_sec` is how long a behaviour may run before it is reported, `None` for ever.
+`local_delivery` is whether messages, calls or goals may be handed over within the process.
 """
 
 from __future__ import annotations
@@ -97,6 +98,7 @@ class PublisherSpec:
     type: str
     topic: str
     qos: QosSpec
+    local_delivery: bool
     external: bool
     path: DataPath
 
@@ -109,6 +111,7 @@ class SubscriptionSpec:
         behaviour: `None` if messages are passed on as they are.
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
+        read_only: Whether it shares its messages with others, as its behaviour only reads them.
         external: Whether its publishers are in no file.
     """
 
@@ -119,6 +122,7 @@ class SubscriptionSpec:
     behaviour: BehaviourSpec | None
     publish: str | None
     group: str | None
+    read_only: bool
     on_error: OnError
     external: bool
     warn_after_sec: float | None
@@ -160,6 +164,7 @@ class ServiceSpec:
     qos: QosSpec
     behaviour: BehaviourSpec
     group: str | None
+    local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
     path: DataPath
@@ -177,6 +182,7 @@ class ServiceClientSpec:
     type: str
     service: str
     qos: QosSpec
+    local_delivery: bool
     external: bool
     path: DataPath
 
@@ -195,6 +201,7 @@ class ActionSpec:
     behaviour: BehaviourSpec
     accept: BehaviourSpec | None
     concurrency: Concurrency
+    local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
     path: DataPath
@@ -215,6 +222,7 @@ class ActionClientSpec:
     action: str
     feedback: BehaviourSpec | None
     result: BehaviourSpec | None
+    local_delivery: bool
     external: bool
     path: DataPath
 

@@ -38,7 +38,7 @@ _KEYS = {
 # What no value of these fields stands for.
 _NONE = {'warn_after_sec': 'never', 'diagnostics_period_sec': False}
 # Entities that do not set these have those of their node.
-_INHERITED = ('on_error', 'warn_after_sec')
+_INHERITED = ('on_error', 'warn_after_sec', 'local_delivery')
 _CHANNELS = {kind.channel for kind in ENTITY_KINDS if kind.channel}
 
 

@@ -19,7 +19,8 @@ from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import is_output_unread, system_logger
-from composer.runtime.messages.local_delivery import LocalServices, LocalTopics
+from composer.runtime.messages.local_delivery import LocalTopics
+from composer.runtime.messages.local_services import LocalServices
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle

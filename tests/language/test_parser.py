@@ -164,6 +164,26 @@ def test_entities_inherit_how_long_they_may_run():
     assert load_node('{}', 'defaults: {warn_after: null}').warn_after_sec is None
 
 
+def test_entities_inherit_whether_they_deliver_locally():
+    entities = (
+        ' publishers: {a: p/msg/T, b: {type: p/msg/T, local_delivery: false},'
+        ' c: {type: p/msg/T, local_delivery: true}},'
+        ' services: {s: {type: p/srv/T, behaviour: m:f}}, service_clients: {s: p/srv/T},'
+        ' actions: {s: {type: p/action/T, behaviour: m:f}}, action_clients: {s: p/action/T}'
+    )
+    for own, default, inherited in (
+        ('', '', True),
+        ('', 'defaults: {local_delivery: false}', False),
+        ('local_delivery: true,', 'defaults: {local_delivery: false}', True),
+        ('local_delivery: false,', '', False),
+    ):
+        node = load_node(f'{{{own}{entities}}}', default)
+        found = [each.local_delivery for each in node.publishers.values()]
+        assert found == [inherited, False, True]
+        for kind in (node.services, node.service_clients, node.actions, node.action_clients):
+            assert kind['s'].local_delivery == inherited
+
+
 def test_a_publisher_may_be_its_type_alone():
     node = load_node(
         '{publishers: {scan: p/msg/T, own: {type: p/msg/T, topic: /x, qos: sensor_data}}}'

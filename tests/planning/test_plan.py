@@ -69,6 +69,18 @@ EDITS = [
         ["~ subscription 'words' of 'listener': with.loud true → false (17 → 17)"],
     ),
     (
+        'with: {loud: true}',
+        'with: {loud: true}, read_only: true',
+        None,
+        ["~ subscription 'words' of 'listener': read_only false → true (17 → 17)"],
+    ),
+    (
+        '  talker:',
+        '  talker:\n    local_delivery: false',
+        None,
+        ["~ publisher 'words' of 'talker': local_delivery true → false (11 → 6)"],
+    ),
+    (
         'maximum: 10.0',
         'maximum: 20.0',
         None,

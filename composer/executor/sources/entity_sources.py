@@ -302,12 +302,20 @@ class ServiceSource(EventSource):
     rank = 3
     ask = staticmethod(Readiness.has_requests)
     watch_entity = staticmethod(c_bindings.watch_service)
-    __slots__ = ()
+    __slots__ = ('_serves_sent',)
+
+    def open(self) -> None:
+        """See the base class."""
+        self._serves_sent = False
+        super().open()
 
     def run(self) -> Any:
         """See the base class."""
         if self.local:
-            return self._serve_local()
+            # In turn, if others have sent requests, too.
+            self._serves_sent = not self._serves_sent and self.pending > 0
+            if not self._serves_sent:
+                return self._serve_local()
         revision = self.revision
         if not self.spends:
             self.parts.scheduler.spend(self)
@@ -336,19 +344,22 @@ class ServiceSource(EventSource):
         try:
             request: LocalRequest = self.local.popleft()
         except IndexError:
-            return NOTHING
+            return NOTHING  # Another thread took it, or it was pushed out.
         callback = service.callback
-        response = callback(request.message, service.srv_type.Response())
-        if self.parts.executor.is_forked:
-            end_child()
         if self._is_async(callback):
-            return self._respond_locally(response, request)
-        request.respond(response)
+            return self._respond_locally(callback, request)
+        # The response is in no variable: what nobody refers to need not be copied.
+        request.respond(self._answer(callback, request.message))
         return None
 
-    @staticmethod
-    async def _respond_locally(response: Any, request: LocalRequest) -> None:
-        request.respond(await response)
+    def _answer(self, callback: Any, message: Any) -> Any:
+        response = callback(message, self.entity.srv_type.Response())
+        if self.parts.executor.is_forked:
+            end_child()
+        return response
+
+    async def _respond_locally(self, callback: Any, request: LocalRequest) -> None:
+        request.respond(await self._answer(callback, request.message))
 
     async def _respond(self, response: Any, header: Any) -> None:
         self.entity.send_response(await response, header)

@@ -1,7 +1,9 @@
 """What all kinds of sources share: a source listens to one entity, takes what came and runs it."""
 
+from __future__ import annotations
+
 import inspect
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rclpy.exceptions import InvalidHandle
 
@@ -9,8 +11,10 @@ from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT, EventFd
 from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Group, Scheduler
-from composer.executor.sources.inbox import Inbox
 from composer.executor.sources.qos_events import QosEventPoll
+
+if TYPE_CHECKING:
+    from composer.executor.sources.inbox import Inbox
 
 NOTHING = object()
 """What `EventSource.run` returns when there was nothing to take."""

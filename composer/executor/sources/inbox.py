@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from composer.executor.sources.event_source import EventSource
+from typing import Any
 
 
 class Inbox:
@@ -21,7 +18,7 @@ class Inbox:
 
     Attributes:
         messages: The oldest first.
-        source: What takes them, while an executor listens to the entity.
+        source: The `EventSource` that takes them, while an executor listens to the entity.
         overruns: How many were pushed out.
     """
 
@@ -30,7 +27,7 @@ class Inbox:
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque(maxlen=depth)
-        self.source: EventSource | None = None
+        self.source: Any = None
         self.overruns = 0
 
     def put(self, message: Any) -> None:
@@ -55,4 +52,4 @@ class Inbox:
     def is_drained(self) -> bool:
         """Tell whether the middleware has nothing more for the entity."""
         source = self.source
-        return source is None or not source.has_data()
+        return source is not None and not source.has_data()

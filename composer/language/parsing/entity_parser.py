@@ -57,6 +57,10 @@ def parse_run_options(data: Data, node: Data) -> RunOptions:
     }
 
 
+def _allows_local_delivery(data: Data, node: Data) -> bool:
+    return bool(data.get('local_delivery', node.get('local_delivery', True)))
+
+
 def _parse_parameter(_: Data, name: str, data: Any, path: DataPath) -> ParameterSpec:
     declaration = data if isinstance(data, dict) else {'default': data}
     value = declaration.get('default')
@@ -78,13 +82,14 @@ def _parse_parameter(_: Data, name: str, data: Any, path: DataPath) -> Parameter
     )
 
 
-def _parse_publisher(_: Data, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
+def _parse_publisher(node: Data, name: str, data: str | Data, path: DataPath) -> PublisherSpec:
     data = _full(data)
     return PublisherSpec(
         name=name,
         type=data['type'],
         topic=data.get('topic', name),
         qos=parse_entity_qos(data, path),
+        local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
         path=path,
     )
@@ -99,6 +104,7 @@ def _parse_subscription(node: Data, name: str, data: Data, path: DataPath) -> Su
         behaviour=parse_behaviour(data, path),
         publish=data.get('publish'),
         group=data.get('group'),
+        read_only=data.get('read_only', False),
         external=data.get('external', False),
         path=path,
         **parse_run_options(data, node),
@@ -127,13 +133,14 @@ def _parse_service(node: Data, name: str, data: Data, path: DataPath) -> Service
         qos=parse_entity_qos(data, path, is_service=True),
         behaviour=behaviour_at(data, path),
         group=data.get('group'),
+        local_delivery=_allows_local_delivery(data, node),
         path=path,
         **parse_run_options(data, node),
     )
 
 
 def _parse_service_client(
-    _: Data, name: str, data: str | Data, path: DataPath
+    node: Data, name: str, data: str | Data, path: DataPath
 ) -> ServiceClientSpec:
     data = _full(data)
     return ServiceClientSpec(
@@ -141,6 +148,7 @@ def _parse_service_client(
         type=data['type'],
         service=data.get('service', name),
         qos=parse_entity_qos(data, path, is_service=True),
+        local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
         path=path,
     )
@@ -154,12 +162,15 @@ def _parse_action(node: Data, name: str, data: Data, path: DataPath) -> ActionSp
         behaviour=behaviour_at(data, path),
         accept=parse_behaviour(data, path, 'accept'),
         concurrency=data.get('concurrency', 'parallel'),
+        local_delivery=_allows_local_delivery(data, node),
         path=path,
         **parse_run_options(data, node),
     )
 
 
-def _parse_action_client(_: Data, name: str, data: str | Data, path: DataPath) -> ActionClientSpec:
+def _parse_action_client(
+    node: Data, name: str, data: str | Data, path: DataPath
+) -> ActionClientSpec:
     data = _full(data)
     return ActionClientSpec(
         name=name,
@@ -167,6 +178,7 @@ def _parse_action_client(_: Data, name: str, data: str | Data, path: DataPath) -
         action=data.get('action', name),
         feedback=parse_behaviour(data, path, 'feedback'),
         result=parse_behaviour(data, path, 'result'),
+        local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
         path=path,
     )

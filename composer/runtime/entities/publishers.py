@@ -38,7 +38,9 @@ class Publisher:
             event_callbacks=self._endpoint.publisher_events(),
         )
         node.endpoints.append(self._endpoint)
-        self._local = node.system.topics.add_publisher(self._ros)
+        self._local = node.system.topics.add_publisher(
+            node.ros, self._ros, is_local=spec.local_delivery
+        )
         send, convert = self._local.publish, converter_for(message_class).convert
 
         def publish(payload: Payload, unheld: int = UNHELD_ARGUMENT) -> None:
@@ -48,8 +50,10 @@ class Publisher:
 
         self.publish: Publish = publish
 
-    def change(self, _spec: PublisherSpec) -> None:
-        """See `LiveEntity`: all that it has is fixed."""
+    def change(self, spec: PublisherSpec) -> None:
+        """See `LiveEntity`."""
+        topics = self._node.system.topics
+        topics.change_publisher(self._local, is_local=spec.local_delivery)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""

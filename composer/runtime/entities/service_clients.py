@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from sys import getrefcount
+from typing import TYPE_CHECKING, Any, Final
 
 from composer.errors import (
     CallError,
@@ -17,12 +19,9 @@ from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rclpy.task import Future
 
     from composer.language.specs import ServiceClientSpec
-    from composer.runtime.messages.local_delivery import LocalService
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -36,7 +35,6 @@ class ServiceClient:
         self._failures = node.system.failures
         self._convert = converter_for(service_class.Request).convert
         self._service = node.ros.resolve_service_name(spec.service)
-        self._service_class = service_class
         # Never in a group of behaviours: one that waits for a response would keep it out.
         self._client = node.ros.create_client(
             service_class,
@@ -44,6 +42,8 @@ class ServiceClient:
             qos_profile=create_qos_profile(spec.qos, node.system.profiles),
             callback_group=node.background,
         )
+        self._local = node.system.services.add_client(node.ros, self._client, self._service)
+        self._local.allow(is_allowed=spec.local_delivery)
         self._requests = Requests(
             node.waits,
             self._is_available,
@@ -61,38 +61,35 @@ class ServiceClient:
             CallError: There is no response; its subclasses say why.
             SystemStoppingError: A stop was requested while it waited.
         """
-        return self._requests.send(self._sending(payload), timeout_sec)
+        request = self._convert(payload)
+        is_held = request is payload and getrefcount(payload) > _UNHELD
+        return self._requests.send(partial(self._send, request, is_held=is_held), timeout_sec)
 
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
         """As `call`, without holding a thread while it waits."""
-        return await self._requests.send_async(self._sending(payload), timeout_sec)
-
-    def _sending(self, payload: Payload) -> Callable[[], Future]:
-        """Return what sends a request, or hands it to a server of the same system."""
         request = self._convert(payload)
-        is_held = request is payload
+        is_held = request is payload and getrefcount(payload) > _UNHELD_ASYNC
+        send = partial(self._send, request, is_held=is_held)
+        return await self._requests.send_async(send, timeout_sec)
 
-        def send() -> Future:
-            local = self._find_local()
-            if local is None:
-                return self._client.call_async(request)
-            return local.call(request, is_held=is_held)
-
-        return send
-
-    def _find_local(self) -> LocalService | None:
-        return self._node.system.services.find(self._service, self._service_class)
+    def _send(self, request: Any, *, is_held: bool) -> Future:
+        server = self._local.server
+        if server is None:
+            return self._client.call_async(request)
+        return server.call(request, is_held=is_held)
 
     def _is_available(self) -> bool:
-        return self._find_local() is not None or self._client.service_is_ready()
+        return self._local.server is not None or self._client.service_is_ready()
 
-    def change(self, _spec: ServiceClientSpec) -> None:
-        """See `LiveEntity`: all that it has is fixed."""
+    def change(self, spec: ServiceClientSpec) -> None:
+        """See `LiveEntity`."""
+        self._local.allow(is_allowed=spec.local_delivery)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
         message = f"an edit took the client of '{self._service}' away, which this call waited for"
         self._requests.end(ServiceNotAvailableError(message))
+        self._node.system.services.remove_client(self._local)
         self._node.ros.destroy_client(self._client)
 
     def _unavailable(self, timeout_sec: float) -> CallError:
@@ -105,3 +102,36 @@ class ServiceClient:
             return ServiceFailedError(message, help="the server's log has the traceback")
         message = f"'{self._service}' did not answer within {timeout_sec:g} s"
         return CallTimeoutError(message)
+
+
+class _Probe:
+    """Calls as those on the way of a payload to its client, which count its references."""
+
+    def call_by_name(self, _name: str, payload: Any, timeout: float | None) -> int:
+        client = self
+        return client.call({} if payload is None else payload, timeout)
+
+    def call(self, payload: Any, _timeout_sec: float | None) -> int:
+        request = payload
+        return 0 if request is None else getrefcount(payload)
+
+    async def call_async_by_name(self, _name: str, payload: Any, timeout: float | None) -> int:  # noqa: ASYNC109 - as `Node.call_async`
+        client = self
+        return await client.call_async({} if payload is None else payload, timeout)
+
+    async def call_async(self, payload: Any, _timeout_sec: float | None) -> int:
+        request = payload
+        return 0 if request is None else getrefcount(payload)
+
+
+def _count_async() -> int:
+    try:
+        _Probe().call_async_by_name('', [None], None).send(None)
+    except StopIteration as end:
+        return int(end.value)
+    return 0
+
+
+# The references to a payload in `ServiceClient.call` that only `Node.call` was given.
+_UNHELD: Final = _Probe().call_by_name('', [None], None)
+_UNHELD_ASYNC: Final = _count_async()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED
 from composer.runtime.behaviours.running_calls import Owner
-from composer.runtime.messages.local_delivery import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError
@@ -24,24 +23,25 @@ class Service:
 
     def __init__(self, node: LiveNode, spec: ServiceSpec) -> None:
         self._node = node
-        profile = create_qos_profile(spec.qos, node.system.profiles)
         self._ros = node.ros.create_service(
             import_interface(spec.type),
             spec.service,
             _create_callback(node, spec),
-            qos_profile=profile,
+            qos_profile=create_qos_profile(spec.qos, node.system.profiles),
             callback_group=node.group(spec.group),
         )
         name = node.ros.resolve_service_name(spec.service)
-        self._local = node.system.services.add(node.ros, self._ros, name, queue_depth(profile))
+        self._local = node.system.services.add_server(node.ros, self._ros, name)
+        self._local.allow(is_allowed=spec.local_delivery)
 
     def change(self, spec: ServiceSpec) -> None:
         """See `LiveEntity`."""
         self._ros.callback = _create_callback(self._node, spec)
+        self._local.allow(is_allowed=spec.local_delivery)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
-        self._node.system.services.remove(self._local)
+        self._node.system.services.remove_server(self._local)
         self._node.ros.destroy_service(self._ros)
 
 

@@ -34,11 +34,15 @@ class Subscription:
             event_callbacks=self._endpoint.subscription_events(),
         )
         node.endpoints.append(self._endpoint)
-        self._local = node.system.topics.add_subscription(node.ros, self._ros)
+        self._local = node.system.topics.add_subscription(
+            node.ros, self._ros, read_only=spec.read_only
+        )
         node.count_missed(self._owner, self._ros, self._local.inbox)
 
     def change(self, spec: SubscriptionSpec) -> None:
         """See `LiveEntity`."""
+        topics = self._node.system.topics
+        topics.change_subscription(self._local, read_only=spec.read_only)
         self._ros.callback = self._create_callback(spec)
 
     def destroy(self) -> None:

@@ -4,55 +4,105 @@ A publisher hands a message over while all that match it are subscriptions of th
 as somebody else listens, it sends, to everyone: the middleware cannot tell one subscription from
 another. It hands over again when all that it has sent was taken; so messages of one publisher
 never overtake each other.
+
+That is exact where the middleware delivers within `publish`, as Fast DDS does in one process. If
+it may be told otherwise (see `may_be_late`), a publisher that has sent once does so for good.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
     LivelinessPolicy,
     QoSCompatibility,
+    ReliabilityPolicy,
     qos_check_compatible,
 )
-from rclpy.task import Future
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
 
     from rclpy.publisher import Publisher as RosPublisher
     from rclpy.qos import QoSProfile
-    from rclpy.service import Service as RosService
     from rclpy.subscription import Subscription as RosSubscription
 
     from composer.executor import ComposerExecutor
     from composer.executor.sources.inbox import Inbox
 
 # Longer durations are no limit.
-_LONGEST_NS = 2**62
+_LONGEST_NS: Final = 2**62
+# What Fast DDS keeps for a subscription whose history is `keep_all`.
+_MOST_KEPT: Final = 5000
+_SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
+# Each names a file that may change how Fast DDS delivers.
+_PROFILE_VARIABLES: Final = (
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_USE_QOS_FROM_XML',
+)
+_NOWHERE: Final = -1
 
 
 class LocalPublisher:
     """A publisher of the system.
 
+    Args:
+        node: The rclpy node that it belongs to.
+        returns: Whether it hands over again after it has sent.
+
     Attributes:
-        reason: Why its messages are sent; empty if they are handed over while nobody else listens.
+        is_local: Whether it may hand messages over.
+        reason: Why its messages are always sent; empty if they are handed over while nobody
+            outside listens.
     """
 
-    def __init__(self, ros: RosPublisher, reason: str) -> None:
+    def __init__(self, node: Any, ros: RosPublisher, *, is_local: bool, returns: bool) -> None:
+        self.node = node
         self.ros = ros
-        self.own_reason = self.reason = reason
-        self.inboxes: tuple[Inbox, ...] | None = None
+        self.is_local = is_local
+        self.reason = ''
+        self._own_reason = why_sent(ros.qos_profile)
+        self._returns = returns
         self._ownership = ownership_of(ros.msg_type)
         self._count: Callable[[], int] = ros.handle.get_subscription_count
         self._send = ros.publish
         self._has_sent = False
+        self._lock = threading.RLock()  # A finalizer may publish.
+        self._inboxes: tuple[Inbox, ...] = ()
+        self._shared: tuple[Inbox, ...] = ()
+        self._limited: tuple[Inbox, ...] = ()
+        self._size = _NOWHERE
+
+    @property
+    def outside(self) -> int:
+        """How many subscriptions listen that are not the system's own."""
+        return max(0, self._count() - len(self._inboxes) - len(self._shared))
+
+    def connect(self, subscriptions: Iterable[LocalSubscription]) -> None:
+        """Hand messages over to those of the system's subscriptions that match."""
+        profile = self.ros.qos_profile
+        matched = [each for each in subscriptions if _are_compatible(profile, each.ros)]
+        # Nothing is handed over meanwhile: the middleware never counts so few.
+        self._size = _NOWHERE
+        inboxes = [(each, each.inbox) for each in matched if each.inbox is not None]
+        self._inboxes = tuple(inbox for each, inbox in inboxes if not each.read_only)
+        self._shared = tuple(inbox for each, inbox in inboxes if each.read_only)
+        self._limited = tuple(inbox for _, inbox in inboxes if inbox.depth is None)
+        turned_off = '' if self.is_local else 'local_delivery: false'
+        reasons = [turned_off, self._own_reason, *(each.reason for each in matched)]
+        # What it has sent until now may not have been taken yet.
+        self._has_sent = self._has_sent or bool(self.reason)
+        self.reason = next(filter(None, reasons), '')
+        self._size = len(matched)
 
     def publish(self, message: Any, *, is_held: bool) -> None:
         """Hand a message over, or send it.
@@ -60,32 +110,61 @@ class LocalPublisher:
         Args:
             is_held: Whether somebody refers to it.
         """
-        inboxes = self.inboxes
-        if inboxes is None or self._count() != len(inboxes):
-            self._has_sent = True
+        if self.reason:
             self._send(message)
-            return
-        if self._has_sent:
-            if not all(inbox.is_drained() for inbox in inboxes):
+        elif self._has_sent or self._count() != self._size or self._is_full():
+            self._send_or_return(message, is_held=is_held)
+        else:
+            self._hand_over(message, is_held=is_held)
+
+    def _is_full(self) -> bool:
+        """Tell whether the middleware must hold back who publishes."""
+        return any(len(inbox.messages) >= _MOST_KEPT for inbox in self._limited)
+
+    def _send_or_return(self, message: Any, *, is_held: bool) -> None:
+        with self._lock:
+            self._has_sent = self._has_sent and not self._may_return()
+            if self._has_sent or self._count() != self._size or self._is_full():
+                self._has_sent = True
                 self._send(message)
                 return
-            self._has_sent = False
-        if not inboxes:
+        self._hand_over(message, is_held=is_held)
+
+    def _may_return(self) -> bool:
+        """Tell whether all that was sent has been taken."""
+        inboxes = self._inboxes + self._shared
+        return self._returns and all(inbox.is_drained() for inbox in inboxes)
+
+    def _hand_over(self, message: Any, *, is_held: bool) -> None:
+        inboxes, shared = self._inboxes, self._shared
+        if not inboxes and not shared:
             return
         ownership = self._ownership
         message = ownership.take(message, is_held=is_held)
-        for inbox in inboxes[1:]:
+        for inbox in inboxes if shared else inboxes[1:]:
             inbox.put(ownership.copy(message))
-        inboxes[0].put(message)
+        for inbox in shared or inboxes[:1]:
+            inbox.put(message)
 
 
 class LocalSubscription:
-    """A subscription of the system."""
+    """A subscription of the system.
 
-    def __init__(self, ros: RosSubscription, inbox: Inbox, reason: str) -> None:
+    Args:
+        node: The rclpy node that it belongs to.
+        inbox: Takes its messages; `None` if there is a reason to send them.
+        reason: Why messages for it are sent.
+        read_only: Whether it shares messages with others.
+    """
+
+    def __init__(
+        self, node: Any, ros: RosSubscription, inbox: Inbox | None, reason: str, *, read_only: bool
+    ) -> None:
+        self.node = node
         self.ros = ros
         self.inbox = inbox
         self.reason = reason
+        self.read_only = read_only
 
 
 class _Topic:
@@ -96,14 +175,7 @@ class _Topic:
     def connect(self) -> None:
         """Find out to which subscriptions each publisher hands over."""
         for publisher in self.publishers:
-            matched = [
-                each
-                for each in self.subscriptions
-                if _are_compatible(publisher.ros.qos_profile, each.ros.qos_profile)
-            ]
-            reasons = [publisher.own_reason, *(each.reason for each in matched)]
-            publisher.reason = next(filter(None, reasons), '')
-            publisher.inboxes = None if publisher.reason else tuple(each.inbox for each in matched)
+            publisher.connect(self.subscriptions)
 
 
 class LocalTopics:
@@ -111,124 +183,107 @@ class LocalTopics:
 
     def __init__(self, executor: ComposerExecutor) -> None:
         self._executor = executor
+        self._returns = not may_be_late(get_rmw_implementation_identifier(), os.environ)
         self._topics: defaultdict[tuple[str, type], _Topic] = defaultdict(_Topic)
         self._lock = threading.Lock()
 
-    def add_publisher(self, ros: RosPublisher, *, is_local: bool = True) -> LocalPublisher:
-        """Take in a publisher."""
-        reason = _why_sent(ros.qos_profile) if is_local else 'local_delivery: false'
-        publisher = LocalPublisher(ros, reason)
-        self._change(ros, lambda topic: topic.publishers.append(publisher))
+    def add_publisher(
+        self, node: Any, ros: RosPublisher, *, is_local: bool = True
+    ) -> LocalPublisher:
+        """Take in a publisher of the rclpy node `node`, which may hand over if `is_local`."""
+        publisher = LocalPublisher(node, ros, is_local=is_local, returns=self._returns)
+        with self._lock:
+            topic = self._topic(ros)
+            topic.publishers.append(publisher)
+            publisher.connect(topic.subscriptions)
         return publisher
 
-    def add_subscription(self, node: Any, ros: RosSubscription) -> LocalSubscription:
-        """Take in a subscription of `node`."""
-        inbox = self._executor.open_inbox(node, ros, queue_depth(ros.qos_profile))
-        subscription = LocalSubscription(ros, inbox, _why_sent(ros.qos_profile))
-        self._change(ros, lambda topic: topic.subscriptions.append(subscription))
+    def change_publisher(self, publisher: LocalPublisher, *, is_local: bool) -> None:
+        """Let a publisher hand messages over, or only send them."""
+        with self._lock:
+            publisher.is_local = is_local
+            publisher.connect(self._topic(publisher.ros).subscriptions)
+
+    def add_subscription(
+        self, node: Any, ros: RosSubscription, *, read_only: bool = False
+    ) -> LocalSubscription:
+        """Take in a subscription of the rclpy node `node`."""
+        reason = why_sent(ros.qos_profile)
+        depth = queue_depth(ros.qos_profile)
+        inbox = None if reason else self._executor.open_inbox(node, ros, depth)
+        subscription = LocalSubscription(node, ros, inbox, reason, read_only=read_only)
+        with self._lock:
+            topic = self._topic(ros)
+            topic.subscriptions.append(subscription)
+            topic.connect()
         return subscription
+
+    def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:
+        """Let a subscription share messages with others, or have its own."""
+        with self._lock:
+            subscription.read_only = read_only
+            self._topic(subscription.ros).connect()
 
     def remove_publisher(self, publisher: LocalPublisher) -> None:
         """Forget a publisher."""
-        self._change(publisher.ros, lambda topic: topic.publishers.remove(publisher))
+        with self._lock:
+            self._topic(publisher.ros).publishers.remove(publisher)
 
     def remove_subscription(self, subscription: LocalSubscription) -> None:
         """Forget a subscription."""
-        self._change(subscription.ros, lambda topic: topic.subscriptions.remove(subscription))
-
-    def _change(
-        self, ros: RosPublisher | RosSubscription, change: Callable[[_Topic], None]
-    ) -> None:
         with self._lock:
-            topic = self._topics[ros.topic_name, ros.msg_type]
-            change(topic)
+            topic = self._topic(subscription.ros)
+            topic.subscriptions.remove(subscription)
             topic.connect()
 
+    def forget(self, node: Any) -> None:
+        """Forget all that belongs to an rclpy node."""
+        with self._lock:
+            for topic in self._topics.values():
+                topic.publishers = [each for each in topic.publishers if each.node is not node]
+                left = [each for each in topic.subscriptions if each.node is not node]
+                if len(left) < len(topic.subscriptions):
+                    topic.subscriptions = left
+                    topic.connect()
 
-class LocalService:
-    """A service of the system.
-
-    Args:
-        inbox: Takes requests.
-    """
-
-    def __init__(self, ros: RosService, inbox: Inbox) -> None:
-        self.ros = ros
-        self._inbox = inbox
-        self._requests = ownership_of(ros.srv_type.Request)
-        self._responses = ownership_of(ros.srv_type.Response)
-
-    def call(self, request: Any, *, is_held: bool) -> Future:
-        """Hand a request over, and return the future of its response.
-
-        Args:
-            is_held: Whether somebody else refers to the request.
-        """
-        future = Future()
-        taken = self._requests.take(request, is_held=is_held)
-        self._inbox.put(_Request(taken, future, self._responses.copy))
-        return future
+    def _topic(self, ros: RosPublisher | RosSubscription) -> _Topic:
+        return self._topics[ros.topic_name, ros.msg_type]
 
 
-class _Request:
-    """A request that was handed over."""
+def why_sent(profile: QoSProfile) -> str:
+    """Return which policy only the middleware keeps; empty if there is none."""
+    kept: dict[str, tuple[Any, ...]] = {
+        'durability': (DurabilityPolicy.VOLATILE,),
+        'history': (HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL),
+        'reliability': (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT),
+        'liveliness': (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.SYSTEM_DEFAULT),
+    }
+    for name, policies in kept.items():
+        policy = getattr(profile, name)
+        if policy not in policies:
+            return f'{name}: {policy.name.lower()}'
+    for name in ('deadline', 'lifespan'):
+        if 0 < getattr(profile, name).nanoseconds < _LONGEST_NS:
+            return name
+    return ''
 
-    __slots__ = ('_copy', '_future', 'message')
 
-    def __init__(self, message: Any, future: Future, copy: Callable[[Any], Any]) -> None:
-        self.message = message
-        self._future = future
-        self._copy = copy
-
-    def respond(self, response: Any) -> None:
-        """Take the response, which the server may keep."""
-        self._future.set_result(self._copy(response))
-
-
-class LocalServices:
-    """The services of one system, by their names in the graph and their types."""
-
-    def __init__(self, executor: ComposerExecutor) -> None:
-        self._executor = executor
-        self._services: dict[tuple[str, type], LocalService] = {}
-
-    def add(self, node: Any, ros: RosService, name: str, depth: int | None) -> LocalService:
-        """Take in a service of `node`."""
-        service = LocalService(ros, self._executor.open_inbox(node, ros, depth))
-        self._services[name, ros.srv_type] = service
-        return service
-
-    def remove(self, service: LocalService) -> None:
-        """Forget a service."""
-        for key, known in list(self._services.items()):
-            if known is service:
-                del self._services[key]
-
-    def find(self, name: str, service_class: type) -> LocalService | None:
-        """Return the service of a name and a type, if it is the system's own."""
-        return self._services.get((name, service_class))
+def may_be_late(middleware: str, environment: Mapping[str, str]) -> bool:
+    """Tell whether a message may be on its way when `publish` has returned."""
+    return (
+        middleware != 'rmw_fastrtps_cpp'
+        or environment.get('RMW_FASTRTPS_PUBLICATION_MODE', '') not in _SYNCHRONOUS
+        or any(environment.get(name) for name in _PROFILE_VARIABLES)
+    )
 
 
 def queue_depth(profile: QoSProfile) -> int | None:
     """Return how many messages a queue holds; `None` for any number."""
     depth: int = profile.depth
-    return depth if profile.history == HistoryPolicy.KEEP_LAST else None
+    # Where the depth is 0, Fast DDS keeps one.
+    return max(depth, 1) if profile.history == HistoryPolicy.KEEP_LAST else None
 
 
-def _are_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
-    compatibility, _ = qos_check_compatible(offered, requested)
+def _are_compatible(offered: QoSProfile, subscription: RosSubscription) -> bool:
+    compatibility, _ = qos_check_compatible(offered, subscription.qos_profile)
     return bool(compatibility != QoSCompatibility.ERROR)
-
-
-def _why_sent(profile: QoSProfile) -> str:
-    """Return which policy the middleware must keep, if there is one."""
-    if profile.durability != DurabilityPolicy.VOLATILE:
-        return f'durability: {profile.durability.name.lower()}'
-    if profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC:
-        return 'liveliness: manual_by_topic'
-    if profile.history == HistoryPolicy.KEEP_ALL:
-        return 'history: keep_all'
-    for name in ('deadline', 'lifespan'):
-        if 0 < getattr(profile, name).nanoseconds < _LONGEST_NS:
-            return name
-    return ''

@@ -62,7 +62,10 @@ class Ownership:
         Args:
             is_held: Whether somebody else refers to it.
         """
-        return self.copy(message) if is_held else self.move(message)
+        # One of a derived class becomes what it would be after the middleware.
+        if is_held or type(message) is not self._class:
+            return self.copy(message)
+        return self.move(message)
 
     def copy(self, message: Any) -> Any:
         """Return a copy that shares nothing that can change."""
@@ -124,17 +127,15 @@ def _round(value: Any) -> float:
 
 def _copier_for(field_type: FieldType) -> Callable[[Any], Any] | None:
     """Return what copies the values of a field; `None` if they cannot change."""
-    if field_type.array is None:
-        return _item_copier(field_type)
     copy_item = _item_copier(field_type)
-    if copy_item is not None and field_type.kind != 'float32':
-        return lambda values: [copy_item(each) for each in values]
-    return _copy_values
+    if field_type.array is None:
+        return copy_item
+    if copy_item is None or field_type.kind == 'float32':
+        return _copy_values
+    return lambda values: [copy_item(each) for each in values]
 
 
 def _copy_values(values: Any) -> Any:
-    if type(values) is list:
-        return values.copy()
     # An `array.array` as a slice is several times faster than by its `__copy__`.
     return values[:] if type(values) is array else values.copy()
 
@@ -147,14 +148,16 @@ def _item_copier(field_type: FieldType) -> Callable[[Any], Any] | None:
 
 def _mover_for(field_type: FieldType) -> Callable[[Any], Any] | None:
     """Return what moves the values of a field; `None` if they cannot change."""
+    move_item = _item_mover(field_type)
     if field_type.array is None:
-        return _item_mover(field_type)
-    move_item = _item_mover(field_type) if field_type.kind != 'float32' else None
+        return move_item
     copy = _copier_for(field_type)
     assert copy is not None  # noqa: S101 - arrays can change
+    if field_type.kind == 'float32':
+        move_item = None  # Its arrays keep rounded numbers.
 
     def move(values: Any) -> Any:
-        if getrefcount(values) > _IN_A_FIELD or getattr(values, 'base', None) is not None:
+        if getrefcount(values) > _IN_A_FIELD or _is_of_another(values):
             return copy(values)
         if move_item is not None:
             # `enumerate` would hold each item, too.
@@ -168,14 +171,20 @@ def _mover_for(field_type: FieldType) -> Callable[[Any], Any] | None:
     return move
 
 
+def _is_of_another(values: Any) -> bool:
+    """Tell whether it is a NumPy array of another's memory, or one that subscriptions share."""
+    if type(values) is list or type(values) is array:
+        return False
+    return values.base is not None or not values.flags.writeable
+
+
 def _item_mover(field_type: FieldType) -> Callable[[Any], Any] | None:
     if field_type.nested is None:
         return _round if field_type.kind == 'float32' else None
     ownership = ownership_of(import_interface(field_type.nested))
 
     def move(message: Any) -> Any:
-        if getrefcount(message) > _IN_A_FIELD:
-            return ownership.copy(message)
-        return ownership.move(message)
+        is_held = getrefcount(message) > _IN_A_FIELD
+        return ownership.take(message, is_held=is_held)
 
     return move

@@ -353,6 +353,8 @@ class LiveNode:
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
                 end()
+        self.system.topics.forget(self.ros)
+        self.system.services.forget(self.ros)
         release(self.ros)
         self.ros.destroy_node()
 

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from composer.language.specs import OnError, QosSpec
     from composer.runtime.health.statistics import HealthRegistry
-    from composer.runtime.messages.local_delivery import LocalServices, LocalTopics
+    from composer.runtime.messages.local_delivery import LocalTopics
+    from composer.runtime.messages.local_services import LocalServices
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
     from composer.yaml_text.positions import SourceMap

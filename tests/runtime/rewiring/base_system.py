@@ -199,6 +199,7 @@ _OWN = {
     'logger_services': False,
     'on_error': 'log',
     'warn_after': None,
+    'local_delivery': True,
 }
 
 WITNESS_NODE = {
