@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from composer import Node
 
-_TIMED = 60
 _KEPT = 10
 _PERIOD_SEC = 0.05
 _SPARE_SEC = 60.0
@@ -25,7 +24,7 @@ _MB = 1_000_000
 _PAGE = 4096
 
 
-def measure(side: str, size: int, _seconds: float) -> dict[str, float]:
+def measure(side: str, size: int, seconds: float) -> dict[str, float]:
     """Return what messages cost that go to all subscriptions.
 
     The figures are `us`, from `publish` to the last callback (median), and `kept_share`: the
@@ -39,19 +38,20 @@ def measure(side: str, size: int, _seconds: float) -> dict[str, float]:
     way, kind = side.split('_')
     megabytes = 6 if kind == 'image' else 1
     text = render_system(
-        _system(size, megabytes, read_only=kind == 'shared'), local_delivery=way == 'local'
+        _system(size, megabytes, int(seconds / _PERIOD_SEC), read_only=kind == 'shared'),
+        local_delivery=way == 'local',
     )
     with composed(text) as program:
         program.wait_for_line(READY)
         return printed_figures(program, _SPARE_SEC)
 
 
-def _system(readers: int, megabytes: int, *, read_only: bool) -> dict[str, Any]:
+def _system(readers: int, megabytes: int, timed: int, *, read_only: bool) -> dict[str, Any]:
     image = {'topic': 'image', 'type': 'sensor_msgs/msg/Image', 'qos': 5}
     reading = {
         **image,
         'behaviour': f'{__name__}:note',
-        'with': {'readers': readers},
+        'with': {'readers': readers, 'timed': timed},
         'read_only': read_only,
     }
     sending = {
@@ -77,8 +77,8 @@ def send(node: Node, megabytes: int) -> None:
     node.publish('image', images.pop())
 
 
-def note(node: Node, message: Image, readers: int) -> None:
-    """Note when the last of `readers` has a message; keep some in the end, and print figures."""
+def note(node: Node, message: Image, readers: int, timed: int) -> None:
+    """Note when the last of `readers` has a message, `timed` times; keep some, print figures."""
     state = node.state
     now, begun = time.perf_counter(), float(message.header.frame_id)
     if begun != state.begun:
@@ -89,9 +89,9 @@ def note(node: Node, message: Image, readers: int) -> None:
     if state.left:
         return
     state.times.append(now - begun)
-    if len(state.times) == _TIMED:
+    if len(state.times) == timed:
         state.memory = _resident()
-    elif len(state.times) == _TIMED + _KEPT:
+    elif len(state.times) == timed + _KEPT:
         share = (_resident() - state.memory) / len(message.data) / _KEPT
         print(json.dumps({'us': median(state.times) * 1e6, 'kept_share': share}), flush=True)
         node.shutdown()
