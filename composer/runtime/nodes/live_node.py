@@ -366,7 +366,8 @@ class LiveNode:
 
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
-    ros = ComposedRosNode(spec, system.context, system.ros_arguments)
+    entries = system.parameter_files.get(spec.full_name, {})
+    ros = ComposedRosNode(spec, system.context, system.ros_arguments, entries)
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()

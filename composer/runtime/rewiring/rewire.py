@@ -118,6 +118,7 @@ class Rewiring:
             if not at_first:
                 self._end_clashing(plan, clashing)
             self._change_nodes(plan)
+            self._switch_clocks(plan)
         except BaseException:
             self._undo_all()
             raise
@@ -160,6 +161,7 @@ class Rewiring:
         handle.positions = reading.positions
         handle.profiles = spec.qos
         handle.functions = reading.functions
+        handle.parameter_files = reading.snapshot.overrides
         handle.without_parameter_services = spec.without_parameter_services
 
     def _create(self, target: Target, node: LiveNode, spec: Any) -> LiveEntity:
@@ -332,13 +334,9 @@ class Rewiring:
     def _change_node(self, node: LiveNode, operation: Operation) -> None:
         keys = {each.top_key for each in operation.changes}
         old = self._before[node.full_name]
-        if 'use_sim_time' in keys:
-            value = node.spec.use_sim_time
-            self._undo.append(partial(_set_sim_time, node, value=not value))
-            _set_sim_time(node, value=value)
         if 'log_level' in keys:
-            self._undo.append(partial(set_level, old))
-            set_level(node.spec)
+            self._undo.append(partial(set_level, old, self._handle.log_levels))
+            set_level(node.spec, self._handle.log_levels)
         if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
             self._undo.append(partial(node.parameters.ask, old.on_parameters))
             node.parameters.ask(node.spec.on_parameters)
@@ -349,6 +347,25 @@ class Rewiring:
                 before = old.action_clients.get(name, spec)
                 self._undo.append(partial(node.change, 'action client', before, client))
                 node.change('action client', spec, client)
+
+    def _switch_clocks(self, plan: Plan) -> None:
+        """Change `use_sim_time`, last of all.
+
+        rclpy has the subscription to `/clock` come and go with it: one that goes cannot be brought
+        back as it was if anything else fails. So those that go, go after those that come.
+        """
+        values = {}
+        for operation in plan.operations:
+            node = self._nodes.get(operation.target[0])
+            keys = {each.key for each in operation.changes}
+            if node and operation.action is Action.CHANGE and 'use_sim_time' in keys:
+                given = node.ros.find_override('use_sim_time')
+                values[node.full_name] = node.spec.use_sim_time if given is None else given
+        for full_name in sorted(values, key=values.__getitem__, reverse=True):
+            node = self._nodes[full_name]
+            before = node.ros.get_parameter('use_sim_time').value
+            _set_sim_time(node, value=values[full_name])
+            self._undo.append(partial(_set_sim_time, node, value=before))
 
     def _change_entity(self, operation: Operation) -> None:
         full_name, section, name = operation.target
@@ -424,7 +441,10 @@ def _is_in_a_call(node: LiveNode) -> bool:
 
 
 def _set_sim_time(node: LiveNode, *, value: bool) -> None:
-    node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+    (result,) = node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+    if not result.successful:
+        message = f"parameter 'use_sim_time' of '{node.spec.key}': {result.reason}"
+        raise StartError(message)
 
 
 def _start_timer(timer: Any) -> None:

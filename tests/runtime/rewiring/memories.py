@@ -27,6 +27,8 @@ class Same:
         self._text = repr(thing)
 
     def __eq__(self, other):
+        if not isinstance(other, Same):
+            return False
         return self._find() is not None and self._find() == other._find()
 
     def __hash__(self):
