@@ -41,6 +41,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
+from composer.ament import remaps_actions
+from composer.names import expand_name
 from composer.ros_parameters.overrides import find_names_given
 from composer.runtime.logs import has_rosout_publisher
 
@@ -116,6 +118,12 @@ class ComposedRosNode(Node):
             lambda: self.create_publisher(msg_type, topic, *arguments, **options)
         )
         return self._late_events
+
+    def resolve_action_name(self, name: str) -> str:
+        """Return the full name of an action, which newer versions of ROS remap as a topic."""
+        if remaps_actions():
+            return str(self.resolve_topic_name(name))
+        return expand_name(name, self.get_name(), self.get_namespace())
 
     def follow_files(self, entries: Mapping[str, ParameterEntry]) -> None:
         """Let parameters that are declared from now on have the values of parameter files.
