@@ -282,7 +282,8 @@ class LiveNode:
             return
         self._is_destroyed = True
         self.flush_counts()
-        for end in self.at_destruction:
+        # Some take themselves out of it.
+        for end in list(self.at_destruction):
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
                 end()
