@@ -287,7 +287,8 @@ class LiveNode:
             return
         self._is_destroyed = True
         self.flush_counts()
-        for end in self.at_destruction:
+        # Some take themselves out of it.
+        for end in list(self.at_destruction):
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
                 end()
@@ -314,7 +315,8 @@ def _drop(by_owner: dict[Owner, Any], noun: str, name: str) -> None:
 
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
-    ros = ComposedRosNode(spec, system.context, system.ros_arguments)
+    entries = system.parameter_files.get(spec.full_name, {})
+    ros = ComposedRosNode(spec, system.context, system.ros_arguments, entries)
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
