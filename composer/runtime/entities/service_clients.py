@@ -81,6 +81,10 @@ class ServiceClient:
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way requests go, and why."""
+        return ('sent', '') if self._local.server is None else ('local', '')
+
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""
         self._local.allow(is_allowed=spec.local_delivery)
