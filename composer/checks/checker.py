@@ -96,12 +96,18 @@ _OPTIONAL: frozenset[Need] = frozenset({'import', 'types'})
 _MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
 
 
-def create_context(system: LoadedSystem, installed: InterfaceCatalogue) -> CheckContext | None:
-    """Return what checks are given, or `None` if the file could not be read at all."""
+def create_context(
+    system: LoadedSystem, installed: InterfaceCatalogue, before: CheckContext | None = None
+) -> CheckContext | None:
+    """Return what checks are given, or `None` if the file could not be read at all.
+
+    Args:
+        before: What was read before; its modules are kept where their source is the same.
+    """
     if system.spec is None:
         return None
     interfaces = load_declared(system, installed)
-    modules = ModuleFinder(project_search_path(system.files))
+    modules = ModuleFinder(project_search_path(system.files), before.modules if before else None)
     return CheckContext(system, system.spec, interfaces, modules)
 
 

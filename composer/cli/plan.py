@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.planning.plan import Plan
 
+_SNAPSHOT_SEC = 30.0
+
 
 def plan(
     paths: Sequence[Path],
@@ -54,12 +56,13 @@ def plan(
     if len(paths) > 2:  # noqa: PLR2004
         message = f'a plan compares two files, not {len(paths)}'
         raise UsageError(message, help='give layers with --layer')
-    contexts = []
+    contexts: list[CheckContext | None] = []
     findings: list[Diagnostic] = []
     hidden: dict[str, str] = {}
     for path in paths:
         is_new = path is paths[-1]
-        context, found = _read([path, *layers], words, set_values, checks=is_new)
+        before = next(filter(None, contexts), None)
+        context, found = _read([path, *layers], words, set_values, before, checks=is_new)
         contexts.append(context)
         # Both may have one, as of a layer.
         findings += [each for each in found if each not in findings]
@@ -81,21 +84,31 @@ def plan(
 
 
 def _compare_with_running(context: CheckContext) -> Plan:
-    from composer.cli.running.client import ask_snapshot
+    from composer.cli.running.answer_forms import read_answer
+    from composer.cli.running.client import Client
+    from composer.cli.running.discovery import Discovery
+    from composer.runtime.control import protocol
     from composer.runtime.environment import environment_set
 
     # They say on which graph it runs.
-    with environment_set(context.spec.environment):
-        old = ask_snapshot(context.spec.name)
+    with environment_set(context.spec.environment), Client() as client:
+        system = Discovery(client).find(context.spec.name)
+        answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
+    old = decode_snapshot(read_answer(answer.text))
     new = take_snapshot(context, [Path(each) for each in old.prefixes])
     # What was left out of the one is left out of the other.
     return compare(old, decode_snapshot(encode_snapshot(new)))
 
 
 def _read(
-    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], *, checks: bool
+    paths: Sequence[Path],
+    words: Sequence[str],
+    set_values: Sequence[str],
+    before: CheckContext | None,
+    *,
+    checks: bool,
 ) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
     """Return the context of a system, and what was found in it."""
-    system = load_given(paths, words, set_values)
-    context = create_context(system, InterfaceCatalogue())
+    system = load_given(paths, words, set_values, before.system if before else None)
+    context = create_context(system, InterfaceCatalogue(), before)
     return context, check_in_context(system, context) if checks else system.diagnostics

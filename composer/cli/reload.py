@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections import Counter
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.system_reader import import_reading
+from composer.cli.common.system_reader import import_reading, list_files
 from composer.cli.common.told_findings import ToldFindings, with_findings
 from composer.cli.rehearsal import rehearse
 from composer.cli.watched_files import WatchedFiles
@@ -21,11 +20,11 @@ from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
-from composer.language.paths import PathError, resolve_path
 from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot import take_snapshot
 from composer.planning.text import render_plan
 from composer.python_source.module_finder import project_search_path
+from composer.runtime.health.system_state import Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.planning.plan import Operation, Plan
     from composer.planning.snapshot import Snapshot
-    from composer.runtime.health.system_state import Outcome
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
 
@@ -70,7 +68,8 @@ class Reloader:
         self._prefixes = prefixes
         self._folder = Path.cwd()
         self._paths = [self._folder / each for each in reader.paths]
-        self._files = WatchedFiles([*self._paths, *_list_files(context)], begun_ns)
+        self._read_before = replace(context)
+        self._files = WatchedFiles([*self._paths, *list_files(context)], begun_ns)
         self._lock = threading.Lock()
         self._aborts_goals = threading.Event()
         self._told = ToldFindings(told)
@@ -90,41 +89,40 @@ class Reloader:
         Args:
             is_whole: Whether files with errors are more than half written; may wait to see.
         """
-        from composer.runtime.health.system_state import Outcome
-        from composer.runtime.logs import system_logger
-
         with self._lock, system.state.reloading():
             begun = monotonic()
             findings: list[Diagnostic] = []
-            while True:
-                try:
-                    plan = self._rewire(system, findings, is_whole)
-                except _HalfWrittenError:
-                    findings.clear()
-                    continue
-                except ComposerError as error:
-                    text = f'not reloaded: {error}'
-                    if not system.stop_requested and self._told.show(findings, text):
-                        system_logger.error(text)
-                    errors = [
-                        f'{each.span or each.file}: {each.message}'
-                        for each in findings
-                        if has_errors([each])
-                    ]
-                    told = Outcome(succeeded=False, text='; '.join(errors) or text)
-                    system.state.note_reload(told)
-                    return Outcome(succeeded=False, text=with_findings(findings, text))
-                break
-            took_ms = (monotonic() - begun) * 1000
-            was_good = not self._told.failure
-            self._told.show(findings)
-            text = f'reloaded in {took_ms:.0f} ms: {summarize(plan)}' if plan else _NO_CHANGE
-            if system.starts_again:
-                text = f'the system starts again: {summarize(plan)}'
-            if plan or not was_good:
-                system_logger.info(text if plan else _GOOD_AGAIN)
-            system.state.note_reload(Outcome(succeeded=True, text=text))
-            return Outcome(succeeded=True, text=with_findings(findings, text))
+            try:
+                plan = self._rewire(system, findings, is_whole)
+            except ComposerError as error:
+                return self._note_failure(system, findings, f'not reloaded: {error}')
+            return self._note_success(system, findings, plan, monotonic() - begun)
+
+    def _note_failure(self, system: System, findings: list[Diagnostic], text: str) -> Outcome:
+        from composer.runtime.logs import system_logger
+
+        if not system.stop_requested and self._told.show(findings, text):
+            system_logger.error(text)
+        errors = [
+            f'{each.span or each.file}: {each.message}' for each in findings if has_errors([each])
+        ]
+        system.state.note_reload(Outcome(succeeded=False, text='; '.join(errors) or text))
+        return Outcome(succeeded=False, text=with_findings(findings, text))
+
+    def _note_success(
+        self, system: System, findings: list[Diagnostic], plan: Plan, took_sec: float
+    ) -> Outcome:
+        from composer.runtime.logs import system_logger
+
+        was_good = not self._told.failure
+        self._told.show(findings)
+        text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}' if plan else _NO_CHANGE
+        if system.starts_again:
+            text = f'the system starts again: {plan.summarize()}'
+        if plan or not was_good:
+            system_logger.info(text if plan else _GOOD_AGAIN)
+        system.state.note_reload(Outcome(succeeded=True, text=text))
+        return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def reload_now(self, system: System) -> Outcome:
         """Do as `reload`, but abort goals; also those that another reload waits for."""
@@ -136,8 +134,6 @@ class Reloader:
 
     def plan(self, system: System) -> Outcome:
         """Read the files, and tell what `reload` would do."""
-        from composer.runtime.health.system_state import Outcome
-
         findings: list[Diagnostic] = []
         with self._lock:
             try:
@@ -151,13 +147,17 @@ class Reloader:
     def _rewire(
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
     ) -> Plan:
-        self._files.note_reading()
-        try:
-            return self._become(system, findings, is_whole)
-        except ComposerError as error:
-            if not (system.stop_requested or is_whole()):
-                raise _HalfWrittenError from error
-            raise
+        """Read the files, and rewire the system; anew as long as they change meanwhile."""
+        while True:
+            findings.clear()
+            self._files.note_reading()
+            try:
+                return self._become(system, findings, is_whole)
+            except _HalfWrittenError:
+                continue
+            except ComposerError:
+                if system.stop_requested or is_whole():
+                    raise
 
     def _become(
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
@@ -167,7 +167,7 @@ class Reloader:
 
         context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
-        self._files.also_follow(_list_files(context))
+        self._files.also_follow(list_files(context))
         if cause := find_new_start(system.snapshot, snapshot):
             self._start_again(system, cause, is_whole)
             return compare(system.snapshot, snapshot)
@@ -196,7 +196,7 @@ class Reloader:
             plan = system.rewire(reading, self._aborts_goals.is_set, self._is_outdated)
             if system.stop_requested:
                 raise ComposerError(_STOPS)
-        self._files.follow([*self._paths, *_list_files(context)])
+        self._files.follow([*self._paths, *list_files(context)])
         return plan
 
     def _start_again(self, system: System, cause: Operation, is_whole: Callable[[], bool]) -> None:
@@ -243,11 +243,13 @@ class Reloader:
         if any(str(path) == '-' for path in self._reader.paths):
             message = 'the system was read from standard input, which cannot be read again'
             raise ComposerError(message)
-        context, files, found = self._reader_here().read()
+        context, files, found = self._reader_here().read(self._read_before)
         findings += found
-        self._files.also_follow([*files, *(_list_files(context) if context else ())])
+        self._files.also_follow(files)
         if context is None or has_errors(found):
             raise ComposerError(_RUNS_ON)
+        # A copy, without what its checks have found out.
+        self._read_before = replace(context)
         return context
 
     def _reader_here(self) -> SystemReader:
@@ -303,29 +305,3 @@ def _loses_parts(old: Snapshot, new: Snapshot) -> bool:
         before.nodes.keys() - after.nodes.keys()
         or before.processes.keys() - after.processes.keys()
     )
-
-
-def summarize(plan: Plan) -> str:
-    """Return `~1 timer, +2 subscriptions`."""
-    counts = Counter((each.action, each.noun) for each in plan.operations)
-    return ', '.join(
-        f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
-        for (action, noun), count in counts.items()
-    )
-
-
-def _list_files(context: CheckContext) -> set[Path]:
-    """Return the files that a system is read from, and those that it lacks."""
-    spec = context.spec
-    files = {*context.system.files, *context.system.named, *context.modules.list_files()}
-    named = [
-        *(each.parameter_files for each in spec.nodes.values()),
-        *(each.parameter_files for each in spec.processes.values()),
-    ]
-    for text in (text for texts in named for text in texts):
-        # A package that is not installed is for the checks to say.
-        with suppress(PathError):
-            files.add(resolve_path(text, Path()))
-    for package in context.interfaces.definitions or ():
-        files |= {package.folder / name for name in package.sources}
-    return files

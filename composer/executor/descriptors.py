@@ -56,17 +56,6 @@ def read_eventfd(fd: int) -> int:
 
 # Waiting
 
-_EPOLL_GAP = 0 if os.uname().machine == 'x86_64' else 1  # Packed only there.
-
-
-class _EpollEvent(ctypes.Structure):
-    _fields_ = (
-        ('events', ctypes.c_uint32),
-        ('_gap', ctypes.c_int32 * _EPOLL_GAP),
-        ('fd', ctypes.c_int32),
-        ('_rest', ctypes.c_int32),
-    )
-
 
 class _PollFd(ctypes.Structure):
     _fields_ = (('fd', ctypes.c_int), ('events', ctypes.c_short), ('revents', ctypes.c_short))
@@ -78,7 +67,9 @@ class _TimeSpec(ctypes.Structure):
 
 EPOLL = 'an epoll'
 _MAX_EVENTS = 64
-_EpollEvents = _EpollEvent * _MAX_EVENTS
+# An `epoll_event` in words of 32 bits: a set of flags, then the descriptor; packed only on x86-64.
+_WORDS, _FD_WORD = (3, 1) if os.uname().machine == 'x86_64' else (4, 2)
+_EpollEvents = ctypes.c_int32 * (_WORDS * _MAX_EVENTS)
 _spare_events: list[Any] = []  # A new one is made only when several threads look at once.
 _epoll_wait = _libc_holding_gil.epoll_wait
 _POLLIN = 1
@@ -90,8 +81,8 @@ _libc.ppoll.argtypes = (
 )
 
 
-def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
-    """Return what is ready in an epoll as (descriptor, events), without releasing the GIL.
+def peek_epoll(epoll_fd: int) -> list[int]:
+    """Return the descriptors that are ready in an epoll, without releasing the GIL.
 
     Raises:
         LostDescriptorError: `epoll_fd` is no epoll.
@@ -103,7 +94,7 @@ def peek_epoll(epoll_fd: int) -> list[tuple[int, int]]:
     count = _epoll_wait(epoll_fd, found, _MAX_EVENTS, 0)
     if count < 0:
         raise LostDescriptorError(EPOLL, epoll_fd)
-    arrived = [(found[i].fd, found[i].events) for i in range(count)]
+    arrived = found[_FD_WORD : count * _WORDS : _WORDS] if count else []
     _spare_events.append(found)
     return arrived
 

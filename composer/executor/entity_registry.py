@@ -112,7 +112,7 @@ class EntityRegistry:
             entities = self._nodes.get(node)
             source = None if entities is None else entities.sources.get(entity)
             if source is not None:
-                _connect(inbox, source)
+                source.connect(inbox)
             return inbox
 
     def drop_all(self) -> None:
@@ -164,7 +164,7 @@ class EntityRegistry:
                     source = source_class(entity, node, self._parts)
                     source.observer = self._observers.get(entity)
                     if entity in self._inboxes:
-                        _connect(self._inboxes[entity], source)
+                        source.connect(self._inboxes[entity])
                     self._open(source)
                     seen.sources[entity] = source
         if half_made:
@@ -181,12 +181,6 @@ class EntityRegistry:
         if _is_waited_for(source):
             self._wait_set_thread.remove(source)
         source.close()
-
-
-def _connect(inbox: Inbox, source: EventSource) -> None:
-    source.inbox, inbox.source = inbox, source
-    if inbox.messages:
-        source.on_events(UNKNOWN_COUNT)
 
 
 def _class_for(waitable: Any) -> type[EventSource]:

@@ -86,8 +86,13 @@ class EventFd:
         if not count:
             return
         self.was_used = True
-        for listener in tuple(self.listeners):
-            listener.on_events(count)
+        if self.is_shared:
+            for listener in tuple(self.listeners):
+                listener.on_events(count)
+        else:
+            for listener in self.listeners:  # One, or none any more.
+                listener.on_events(count)
+                break
 
     def remove(self, listener: Listener) -> None:
         """Have the middleware write no more for `listener`, if it can still be told."""

@@ -27,12 +27,15 @@ class EventPoller:
 
     All listeners have been called when `peek` returns. It raises `LostDescriptorError` if somebody
     has closed or replaced a descriptor, a second later at most.
+
+    Attributes:
+        waiting_threads: Those that wait.
     """
 
     def __init__(self) -> None:
         self._epoll = select.epoll()
         self.event_fds = EventFds(self._epoll)
-        self._waiting_threads: set[int] = set()
+        self.waiting_threads: set[int] = set()
         self._next_check = 0.0
         self.deadlines = Deadlines(self.wake)
         # Last, for the others close themselves if there are no more descriptors.
@@ -46,17 +49,19 @@ class EventPoller:
 
     def wake(self) -> None:
         """Make the threads that wait look again."""
-        if self._waiting_threads:
+        if self.waiting_threads:
             write_eventfd(self._wake_fd)
 
     def peek(self) -> bool:
         """Look for events, at once and without releasing the GIL; returns whether any came."""
         arrived = peek_epoll(self._epoll.fileno())
-        self._dispatch(arrived)
         if arrived:
-            # A wake-up for the leader may have been among them: a former leader looks here too.
-            self.wake()
-        self.deadlines.rearm_after_jumps()
+            self._dispatch(arrived)
+            if self.waiting_threads:
+                # A wake-up for them may have been among these: a former leader looks here, too.
+                self.wake()
+        if self.deadlines.jumped:
+            self.deadlines.rearm_after_jumps()
         if monotonic() >= self._next_check:
             self._check()
         return bool(arrived)
@@ -74,12 +79,12 @@ class EventPoller:
 
     def _wait_if(self, is_idle: Callable[[], bool], fd: int, timeout_sec: float) -> None:
         me = get_ident()
-        self._waiting_threads.add(me)
+        self.waiting_threads.add(me)
         try:
             if is_idle():
                 wait_readable(fd, timeout_sec)
         finally:
-            self._waiting_threads.discard(me)
+            self.waiting_threads.discard(me)
 
     def _check(self) -> None:
         """Check that nobody has closed a descriptor: no event would come, and no word of it."""
@@ -89,10 +94,10 @@ class EventPoller:
             check_watched(self._epoll, self.deadlines.timer.fd, TIMER)
             self.event_fds.check()
 
-    def _dispatch(self, arrived: list[tuple[int, int]]) -> None:
+    def _dispatch(self, arrived: list[int]) -> None:
         if len(arrived) > 1:
             arrived.sort(key=self._rank)
-        for fd, _ in arrived:
+        for fd in arrived:
             event_fd = self.event_fds.by_number.get(fd)
             if event_fd is not None:
                 event_fd.read()
@@ -101,13 +106,13 @@ class EventPoller:
             elif fd == self.deadlines.timer.fd:  # Any other was detached since it came.
                 self.deadlines.run_due()
 
-    def _rank(self, event: tuple[int, int]) -> int:
-        event_fd = self.event_fds.by_number.get(event[0])
+    def _rank(self, fd: int) -> int:
+        event_fd = self.event_fds.by_number.get(fd)
         return 0 if event_fd is None else event_fd.rank
 
     def leave_to_parent(self) -> None:
         """Close the descriptors that this process, a forked child, shares with its parent."""
-        self._waiting_threads.clear()
+        self.waiting_threads.clear()
         self.deadlines.timer.close()
         if self._epoll.closed:
             return

@@ -7,7 +7,7 @@ of the middleware before it can run: what waits longer than the QoS depth allows
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
@@ -24,13 +24,22 @@ _OLDEST_TASK_FIRST = hasattr(rclpy.timer, 'TimerInfo')
 class Group:
     """The state of one callback group in one executor."""
 
-    __slots__ = ('__weakref__', 'active', 'exclusive', 'parked', 'reentrant', 'unrestricted')
+    __slots__ = (
+        '__weakref__',
+        'active',
+        'exclusive',
+        'is_plain',
+        'parked',
+        'reentrant',
+        'unrestricted',
+    )
 
     def __init__(self, callback_group: Any) -> None:
         self.exclusive = isinstance(callback_group, MutuallyExclusiveCallbackGroup)
         self.reentrant = isinstance(callback_group, ReentrantCallbackGroup)
         # A subclass may have rules of its own.
         self.unrestricted = type(callback_group) is ReentrantCallbackGroup
+        self.is_plain = type(callback_group) is MutuallyExclusiveCallbackGroup
         self.active = False
         self.parked: deque[QueuedSource] = deque()
 
@@ -76,7 +85,10 @@ class QueuedSource(Protocol):
     Attributes:
         alive: Whether the executor still listens to it.
         queued: Whether it is in a queue, parked or running.
-        pending: How many events it still has to take.
+        pending: How many events it still has to take from the middleware.
+        local: What has come to it without the middleware, oldest first.
+        spends: What a start takes from `pending`: 1; or 0 if the run does, as it may take a
+            local one instead.
         revision: Grows with every event, which tells whether one came meanwhile.
     """
 
@@ -85,15 +97,20 @@ class QueuedSource(Protocol):
     alive: bool
     queued: bool
     pending: int
+    local: Sequence[Any]
+    spends: int
     revision: int
 
 
 class Scheduler:
     """The queues of one executor. They change only under `lock`, and nothing is called under it.
 
+    Events are put down without the lock, and added to the queues by whoever holds it next.
+
     Args:
         max_running: How many callbacks may run at the same time.
         wake: Makes the threads that wait for events look again.
+        waiting: These threads.
         has_node: Tells whether the executor has a node, whose suspended callbacks it may resume.
 
     Attributes:
@@ -106,7 +123,11 @@ class Scheduler:
     """
 
     def __init__(
-        self, max_running: int, wake: Callable[[], None], has_node: Callable[[Any], bool]
+        self,
+        max_running: int,
+        wake: Callable[[], None],
+        waiting: Collection[int],
+        has_node: Callable[[Any], bool],
     ) -> None:
         self.lock = threading.RLock()  # A finalizer may create a task.
         self.running = 0
@@ -119,7 +140,9 @@ class Scheduler:
         self._admitting: deque[Session] = deque()
         self._max_running = max_running
         self._wake = wake
+        self._waiting_threads = waiting
         self._has_node = has_node
+        self._announced: deque[tuple[QueuedSource, int]] = deque()
         self._ready: deque[QueuedSource] = deque()
         self._tasks: list[ScheduledTask] = []
         self._new_tasks: list[ScheduledTask] = []
@@ -128,8 +151,13 @@ class Scheduler:
         self._prefers_tasks = True
         self._groups: WeakKeyDictionary[Any, Group] = WeakKeyDictionary()
 
-    def __len__(self) -> int:
+    def count_ready(self) -> int:
+        """Return how many sources and tasks are ready, at least."""
         return len(self._ready) + len(self._tasks) + len(self._new_tasks)
+
+    def is_empty(self) -> bool:
+        """Tell whether nothing is ready."""
+        return not (self._ready or self._announced or self._tasks or self._new_tasks)
 
     def count_tasks(self) -> int:
         """Return how many tasks could run now."""
@@ -137,7 +165,7 @@ class Scheduler:
 
     def has_work(self) -> bool:
         """Tell whether something is ready, and one more callback may run."""
-        return len(self) > 0 and self._has_free_slot()
+        return not self.is_empty() and self._has_free_slot()
 
     def limit_running(self, most: int) -> None:
         """Let so many callbacks run at the same time; those beyond that run to their end."""
@@ -189,30 +217,26 @@ class Scheduler:
             return group
 
     def add_events(self, source: QueuedSource, count: int) -> None:
-        """Add `count` to what `source` has to take."""
-        with self.lock:
+        """Add `count` to what `source` has to take; 0 if something local came."""
+        self._announced.append((source, count))
+        if self._waiting_threads:
+            self._wake()
+
+    def _add_announced(self) -> None:
+        announced = self._announced
+        while announced:
+            source, count = announced.popleft()
             source.revision += 1
             if source.pending < UNKNOWN_COUNT:
                 source.pending += count
             if source.alive and not source.queued:
                 source.queued = True
                 self._ready.append(source)
-        self._wake()
-
-    def deliver(self, source: QueuedSource, inbox: Any, message: Any) -> None:
-        """Add a message to the inbox of `source`."""
-        with self.lock:
-            source.revision += 1
-            if inbox.add(message) and source.pending < UNKNOWN_COUNT:
-                source.pending += 1
-            if source.alive and not source.queued:
-                source.queued = True
-                self._ready.append(source)
-        self._wake()
 
     def set_ready(self, source: QueuedSource) -> None:
         """Make `source` run once, however often this is called before it does."""
         with self.lock:
+            self._add_announced()  # They were first.
             source.revision += 1
             source.pending = 1
             if source.alive and not source.queued:
@@ -223,8 +247,15 @@ class Scheduler:
     def set_empty(self, source: QueuedSource, revision: int) -> None:
         """Note that `source` had nothing left to take when it was at `revision`."""
         with self.lock:
+            self._add_announced()
             if source.revision == revision:
                 source.pending = 0
+
+    def spend(self, source: QueuedSource) -> None:
+        """Note that `source`, from whose `pending` a start takes nothing, takes one event."""
+        with self.lock:
+            if source.pending:
+                source.pending -= 1
 
     def add_task(self, task: ScheduledTask) -> None:
         """Queue a task."""
@@ -241,13 +272,21 @@ class Scheduler:
         with self.lock:
             self._new_tasks += kept
 
-    def start_next(self, starter: Starter) -> Any:
+    def start_next(self, starter: Starter, ended: QueuedSource | None = None) -> Any:
         """Return a source or a task that `starter` executes now, or None.
 
         `finish` must follow, and `finish_session` if this gave the starter a session.
+
+        Args:
+            ended: What to `finish` first; to take the lock once for both is faster.
         """
         with self.lock:
-            if not self.is_spinning or not self._has_free_slot():
+            if ended is not None:
+                self.running -= 1
+                self._release(ended)
+            if self._announced:
+                self._add_announced()
+            if not self.is_spinning or self.running - self.waiting >= self._max_running:
                 return None
             if not (self._tasks or self._new_tasks):
                 work: Any = self._next_source()
@@ -287,7 +326,7 @@ class Scheduler:
         """Undo the start of `source`, because its group refused; `retry_deferred` requeues it."""
         with self.lock:
             self.running -= 1
-            source.pending += 1
+            source.pending += source.spends
             source.queued = True
             self._deferred.append(source)
             group = source.group
@@ -321,7 +360,7 @@ class Scheduler:
         group = source.group
         if group.exclusive or not group.reentrant:
             group.active = False
-            if source.pending and source.alive:
+            if (source.pending or source.local) and source.alive:
                 group.parked.append(source)
             else:
                 source.queued = False
@@ -332,14 +371,14 @@ class Scheduler:
         while self._ready:
             source = self._ready.popleft()
             group = source.group
-            if not source.alive or not source.pending:
+            if not source.alive or not (source.pending or source.local):
                 source.queued = False
                 if group.parked and not group.active:
                     self._ready.append(group.parked.popleft())
                 continue
             if not group.exclusive:
-                source.pending -= 1
-                if group.reentrant and source.pending:
+                source.pending -= source.spends
+                if group.reentrant and (source.pending or source.local):
                     self._ready.append(source)
                 elif group.reentrant:
                     source.queued = False
@@ -348,7 +387,7 @@ class Scheduler:
                 continue
             else:
                 group.active = True
-                source.pending -= 1
+                source.pending -= source.spends
             self._prefers_tasks = True
             return source
         return None

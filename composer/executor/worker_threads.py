@@ -84,6 +84,8 @@ class WorkerThreads:
 
     Attributes:
         leader: The worker that leads, or None.
+        put_off_at: When the standby's timer must be set at the next callback (monotonic); 0 if it
+            is not set.
     """
 
     def __init__(
@@ -99,8 +101,7 @@ class WorkerThreads:
         self._on_takeover = on_takeover
         self._report = report
         self._timer = TimerFd(blocking=True)
-        self._timer_is_set = False
-        self._put_off_at = 0.0
+        self.put_off_at = 0.0
         self._idle: list[Worker] = []
         self._workers: dict[int, Worker] = {}
         self._count = 0  # With those whose threads are still to begin.
@@ -179,26 +180,23 @@ class WorkerThreads:
             self._wake_standby()
         elif self._standby is not None:
             # It stays for the next leader, but not for long.
-            self._timer_is_set = False
+            self.put_off_at = 0.0
             self._timer.expire_in(_MAX_IDLE_NS)
 
     def is_alone(self) -> bool:
         """Tell whether nobody stands by."""
         return self._standby is None
 
-    def begin_callback(self, worker: Worker) -> None:
-        """Note that `worker`, the leader, begins a callback."""
-        worker.busy_since = now = monotonic()
-        if not self._timer_is_set or now > self._put_off_at:
-            self._timer_is_set = True
-            self._put_off_at = now + TAKEOVER_SEC / 2
-            self._wake_in(_TAKEOVER_NS)
+    def put_off(self, now: float) -> None:
+        """Have the standby sleep on, because the leader begins a callback `now`."""
+        self.put_off_at = now + TAKEOVER_SEC / 2
+        self._wake_in(_TAKEOVER_NS)
 
     def let_standby_sleep(self, worker: Worker) -> None:
         """Disarm the standby's timer: `worker` leads and will wait, and others want the GIL."""
         with self.lock:
-            if self._timer_is_set and self.leader is worker:
-                self._timer_is_set = False
+            if self.put_off_at and self.leader is worker:
+                self.put_off_at = 0.0
                 self._timer.disarm()
 
     def hand_over(self, worker: Worker) -> None:
@@ -284,8 +282,7 @@ class WorkerThreads:
 
     def _wake_standby(self) -> None:
         if self._standby is not None:
-            self._timer_is_set = True
-            self._put_off_at = math.inf
+            self.put_off_at = math.inf
             self._wake_in(1)
 
     def _wake_in(self, delay_ns: int) -> None:
@@ -299,7 +296,7 @@ class WorkerThreads:
         while True:
             self._timer.read()
             with self.lock:
-                self._timer_is_set = False
+                self.put_off_at = 0.0
                 leader = self.leader
                 if leader is None:
                     self._standby = None
@@ -323,6 +320,6 @@ class WorkerThreads:
         left = TAKEOVER_SEC - (monotonic() - since)
         if left <= 0:
             return True
-        self._timer_is_set = True
+        self.put_off_at = since  # The next callback puts it off.
         self._wake_in(int(left * 1e9))
         return False

@@ -211,7 +211,9 @@ def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: 
         return
     callee, bound = function
     place = Place(module, callee.definition)
-    given: Value = Message(wire.given) if wire.given else UNKNOWN
+    given: Value = UNKNOWN
+    if wire.given:
+        given = Message(wire.given, is_read_only=wire.is_read_only)
     if binding.key.key == 'on_parameters':
         given = PartOfNode('changes')
     positional = [NODE, given][: len(binding.parameters)]

@@ -203,6 +203,7 @@ class Run:
         help_text: str | None = None,
         *,
         used_at: Place | None = None,
+        is_harm: bool = False,
     ) -> None:
         """Note a problem, unless the behaviour is ready for it.
 
@@ -211,13 +212,14 @@ class Run:
 
         Args:
             used_at: Where the value is used that `place` wrote.
+            is_harm: Whether it harms wherever it may be reached: nothing is raised.
         """
-        if self.guards or self.broad_guards or self.is_silent:
+        if self.is_silent or ((self.guards or self.broad_guards) and not is_harm):
             self.tried += 1
             return
         if self._other_types and rule == 'unknown-field':
             return
-        if self.doubts and not (help_text or '').startswith('did you mean'):
+        if self.doubts and not is_harm and not (help_text or '').startswith('did you mean'):
             return
         span, used = span_of(place), span_of(used_at) if used_at else None
         if used and (used.source, used.line) == (span.source, span.line):

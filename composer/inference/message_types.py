@@ -99,25 +99,25 @@ def in_python(name: str) -> str:
     return f'{whole}.{part}' if part else whole
 
 
-def value_of(field_type: FieldType, *, is_made: bool = False) -> Value:
-    """Return what a field holds when it is read.
+def value_of(field_type: FieldType, owner: Message) -> Value:
+    """Return what a field of a message holds when it is read.
 
-    Args:
-        is_made: Whether the behaviour itself made the message: it may hold NumPy's values.
+    If the behaviour itself made the message, it may hold NumPy's values.
     """
     if field_type.nested and not field_type.array:
-        return Message(field_type.nested, is_made)
-    if field_type.array and (field_type.nested or not is_made):
-        return ArrayField(field_type, is_made)
-    if is_made:
+        return Message(field_type.nested, owner.is_made, owner.is_read_only)
+    if field_type.array and (field_type.nested or not owner.is_made):
+        return ArrayField(field_type, owner.is_made, owner.is_read_only)
+    if owner.is_made:
         return UNKNOWN
     return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
 
 
-def item_of(field_type: FieldType, *, is_made: bool = False) -> Value:
+def item_of(array: ArrayField) -> Value:
     """Return what an item of an array is when it is read."""
+    field_type = array.type
     if field_type.nested:
-        return Message(field_type.nested, is_made)
+        return Message(field_type.nested, array.is_made, array.is_read_only)
     # NumPy's numbers come out of arrays of fixed length.
     if field_type.array == 'fixed' and field_type.kind not in ('string', 'wstring'):
         return UNKNOWN

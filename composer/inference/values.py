@@ -41,9 +41,11 @@ class Unknown:
             `BY_STATE` for what behaviours keep, which they may have from the file, and `BY_RUN`
             for what goes either way while the system runs, whatever the file says: a message's
             number that is compared with a parameter.
+        is_read_only: Whether it is a view of an array in a message that others have, too.
     """
 
     is_chosen: int = 0
+    is_read_only: bool = field(default=False, kw_only=True)
 
 
 @record
@@ -79,10 +81,12 @@ class Message:
 
     Attributes:
         is_made: Whether the behaviour made it, and may have put anything into its fields.
+        is_read_only: Whether it is, or is part of, a message that others have, too.
     """
 
     type: str
     is_made: bool = False
+    is_read_only: bool = False
 
 
 @record
@@ -98,10 +102,12 @@ class ArrayField:
 
     Attributes:
         is_made: As that of `Message`.
+        is_read_only: As that of `Message`.
     """
 
     type: FieldType
     is_made: bool = False
+    is_read_only: bool = False
 
 
 @record

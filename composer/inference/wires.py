@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import PUBLISHED
+from composer.language.specs import SubscriptionSpec
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class Wire:
         ended: The type that a payload becomes which a generator returns.
         is_unpublished: Whether nothing publishes what it gives, although `publish:` could.
         needs_payload: Whether a response has to be returned.
+        is_read_only: Whether others have what it is given, too.
     """
 
     given: str | None = None
@@ -31,6 +33,7 @@ class Wire:
     ended: str | None = None
     needs_payload: bool = False
     is_unpublished: bool = False
+    is_read_only: bool = False
 
 
 def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
@@ -56,4 +59,5 @@ def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
         ended=type_of(key.returned),
         needs_payload=key.returned not in (None, PUBLISHED),
         is_unpublished=key.returned == PUBLISHED and published is None,
+        is_read_only=isinstance(binding.entity, SubscriptionSpec) and binding.entity.read_only,
     )

@@ -40,6 +40,7 @@ def load_system(
     layers: Sequence[Path] = (),
     set_values: Sequence[str] = (),
     text: bytes | None = None,
+    before: LoadedSystem | None = None,
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -49,6 +50,7 @@ def load_system(
         layers: Files that change the first one, each over those before it.
         set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
         text: The text of the file, if it is not to be read.
+        before: A system whose records are kept where the data are the same.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
@@ -56,7 +58,7 @@ def load_system(
     """
     confidential.begin([path, *layers])
     document = apply_set_values(_read([path, *layers], text), set_values)
-    return _load(document, path, partial(values_from_words, words=words))
+    return _load(document, path, partial(values_from_words, words=words), before)
 
 
 def load_combinations(
@@ -116,7 +118,12 @@ def _read(paths: Sequence[Path], text: bytes | None) -> Document:
     return merge_documents([main, *map(read_document, layers)])
 
 
-def _load(document: Document, path: Path, give_values: GiveValues) -> LoadedSystem:
+def _load(
+    document: Document,
+    path: Path,
+    give_values: GiveValues,
+    before: LoadedSystem | None = None,
+) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
     if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
         # What is wrong with it would tell what is in it.
@@ -127,7 +134,7 @@ def _load(document: Document, path: Path, give_values: GiveValues) -> LoadedSyst
         _load_file(system, give_values)
         Includer(system, _load_file).include_all()
     if system.data is not None:
-        parse_specs(system)
+        parse_specs(system, before)
     return system
 
 

@@ -12,6 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
+from composer.language.bindings import node_bindings
 from composer.language.specs import ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
@@ -129,12 +130,17 @@ def find_new_start(old: Snapshot, new: Snapshot) -> Operation | None:
 class _Comparison:
     def __init__(self, old: Snapshot, new: Snapshot) -> None:
         self._old, self._new = old, new
+        self._stale = new.stale_modules(old)
+        self._has_same_profiles = repr(old.spec.qos) == repr(new.spec.qos)
 
     def operations(self) -> Iterator[Operation]:
         yield from self.compare_system()
         old, new = self._old.spec, self._new.spec
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
+            # One whose data are the same was not read again.
+            if process[0] is process[1]:
+                continue
             yield from self._compare(_PROCESSES, ('', 'processes', name), *process)
         before = {node.full_name: node for node in old.nodes.values()}
         after = {node.full_name: node for node in new.nodes.values()}
@@ -163,6 +169,8 @@ class _Comparison:
     def _compare_nodes(
         self, full_name: str, old: NodeSpec | None, new: NodeSpec | None
     ) -> Iterator[Operation]:
+        if new is not None and self._is_same(old, new):
+            return
         further: list[Change] = []
         if old is not None and new is not None:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
@@ -173,6 +181,16 @@ class _Comparison:
             return
         for kind in ENTITY_KINDS:
             yield from self._compare_entities(kind, old, new)
+
+    def _is_same(self, old: NodeSpec | None, new: NodeSpec) -> bool:
+        """Return whether a node was not read again, and all that it refers to is the same."""
+        name = new.full_name
+        return (
+            old is new
+            and self._has_same_profiles
+            and not (self._old.overrides.get(name) or self._new.overrides.get(name))
+            and not any(each.behaviour.module in self._stale for each in node_bindings(new))
+        )
 
     def _compare_entities(
         self, kind: EntityKind, old: NodeSpec, new: NodeSpec
@@ -216,7 +234,7 @@ class _Comparison:
             own = ('own_state',) if target[1] in _WITH_OWN_STATE else ()
             lost = (rules.lost, *own)
             yield Operation(Action.REMOVE, rules.noun, target, _name(old), span, lost=lost)
-        elif old is not new:
+        else:
             readings = (
                 Reading(self._old, old, old.path, nodes[0]),
                 Reading(self._new, new, new.path, nodes[1]),

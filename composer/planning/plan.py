@@ -25,6 +25,11 @@ class Action(Enum):
     REMOVE = '-'
 
 
+# After these there is no more of what was there, and after those there is something new.
+GOING = (Action.RECREATE, Action.REMOVE)
+COMING = (Action.RECREATE, Action.ADD)
+
+
 @record
 class Change:
     """One value that differs.
@@ -87,6 +92,14 @@ class Plan:
     def __bool__(self) -> bool:
         """Tell whether there is anything to do."""
         return bool(self.operations)
+
+    def summarize(self) -> str:
+        """Return `~1 timer, +2 subscriptions`."""
+        counts = Counter((each.action, each.noun) for each in self.operations)
+        return ', '.join(
+            f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
+            for (action, noun), count in counts.items()
+        )
 
     def counts(self) -> dict[Action, int]:
         """Return how many operations there are of each kind, in the order of `Action`."""

@@ -61,10 +61,15 @@ def project_search_path(configs: Iterable[Path]) -> list[Path]:
 
 
 class ModuleFinder:
-    """Finds and reads modules, each once."""
+    """Finds and reads modules, each once.
 
-    def __init__(self, search_path: list[Path]) -> None:
+    Args:
+        before: A finder whose modules are kept where their source is the same.
+    """
+
+    def __init__(self, search_path: list[Path], before: ModuleFinder | None = None) -> None:
         self._project = search_path
+        self._before = before.list_read(search_path) if before else {}
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
@@ -78,6 +83,14 @@ class ModuleFinder:
         if name not in self._found:
             self._found[name] = self._find(name)
         return self._found[name]
+
+    def list_read(self, search_path: list[Path]) -> dict[Path, ModuleSource]:
+        """Return the modules that were read, by their files, if they were searched here."""
+        # They are named after the current folder, which is the first of these.
+        if search_path != self._project:
+            return {}
+        modules = (each for each in self._found.values() if isinstance(each, ModuleSource))
+        return {each.path: each for each in modules if each.path}
 
     def list_files(self) -> list[Path]:
         """Return the files of the modules of the project that were searched, found or not."""
@@ -128,7 +141,7 @@ class ModuleFinder:
         file = self._locate(name).file
         if file is None:
             return ModuleSource(None)
-        module = read_module(file, self._tokens_left)
+        module = read_module(file, self._tokens_left, self._before.get(file))
         self._tokens_left -= module.tokens
         return module
 

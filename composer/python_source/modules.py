@@ -101,6 +101,7 @@ class ModuleSource:
         unread: Why its source is not read although it may be valid, or `None`.
         tokens: How many words and signs it has.
         body: Its statements.
+        content: Its source, if it was read and is valid.
     """
 
     path: Path | None
@@ -116,6 +117,7 @@ class ModuleSource:
     unread: str | None = None
     tokens: int = 0
     body: tuple[ast.stmt, ...] = field(default=(), repr=False)
+    content: bytes | None = field(default=None, repr=False)
 
     @cached_property
     def source(self) -> SourceFile:
@@ -138,17 +140,22 @@ class ModuleSource:
         )
 
 
-def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSource:
+def read_module(
+    path: Path, most_tokens: int = MAX_MODULE_TOKENS, before: ModuleSource | None = None
+) -> ModuleSource:
     """Read a module; none of its code runs.
 
     Args:
         most_tokens: How many words and signs it may have.
+        before: The module as it was read before; it is kept if its source is the same.
     """
     if path.suffix != '.py':
         return ModuleSource(path, is_open=True)
     lines: tuple[str, ...] = ()
     try:
         text = read_file(path, MAX_MODULE_BYTES)
+        if before is not None and before.content == text and before.tokens <= most_tokens:
+            return before
         tokens = count_tokens(text, path, most_tokens)
         lines = tuple(text.decode(errors='replace').splitlines())
         tree = parse_source(text, path)
@@ -176,6 +183,7 @@ def read_module(path: Path, most_tokens: int = MAX_MODULE_TOKENS) -> ModuleSourc
         reader.is_open,
         tokens=tokens,
         body=tuple(tree.body),
+        content=text,
     )
 
 

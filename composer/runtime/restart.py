@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from composer.language.specs import OnError
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
-    from composer.runtime.start import NodeStarter
+    from composer.runtime.start import Starter
 
 _GONE_SEC = 2.0
 
@@ -29,7 +29,7 @@ class ErrorPolicy:
         shutdown: Ends the system with this exit code.
     """
 
-    def __init__(self, restart: Callable[[str], None], shutdown: Callable[[int], None]) -> None:
+    def __init__(self, restart: Callable[[str], object], shutdown: Callable[[int], None]) -> None:
         self._restart = restart
         self._shutdown = shutdown
         self._backoffs: dict[str, Backoff] = {}
@@ -78,7 +78,7 @@ class NodeRestarter:
     def __init__(
         self,
         nodes: dict[str, LiveNode],
-        starter: NodeStarter,
+        starter: Starter,
         system: SystemHandle,
     ) -> None:
         self.lock = threading.Lock()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from composer.language.specs import SystemSpec
-    from composer.runtime.control.control_node import Commands
+    from composer.runtime.control.control_services import Commands
     from composer.runtime.rewiring.reading import Reading
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)

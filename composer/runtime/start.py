@@ -1,4 +1,7 @@
-"""Starting nodes: their entities are created, `on_start` runs, then behaviours may be called."""
+"""The start of nodes and external processes.
+
+The entities of a node are created, `on_start` runs, then behaviours may be called.
+"""
 
 from __future__ import annotations
 
@@ -12,25 +15,31 @@ from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
+from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
     from composer.language.specs import NodeSpec
+    from composer.processes.external_process import ExternalProcess
+    from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.system_handle import SystemHandle
 
 _POLL_SEC = 0.05
 
 
-class NodeStarter:
-    """Creates and starts the nodes of a system, at its start and at their restarts.
+class Starter:
+    """Creates nodes, and starts nodes and processes: at the start of a system and later.
 
     Args:
         nodes: Takes each node that is created, by its full name.
     """
 
-    def __init__(self, nodes: dict[str, LiveNode], system: SystemHandle) -> None:
+    def __init__(
+        self, nodes: dict[str, LiveNode], processes: ProcessSupervisor, system: SystemHandle
+    ) -> None:
         self._nodes = nodes
+        self._processes = processes
         self._system = system
 
     def create(self, specs: Iterable[NodeSpec]) -> list[LiveNode]:
@@ -42,6 +51,46 @@ class NodeStarter:
         nodes = [self._create_node(spec) for spec in specs]
         create_entities(nodes)
         return nodes
+
+    def start(
+        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+    ) -> list[LiveNode]:
+        """Start processes and nodes; return the nodes that are still to be opened.
+
+        Raises:
+            StartError: One could not start.
+        """
+        stop = self._system.stop
+        for process in processes:
+            if not (process.spec.wait_for or stop.is_set):
+                self._processes.start(process)
+        prompt = [node for node in nodes if not node.spec.wait_for]
+        for node in prompt:
+            self.run_on_start(node)
+        waiters = list_waiters(nodes, processes, self._start_late, self._processes.start)
+        if not waiters or stop.is_set:
+            return prompt
+        self.open(prompt)
+        starter = WaitingStarter(
+            self._system.context, self._nodes, self._processes.by_name, self._system.positions
+        )
+        starter.start_all(waiters, stop)
+        return []
+
+    def start_more(
+        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+    ) -> None:
+        """Start nodes and processes beside those that run.
+
+        Raises:
+            StartError: One could not start.
+        """
+        for node in nodes:
+            self._system.executor.add_node(node.ros)
+            node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
+        self.open(self.start(nodes, processes))
+        for node in nodes:
+            node.ros.start_parameter_services()
 
     def run_on_start(self, node: LiveNode) -> None:
         """Call a node's `on_start`, and wait for its end or for a stop of the system.
@@ -71,7 +120,7 @@ class NodeStarter:
         node.gate.serves = not self._system.stop.is_set
         self._system.executor.wake()
 
-    def open(self, nodes: list[LiveNode]) -> None:
+    def open(self, nodes: Iterable[LiveNode]) -> None:
         """Let the behaviours of nodes that have started be called."""
         for node in nodes:
             node.gate.open()
@@ -80,6 +129,11 @@ class NodeStarter:
                     # `on_start` may have destroyed it.
                     timer.reset()
         self._system.executor.wake()
+
+    def _start_late(self, node: LiveNode) -> None:
+        self.run_on_start(node)
+        if not self._system.stop.is_set:
+            self.open([node])
 
     def _create_node(self, spec: NodeSpec) -> LiveNode:
         try:

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
+from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -54,6 +55,12 @@ class StopRequest:
         for wake in list(self._callbacks):
             wake()
         self._wake_ups.put(None)
+
+    def fail(self, reason: str) -> None:
+        """Log why the system ends by itself, and request it; not if it stops already."""
+        if not self.is_set:
+            system_logger.error(reason)
+            self.make(ExitCode.FAILED)
 
     def set_code(self, code: int) -> None:
         """Set the exit code, unless there is one of a failure."""

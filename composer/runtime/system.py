@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import ExitCode
 from composer.planning.differences import compare
 from composer.processes.guardian_client import end_marked
@@ -26,25 +26,22 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
-from composer.runtime.rewiring.rewire import Rewiring, wait_for_goals
-from composer.runtime.start import NodeStarter
+from composer.runtime.rewiring.goals_in_flight import wait_for_goals
+from composer.runtime.rewiring.rewire import Rewiring
+from composer.runtime.start import Starter
 from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
-from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from contextlib import AbstractContextManager
 
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
-    from composer.processes.external_process import ExternalProcess
     from composer.processes.guardian_client import GuardianClient
-    from composer.runtime.behaviours.running_calls import RunningCall
-    from composer.runtime.control.control_node import Commands
-    from composer.runtime.health.unmatched import TopicEndpoint
+    from composer.runtime.control.control_services import Commands
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
 
@@ -91,20 +88,18 @@ class System:
             self._context,
             spec.threads,
             log=system_logger.error,
-            on_lost=self._on_lost,
+            on_lost=partial(
+                self._stop_request.fail, 'the ROS context was shut down, so the system ends'
+            ),
             on_broken=self._on_broken,
         )
         reserve(self._executor, 'the executor', 'shutdown')
-        self._hang_watcher = HangWatcher(
-            lambda: list(self._nodes.values()), _limits(spec), self._executor.errors
+        self._hang_watcher = HangWatcher(self._nodes, spec, self._executor.errors)
+        self._graph_watcher = GraphWatcher(
+            lambda: [end for node in list(self._nodes.values()) for end in node.endpoints]
         )
-        self._graph_watcher = GraphWatcher(self._endpoints)
-        self._error_policy = ErrorPolicy(self._restart, self._stop_request.make)
+        self._error_policy = ErrorPolicy(self.restart_node, self._stop_request.make)
         self._handle = self._create_handle(ros_arguments)
-        self._starter = NodeStarter(self._nodes, self._handle)
-        self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
-        self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
-        self._control = ControlNode(self, spec, self._handle.health, commands)
         self._processes = ProcessSupervisor(
             spec.processes.values(),
             system_logger,
@@ -115,6 +110,12 @@ class System:
         )
         self._processes.is_alone = not spec.nodes
         self._stop_request.kill_processes = self._processes.kill_all
+        self._starter = Starter(self._nodes, self._processes, self._handle)
+        self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
+        self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
+        self._control = ControlNode(
+            self, spec, self._handle.health, self._hang_watcher.overdue_calls, commands
+        )
 
     def _create_handle(self, ros_arguments: Sequence[str]) -> SystemHandle:
         spec = self._reading.spec
@@ -171,7 +172,7 @@ class System:
             for node in self._nodes.values():
                 node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
             self._executor.wake()
-            prompt = self._start_all(self._nodes.values(), self._processes.by_name.values())
+            prompt = self._starter.start(self._nodes.values(), self._processes.by_name.values())
         except BaseException:
             self.stop()
             raise
@@ -222,7 +223,6 @@ class System:
             self._handle,
             self._starter,
             self._restarter,
-            self._start_more,
             self._reading,
             new,
         )
@@ -241,7 +241,7 @@ class System:
         self._handle.stop_timeout_sec = self._processes.timeout_sec = spec.shutdown_timeout_sec
         self._guardian.allow(limit_stop(spec, ends_process=self._guardian.owns_process))
         self._processes.is_alone = not spec.nodes
-        self._hang_watcher.follow(_limits(spec))
+        self._hang_watcher.follow(spec)
         self._control.follow(spec)
 
     @property
@@ -276,15 +276,6 @@ class System:
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
         return list(self._nodes)
-
-    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
-        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
-        return [
-            (node.full_name, call)
-            for node in list(self._nodes.values())
-            for call in node.running.calls()
-            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
-        ]
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again."""
@@ -332,70 +323,14 @@ class System:
             self._end_graph()
         return ended
 
-    def _start_all(
-        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
-    ) -> list[LiveNode]:
-        """Start processes and nodes; return the nodes whose gates are still to be opened.
-
-        Raises:
-            StartError: One could not start.
-        """
-        for process in processes:
-            if not (process.spec.wait_for or self.stop_requested):
-                self._processes.start(process)
-        prompt = [node for node in nodes if not node.spec.wait_for]
-        for node in prompt:
-            self._starter.run_on_start(node)
-        waiters = list_waiters(nodes, processes, self._start_late, self._processes.start)
-        if not waiters or self.stop_requested:
-            return prompt
-        self._starter.open(prompt)
-        starter = WaitingStarter(
-            self._context, self._nodes, self._processes.by_name, self._handle.positions
-        )
-        starter.start_all(waiters, self._stop_request)
-        return []
-
-    def _start_more(
-        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
-    ) -> None:
-        """Start nodes and processes beside those that run.
-
-        Raises:
-            StartError: One could not start.
-        """
-        for node in nodes:
-            self._executor.add_node(node.ros)
-            node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
-        self._starter.open(self._start_all(nodes, processes))
-        for node in nodes:
-            node.ros.start_parameter_services()
-
-    def _start_late(self, node: LiveNode) -> None:
-        self._starter.run_on_start(node)
-        if not self.stop_requested:
-            self._starter.open([node])
-
-    def _restart(self, full_name: str) -> None:
-        self._restarter.restart(full_name)
-
     def _end(self, code: int) -> None:
         """Stop the system, unless it stops already."""
         if not self.stop_requested:
             self.request_stop(code)
 
-    def _endpoints(self) -> list[TopicEndpoint]:
-        return [end for node in list(self._nodes.values()) for end in node.endpoints]
-
     def _stop_if_unread(self) -> None:
-        if not self.stop_requested and is_output_unread():
-            system_logger.error('nobody reads the output any more, so the system ends')
-            self.request_stop(ExitCode.FAILED)
-
-    def _on_lost(self) -> None:
-        if not self.stop_requested:
-            system_logger.error('the ROS context was shut down, so the system ends')
-            self.request_stop(ExitCode.FAILED)
+        if is_output_unread():
+            self._stop_request.fail('nobody reads the output any more, so the system ends')
 
     def _on_broken(self, reason: str) -> None:
         try:
@@ -424,14 +359,6 @@ class System:
         self._context.destroy()
         if not self._guardian.owns_process:
             self._control.release_name()
-
-
-def _limits(spec: SystemSpec) -> Iterator[float | None]:
-    for node in spec.nodes.values():
-        yield node.warn_after_sec
-        for kind in ENTITY_KINDS:
-            for entity in getattr(node, kind.section).values():
-                yield getattr(entity, 'warn_after_sec', None)
 
 
 def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:

@@ -205,7 +205,7 @@ def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:
         return str(node.ros.resolve_topic_name(condition.name))
     if condition.kind == 'service':
         return str(node.ros.resolve_service_name(condition.name))
-    return node.resolve_action_name(condition.name)
+    return node.ros.resolve_action_name(condition.name)
 
 
 def _log_of_process(spec: ProcessSpec, text: str) -> None:

@@ -19,15 +19,15 @@ def poller():
 
 
 def test_a_thread_that_only_peeks_leaves_a_wake_up_to_those_that_wait(poller):
-    poller._waiting_threads.add(A_THREAD_THAT_WAITS)
+    poller.waiting_threads.add(A_THREAD_THAT_WAITS)
     poller.wake()
     assert poller.peek()
     assert poller._epoll.poll(0), 'the leader would sleep on'
 
 
 def test_a_thread_that_peeks_while_none_waits_uses_up_the_wake_up(poller):
-    poller._waiting_threads.add(A_THREAD_THAT_WAITS)
+    poller.waiting_threads.add(A_THREAD_THAT_WAITS)
     poller.wake()
-    poller._waiting_threads.clear()
+    poller.waiting_threads.clear()
     assert poller.peek()
     assert not poller._epoll.poll(0), 'the leader would never sleep'

@@ -321,3 +321,25 @@ def test_the_mappings_of_specs_cannot_be_changed():
         node.publishers['b'] = None
     with pytest.raises(TypeError):
         node.state['a'] = 2
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'is_kept'),
+    [
+        ('{state: {n: 1, m: 2}}', '{state: {n: 1, m: 2}}', True),
+        ('{state: {n: 1, m: 2}}', '{state: {m: 2, n: 1}}', False),
+        ('{state: {n: 1}}', '{state: {n: 1.0}}', False),
+        ('{state: {n: 1}}', '{state: {n: true}}', False),
+        ('{state: {n: .nan}}', '{state: {n: .nan}}', False),
+        ('{state: {n: 0.0}}', '{state: {n: -0.0}}', False),
+        ('{rosout: true}', '{rosout: true, on_error: log}', False),
+    ],
+)
+def test_a_record_is_kept_where_its_data_are_the_same(tmp_path, old, new, is_kept):
+    path = tmp_path / 'system.yaml'
+    path.write_text(f'version: 1\nnodes: {{rover: {old}}}\n')
+    before = load_system(path)
+    path.write_text(f'version: 1\nnodes:\n  further:\n  rover: {new}\n')
+    after, alone = load_system(path, before=before), load_system(path)
+    assert (after.spec.nodes['rover'] is before.spec.nodes['rover']) is is_kept
+    assert repr(after.spec) == repr(alone.spec)

@@ -359,3 +359,19 @@ def test_modules_are_read_until_they_are_too_many(tmp_path):
         finder.find('b').unread
         == f'{tmp_path}/b.py and the modules before it are too many to be read'
     )
+
+
+def test_a_module_is_read_again_only_if_its_source_differs(tmp_path, monkeypatch):
+    make(tmp_path, 'parts.py', 'rest.py')
+    path = project_search_path([tmp_path / 'system.yaml'])
+    before = ModuleFinder(path)
+    same, other = before.find('parts'), before.find('rest')
+    (tmp_path / 'rest.py').write_text('def g(node): ...\n')
+    after = ModuleFinder(path, before)
+    assert after.find('parts') is same
+    assert after.find('rest') is not other
+    assert [*after.find('rest').functions] == ['g']
+    # Its name is relative to the current folder.
+    monkeypatch.chdir(tmp_path)
+    here = project_search_path([tmp_path / 'system.yaml'])
+    assert ModuleFinder(here, after).find('parts') is not same

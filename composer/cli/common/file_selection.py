@@ -117,15 +117,22 @@ def has_arguments(words: Sequence[str]) -> bool:
 
 
 def load_given(
-    paths: Sequence[Path], words: Sequence[str] | None = None, set_values: Sequence[str] = ()
+    paths: Sequence[Path],
+    words: Sequence[str] | None = None,
+    set_values: Sequence[str] = (),
+    before: LoadedSystem | None = None,
 ) -> LoadedSystem:
     """Return the system that a command line gives: a file, its layers and arguments.
+
+    Args:
+        before: A system whose records are kept where the data are the same.
 
     Raises:
         UsageError: The words or the values to set do not fit the file.
     """
     path, text = read_standard_input(paths[0])
-    return load_system(path, words, layers=paths[1:], set_values=set_values, text=text)
+    layers = paths[1:]
+    return load_system(path, words, layers=layers, set_values=set_values, text=text, before=before)
 
 
 def read_standard_input(path: Path, name: str = '<stdin>') -> tuple[Path, bytes | None]:

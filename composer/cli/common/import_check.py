@@ -5,18 +5,22 @@ from __future__ import annotations
 import importlib.util
 import sys
 from contextlib import contextmanager, redirect_stdout
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_call
 from composer.language.bindings import Binding, node_bindings
 from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
+    import inspect
     from collections.abc import Callable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import SystemSpec
+    from composer.python_source.modules import FunctionKind
+
+_Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
 
 _OF_ROS = ('rclpy', 'rcl_interfaces', 'builtin_interfaces', 'rosidl_runtime_py')
 _OF_ROS_ENDINGS = ('_msgs', '_srvs', '_interfaces')
@@ -28,15 +32,18 @@ def import_behaviours(
     """Import every behaviour; return the functions by name, and the findings about them."""
     functions: dict[str, Callable[..., Any]] = {}
     findings: list[Diagnostic] = []
+    # Many nodes may have the same.
+    shapes: dict[str, _Shape] = {}
     for binding in _bindings(context.spec):
         spec = binding.behaviour
-        try:
-            function = functions.get(spec.name) or behaviours.import_behaviour(spec)
-        except behaviours.BehaviourImportError as error:
-            findings.append(_explain(context, binding, error))
-            continue
-        functions[spec.name] = function
-        findings += _check_function(context, binding, function)
+        if spec.name not in shapes:
+            try:
+                functions[spec.name] = function = behaviours.import_behaviour(spec)
+            except behaviours.BehaviourImportError as error:
+                findings.append(_explain(context, binding, error))
+                continue
+            shapes[spec.name] = _shape_of(function)
+        findings += check_behaviour_call(context, binding, *shapes[spec.name])
     return functions, findings
 
 
@@ -78,7 +85,7 @@ class ImportCheck:
             elif not (was_told and isinstance(error.__cause__, ImportError)):
                 yield _explain(context, binding, error)
             return
-        yield from _check_function(context, binding, function)
+        yield from check_behaviour_call(context, binding, *_shape_of(function))
 
 
 def _bindings(spec: SystemSpec) -> Iterator[Binding]:
@@ -86,13 +93,11 @@ def _bindings(spec: SystemSpec) -> Iterator[Binding]:
         yield from node_bindings(node)
 
 
-def _check_function(
-    context: CheckContext, binding: Binding, function: Callable[..., Any]
-) -> Iterator[Diagnostic]:
+def _shape_of(function: Callable[..., Any]) -> _Shape:
+    """Return how a function runs, and how it is called."""
     # What a wrapper returns may be something else than what it wraps.
     kind = None if hasattr(function, '__wrapped__') else behaviours.kind_of(function)
-    signature = behaviours.signature_of(function)
-    yield from check_behaviour_call(context, binding, kind, signature)
+    return kind, behaviours.signature_of(function)
 
 
 def _explain(

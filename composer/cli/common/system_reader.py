@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.checker import check_in_context, create_context
@@ -11,11 +13,11 @@ from composer.cli.common.import_check import import_behaviours
 from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.paths import PathError, resolve_path
 from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
@@ -52,16 +54,23 @@ class SystemReader:
         report(findings)
         return None if has_errors(findings) else context
 
-    def read(self) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
+    def read(
+        self, before: CheckContext | None = None
+    ) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
         """Return a system, if there is one, the files that it names, and what is wrong with it.
+
+        Args:
+            before: What was read before: what is the same in it is kept.
 
         Raises:
             UsageError: The arguments do not fit the file.
         """
-        system = load_given(self.paths, self.words, self.set_values)
-        context = create_context(system, InterfaceCatalogue())
-        files = [*self.paths, *system.files, *system.named]
-        return context, files, check_in_context(system, context)
+        system_before = before.system if before else None
+        system = load_given(self.paths, self.words, self.set_values, system_before)
+        context = create_context(system, InterfaceCatalogue(), before)
+        findings = check_in_context(system, context)
+        named = list_files(context) if context else {*system.files, *system.named}
+        return context, [*self.paths, *named], findings
 
 
 def import_reading(
@@ -83,3 +92,20 @@ def import_reading(
     if has_errors(shown):
         return None
     return Reading(snapshot.spec, system.positions, functions, snapshot)
+
+
+def list_files(context: CheckContext) -> set[Path]:
+    """Return the files that a system is read from, and those that it lacks."""
+    spec = context.spec
+    files = {*context.system.files, *context.system.named, *context.modules.list_files()}
+    named = [
+        *(each.parameter_files for each in spec.nodes.values()),
+        *(each.parameter_files for each in spec.processes.values()),
+    ]
+    for text in (text for texts in named for text in texts):
+        # A package that is not installed is for the checks to say.
+        with suppress(PathError):
+            files.add(resolve_path(text, Path()))
+    for package in context.interfaces.definitions or ():
+        files |= {package.folder / name for name in package.sources}
+    return files

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.cli.running.client import Client
+from composer.cli.running.discovery import Discovery
 from composer.cli.running.tables import format_duration, render_table
 from composer.errors import ExitCode
 from composer.terminal import escape
@@ -24,8 +25,9 @@ _LONGEST_NOTE = 200
 def list_running(*, format_name: str) -> int:
     """Print the systems that run; return the exit code."""
     with Client() as client:
-        systems = client.find_all()
-        silent = client.find_silent(systems)
+        discovery = Discovery(client)
+        systems = discovery.find_all()
+        silent = discovery.find_silent(systems)
     # Those are stopped, say, and so no longer on the graph.
     unnamed = [
         {'name': '?', 'state': 'no answer', 'host': gethostname(), 'pid': each} for each in silent

@@ -12,6 +12,7 @@ import click
 
 from composer.cli.running import answer_forms
 from composer.cli.running.client import STATUS_SEC, Client
+from composer.cli.running.discovery import Discovery
 from composer.cli.running.top_table import render_entities, select_entities
 from composer.errors import ComposerError, ExitCode
 from composer.runtime.control import protocol
@@ -41,7 +42,7 @@ def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
         ComposerError: There is no such system, it measures nothing, or it ended.
     """
     with Client() as client:
-        system = client.find(name)
+        system = Discovery(client).find(name)
         with client.asking(system, protocol.TOP) as ask:
             if once or format_name == 'json' or not _has_screen():
                 document = _wait_for_all(ask)

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import rclpy.exceptions
 import rclpy.timer
 from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.subscription import Subscription
 
 from composer.executor import c_bindings
@@ -15,9 +16,9 @@ from composer.executor.after_fork import end_child
 from composer.executor.c_bindings import Readiness
 from composer.executor.event_fds import UNKNOWN_COUNT
 from composer.executor.sources.event_source import NOTHING, EventSource
-from composer.executor.sources.inbox import Inbox
 
 _MIN_RESET_NS = 1_000_000
+_MOST_KNOWN = 1 << 32
 
 # Since rclpy 9.
 _TimerInfo = getattr(rclpy.timer, 'TimerInfo', None)
@@ -179,7 +180,12 @@ class SubscriptionSource(EventSource):
     rank = 1
     ask = staticmethod(Readiness.has_messages)
     watch_entity = staticmethod(c_bindings.watch_subscription)
-    __slots__ = ()
+    __slots__ = ('_handle',)
+
+    def open(self) -> None:
+        """See the base class."""
+        self._handle = self.entity.handle
+        super().open()
 
     def on_events(self, count: int) -> None:
         """See the base class."""
@@ -191,26 +197,42 @@ class SubscriptionSource(EventSource):
 
     def run(self) -> Any:
         """See the base class."""
-        entity = self.entity
-        inbox = self.inbox
-        if inbox is not None and inbox.messages:
-            callback = entity.callback
+        local = self.local
+        if local:
+            if self.pending:
+                self._limit_local()
+            callback = self.entity.callback
             try:
                 # In no variable: the callback may pass it on.
-                taken = [inbox.messages.popleft()]
+                taken = [local.popleft()]
             except IndexError:
-                return NOTHING  # Another thread took it, or it was pushed out.
+                return NOTHING  # Another thread took it.
             result = callback(taken.pop())
             return result if result is not None and self._is_async(callback) else None
+        return self._run_taken()
+
+    def _limit_local(self) -> None:
+        """Push out what one queue would not hold beside what the middleware has."""
+        revision, pending = self.revision, self.pending
+        if not self.has_data():
+            self.parts.scheduler.set_empty(self, revision)
+        elif self.inbox is not None:
+            self.inbox.limit_beside(pending if pending < _MOST_KNOWN else 1)
+
+    def _run_taken(self) -> Any:
+        entity = self.entity
         revision = self.revision
         observer = self.observer
         arrived = None if observer is None else observer.begin_take()
-        handle = entity.handle
+        if not self.spends:
+            self.parts.scheduler.spend(self)
         try:
-            with handle:
-                taken = handle.take_message(entity.msg_type, entity.raw)
-        except InvalidHandle:
-            return NOTHING
+            # As nothing can be destroyed while C++ has the GIL, the handle need not be held.
+            taken = self._handle.take_message(entity.msg_type, entity.raw)
+        except _rclpy.RCLError:
+            if self.is_gone():
+                return NOTHING
+            raise
         if taken is None:
             if observer is not None:
                 observer.note_nothing_taken(arrived)
@@ -289,13 +311,14 @@ class ServiceSource(EventSource):
 
     def run(self) -> Any:
         """See the base class."""
-        inbox = self.inbox
-        if inbox is not None and inbox.messages:
+        if self.local:
             # In turn, if others have sent requests, too.
-            self._serves_sent = not self._serves_sent and self.pending >= len(inbox.messages)
+            self._serves_sent = not self._serves_sent and self.pending > 0
             if not self._serves_sent:
-                return self._serve_local(inbox)
+                return self._serve_local()
         revision = self.revision
+        if not self.spends:
+            self.parts.scheduler.spend(self)
         service = self.entity
         try:
             handle = service.handle
@@ -304,8 +327,7 @@ class ServiceSource(EventSource):
         except InvalidHandle:
             return NOTHING
         if header is None:
-            if inbox is None or not inbox.messages:
-                self._note_nothing_taken(revision)
+            self._note_nothing_taken(revision)
             return NOTHING
         self._note_taken()
         callback = service.callback
@@ -317,10 +339,10 @@ class ServiceSource(EventSource):
         service.send_response(response, header)
         return None
 
-    def _serve_local(self, inbox: Inbox) -> Any:
+    def _serve_local(self) -> Any:
         service = self.entity
         try:
-            request: LocalRequest = inbox.messages.popleft()
+            request: LocalRequest = self.local.popleft()
         except IndexError:
             return NOTHING  # Another thread took it, or it was pushed out.
         callback = service.callback

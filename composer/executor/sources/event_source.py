@@ -30,7 +30,9 @@ class ExecutorParts:
         self.event_fds = self.poller.event_fds
         self.deadlines = self.poller.deadlines
         self.qos_event_poll = QosEventPoll(self.deadlines, self.readiness, self.event_fds.lock)
-        self.scheduler = Scheduler(max_running, self.poller.wake, self._has_node)
+        self.scheduler = Scheduler(
+            max_running, self.poller.wake, self.poller.waiting_threads, self._has_node
+        )
 
     def _has_node(self, node: Any) -> bool:
         return node in self.executor._nodes  # noqa: SLF001
@@ -49,6 +51,7 @@ class EventSource:
         watch_entity: The function that has rcl write to an eventfd.
         observer: Is told what happens to the entity; or None.
         inbox: What comes to it without the middleware; or None.
+        local, spends: See `scheduler.QueuedSource`.
         slow: Whether the last callback held up the leader.
     """
 
@@ -65,6 +68,7 @@ class EventSource:
         'event_fd',
         'group',
         'inbox',
+        'local',
         'node',
         'observer',
         'parts',
@@ -72,6 +76,7 @@ class EventSource:
         'queued',
         'revision',
         'slow',
+        'spends',
     )
 
     def __init__(self, entity: Any, node: Any, parts: ExecutorParts) -> None:
@@ -87,6 +92,8 @@ class EventSource:
         self.event_fd: EventFd | None = None
         self.observer: Any = None
         self.inbox: Inbox | None = None
+        self.local: Any = ()
+        self.spends = 1
         self._callback: Any = None
         self._is_coroutine_function = False
 
@@ -101,6 +108,12 @@ class EventSource:
         if self.inbox is not None:
             self.inbox.source = None
         self.parts.event_fds.detach(self)
+
+    def connect(self, inbox: Inbox) -> None:
+        """Take what comes to `inbox`, too."""
+        self.inbox, self.local, self.spends = inbox, inbox.messages, 0
+        inbox.source = self
+        self.parts.scheduler.add_events(self, UNKNOWN_COUNT)
 
     def watch(self, fd: int | None) -> None:
         """Have rcl add to the eventfd `fd` when something new is there; None for nowhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 
@@ -25,29 +26,28 @@ class Inbox:
 
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
-        self.messages: deque[Any] = deque()
+        self.messages: deque[Any] = deque(maxlen=depth)
         self.source: Any = None
         self.overruns = 0
 
     def put(self, message: Any) -> None:
         """Hand over a message, which is the receiver's from now on."""
+        messages = self.messages
+        if len(messages) == self.depth:
+            self.overruns += 1
+        messages.append(message)
         source = self.source
         if source is not None:
-            source.parts.scheduler.deliver(source, self, message)
-            return
-        self.add(message)
-        if self.source is not None:  # It came meanwhile.
-            self.source.parts.scheduler.add_events(self.source, 1)
+            source.parts.scheduler.add_events(source, 0)
 
-    def add(self, message: Any) -> bool:
-        """Add a message; return whether the queue is longer now."""
-        messages = self.messages
-        messages.append(message)
-        if self.depth is None or len(messages) <= self.depth:
-            return True
-        self.overruns += 1
-        messages.popleft()
-        return False
+    def limit_beside(self, others: int) -> None:
+        """Push out the oldest, so that there are no more than the depth with `others`."""
+        if self.depth is None:
+            return
+        for _ in range(len(self.messages) + min(others, self.depth) - self.depth):
+            with suppress(IndexError):  # Another thread was faster.
+                self.messages.popleft()
+                self.overruns += 1
 
     def is_drained(self) -> bool:
         """Tell whether the middleware has nothing more for the entity."""

@@ -9,6 +9,7 @@ from composer.inference.classes.project_classes import CLASS_NAMES
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.library.known_functions import MAPPINGS
 from composer.inference.evaluation.part import Part
+from composer.inference.evaluation.read_only_writes import VIEWING, WRITING
 from composer.inference.message_types import PARTS, in_python, value_of
 from composer.inference.values import (
     BY_PARAMETER,
@@ -170,6 +171,8 @@ class Attributes(Part):
                 return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
             case ArrayField():
                 return self._read_array(owner, name)
+            case Unknown(is_read_only=True) if name in WRITING or name in VIEWING:
+                return BoundMethod(owner, name)
             case Primitive():
                 return BoundMethod(owner, name)
             case Awaitable():
@@ -237,8 +240,7 @@ class Attributes(Part):
         description = self._evaluator.run.types.describe(owner.type)
         field = description.field(name) if description else None
         if field is not None:
-            is_made = isinstance(owner, MessageClass) or owner.is_made
-            return value_of(field.type, is_made=is_made) if isinstance(owner, Message) else UNKNOWN
+            return value_of(field.type, owner) if isinstance(owner, Message) else UNKNOWN
         if isinstance(owner, MessageClass) and name in PARTS and '/msg/' not in owner.type:
             return MessageClass(f'{owner.type}_{name}')
         if name == 'get_fields_and_field_types':
@@ -372,6 +374,7 @@ class Attributes(Part):
 
     def store(self, owner: Value, name: str, value: Value, place: Place) -> None:
         """Store an attribute; a message holds only its fields."""
+        self._evaluator.read_only.check_write(owner, place)
         owners = alternatives(owner)
         if len(owners) == 1 or all(isinstance(each, Instance) for each in owners):
             for each in owners:

@@ -35,6 +35,7 @@ class Containers(Part):
         """Return what a method may return."""
         owner, name = method.owner, method.name
         first = arguments.get(0, '')
+        self._evaluator.read_only.check_method(owner, name, place)
         match owner:
             case PartOfNode(name='parameters' | 'changes'):
                 return self._evaluator.node_calls.read_parameters(owner, name, arguments)
@@ -47,7 +48,7 @@ class Containers(Part):
             case Mapping() | Sequence() | Constant() | Scalar() | Instance():
                 return self._evaluator.methods.call(owner, name, arguments, place)
             case ArrayField() if name in ('tolist', 'copy'):
-                return owner
+                return self._evaluator.read_only.copy_of(owner, place)
             case ArrayField() if name in ('append', 'insert'):
                 item = arguments.get(int(name == 'insert'), '')
                 if item is not None and isinstance(item.value, Message):
@@ -57,7 +58,8 @@ class Containers(Part):
             return self._fields_of(owner, place)
         if first is not None:
             self._evaluator.calls.escape_all(arguments)
-        return Unknown(max(is_chosen(owner), chosen_by(arguments)))
+        is_view = self._evaluator.read_only.is_view(owner, name)
+        return Unknown(max(is_chosen(owner), chosen_by(arguments)), is_read_only=is_view)
 
     def _fields_of(self, owner: Message | MessageClass, place: Place) -> Value:
         description = self._evaluator.run.types.describe(owner.type)

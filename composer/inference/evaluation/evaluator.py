@@ -18,6 +18,7 @@ from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
 from composer.inference.evaluation.payload_fits import Payloads
+from composer.inference.evaluation.read_only_writes import ReadOnlyWrites
 from composer.inference.evaluation.sleeping import Sleeping
 from composer.inference.evaluation.waiting import WAITING, Waiting
 from composer.inference.message_types import item_of
@@ -100,6 +101,7 @@ class Evaluator:
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
+        self.read_only = ReadOnlyWrites(self)
         self.waiting = Waiting(self)
         self.sleeping = Sleeping(self)
         self.call_places: list[Place] = []
@@ -234,7 +236,7 @@ class Evaluator:
     def _item_of(self, value: Value) -> Value:
         match value:
             case ArrayField():
-                return item_of(value.type, is_made=value.is_made)
+                return item_of(value)
             case Sequence():
                 return value.item()
             case Generated():
@@ -355,7 +357,7 @@ def _lasting(value: Value) -> Value:
     """Return what of a value holds in other calls, too."""
     match value:
         case Message():
-            return Message(value.type, is_made=True)
+            return Message(value.type, is_made=True, is_read_only=value.is_read_only)
         case Constant(value=None):
             return NONE
         case PartOfNode(name='time' | 'goal'):

@@ -30,6 +30,7 @@ from composer.inference.values import (
     Place,
     Scalar,
     Sequence,
+    Unknown,
     Value,
     alternatives,
     constant,
@@ -311,7 +312,11 @@ class Expressions(Part):
     def _item(self, owner: Value, index: Value, place: Place, *, is_slice: bool) -> Value:
         match owner:
             case ArrayField():
-                return owner if is_slice else item_of(owner.type, is_made=owner.is_made)
+                if is_slice:
+                    return self._evaluator.read_only.slice_of(owner, place)
+                return item_of(owner)
+            case Unknown(is_read_only=True) if is_slice:
+                return owner
             case Mapping() if not owner.is_lost:
                 return owner.value_of(index) or UNKNOWN
             case Sequence() if not owner.is_lost:

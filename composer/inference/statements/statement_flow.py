@@ -95,6 +95,7 @@ class Statements(Part):
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
         owner = self._evaluator.evaluate(target.value, scope)
         index = self._evaluator.evaluate(target.slice, scope)
+        self._evaluator.read_only.check_write(owner, Place(scope.module, target))
         self._evaluator.containers.store_item(
             owner, index, value, Place(scope.module, target.slice)
         )
@@ -128,6 +129,9 @@ class Statements(Part):
     def _augassign(self, node: ast.AugAssign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
         before = self._evaluator.read_target(node.target, scope)
+        if isinstance(node.target, ast.Name):
+            # Arrays are changed in place.
+            self._evaluator.read_only.check_write(before, Place(scope.module, node.target))
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
@@ -164,6 +168,7 @@ class Statements(Part):
     def _delete_item(self, target: ast.Subscript, scope: Scope) -> None:
         self._evaluator.read_target(target, scope)
         owner = self._evaluator.evaluate(target.value, scope)
+        self._evaluator.read_only.check_write(owner, Place(scope.module, target))
         with self._evaluator.run.silence():
             index = self._evaluator.evaluate(target.slice, scope)
         if isinstance(owner, Mapping | Sequence) and isinstance(index, Constant):

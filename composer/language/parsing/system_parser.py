@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import marshal
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.language.loaded_system import PARTS
-from composer.language.parsing.entry_parser import Data, parse_entries, parse_qos
+from composer.language.parsing.entry_parser import Data, Spec, parse_entries, parse_qos
 from composer.language.parsing.node_parser import parse_node
 from composer.language.parsing.process_parser import parse_process
 from composer.language.specs import (
@@ -18,14 +19,23 @@ from composer.language.specs import (
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
 
 
-def parse_specs(system: LoadedSystem) -> None:
+# The last version in which equal data are written alike, whoever else holds them.
+_MARSHAL_VERSION = 2
+
+
+def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> None:
     """Parse the data of a system; what is left out becomes a system of its own.
 
     Both have the QoS profiles and interfaces.
+
+    Args:
+        before: A system whose nodes and processes are kept where the data are the same.
     """
     name, used = system.path.stem, dict(system.entries)
     if system.left_out:
@@ -39,15 +49,16 @@ def parse_specs(system: LoadedSystem) -> None:
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
         system.unused = parse_system(unused, name)
     system.data = used
-    system.spec = parse_system(used, name)
+    system.spec = parse_system(used, name, before)
 
 
-def parse_system(data: Data, name: str) -> SystemSpec:
+def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> SystemSpec:
     """Return the system that the data describe.
 
     Args:
         data: As the schema wants them.
         name: The file's name without its ending.
+        before: See `parse_specs`.
     """
     executor = data.get('executor', {})
     return SystemSpec(
@@ -58,12 +69,40 @@ def parse_system(data: Data, name: str) -> SystemSpec:
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
         diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
-        nodes=parse_entries(data, (), 'nodes', parse_node),
+        nodes=parse_entries(data, (), 'nodes', _keeping(before, 'nodes', parse_node)),
         environment=MappingProxyType(
             {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
-        processes=parse_entries(data, (), 'processes', parse_process),
+        processes=parse_entries(
+            data, (), 'processes', _keeping(before, 'processes', parse_process)
+        ),
     )
+
+
+def _keeping(
+    before: LoadedSystem | None, section: str, parse: Callable[[str, Any, DataPath], Spec]
+) -> Callable[[str, Any, DataPath], Spec]:
+    """Return a parser that returns the records of before where their data are the same."""
+    if before is None or before.spec is None:
+        return parse
+    specs: Mapping[str, Spec] = getattr(before.spec, section)
+    written = before.entries.get(section, {})
+
+    def parse_changed(name: str, data: Any, path: DataPath) -> Spec:
+        known = specs.get(name)
+        return known if known and _is_same(written[name], data) else parse(name, data, path)
+
+    return parse_changed
+
+
+def _is_same(old: Any, new: Any) -> bool:
+    """Return whether data are the same: in types (`1` equals `True`) and in order, too."""
+    try:
+        return old == new and marshal.dumps(old, _MARSHAL_VERSION) == marshal.dumps(
+            new, _MARSHAL_VERSION
+        )
+    except (RecursionError, ValueError):
+        return False
 
 
 def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as it is written

@@ -8,32 +8,30 @@ from __future__ import annotations
 
 import threading
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
 from composer.errors import ExitCode, StartError
-from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control import protocol
-from composer.runtime.control.answers import snapshot_answer, status_answer, top_answer
+from composer.runtime.control.answers import status_answer, top_answer
+from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
 from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
-from composer.runtime.health.system_state import Outcome, SystemState, find_log
+from composer.runtime.health.system_state import Outcome, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rclpy.callback_groups import CallbackGroup
     from rclpy.context import Context
 
     from composer.language.specs import SystemSpec
-    from composer.planning.snapshot import Snapshot
     from composer.runtime.behaviours.running_calls import RunningCall
+    from composer.runtime.control.control_services import Commands, ControlledSystem
     from composer.runtime.health.statistics import HealthRegistry
 
 # The node is created then even if the system is not up.
@@ -43,48 +41,12 @@ _STOP_SEC = 1.0
 _ANSWER_SEC = 0.1
 
 
-class ControlledSystem(Protocol):
-    """A system that is asked."""
-
-    @property
-    def snapshot(self) -> Snapshot:
-        """What it runs as."""
-
-    @property
-    def state(self) -> SystemState:
-        """Its state."""
-
-    def list_nodes(self) -> list[str]:
-        """Return the full names of its nodes."""
-
-    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
-        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
-
-    def restart_node(self, full_name: str) -> Outcome:
-        """Build a node anew."""
-
-    def request_stop(self, code: int = ExitCode.DONE) -> None:
-        """Let it stop."""
-
-
-class Commands(Protocol):
-    """What is done with the files of a running system."""
-
-    def reload(self, system: Any) -> Outcome:
-        """Read the files, and let the system become what they say."""
-
-    def reload_now(self, system: Any) -> Outcome:
-        """Do as `reload`, but abort goals that it would wait for, or that it waits for."""
-
-    def plan(self, system: Any) -> Outcome:
-        """Read the files, and tell what `reload` would do."""
-
-
 class ControlNode:
     """The node of a system itself, from `start` to `stop`.
 
     Args:
         health: The health of the system's entities.
+        overdue_calls: Returns the calls that exceed their `warn_after`.
         commands: `None` if the system is not to be asked over ROS.
     """
 
@@ -93,14 +55,16 @@ class ControlNode:
         system: ControlledSystem,
         spec: SystemSpec,
         health: HealthRegistry,
+        overdue_calls: Callable[[], list[tuple[str, RunningCall]]],
         commands: Commands | None,
     ) -> None:
         self._system = system
         self._commands = commands
         self._health = health
+        self._overdue_calls = overdue_calls
         self._period_sec = spec.diagnostics_period_sec
         self._diagnostics: DiagnosticsPublisher | None = None
-        self._answered = float('-inf')
+        self._services: ControlServices | None = None
         self._node: RosNode | None = None
         self._executor: SystemExecutor | None = None
         self._claim: NameClaim | None = None
@@ -152,7 +116,8 @@ class ControlNode:
         self._stop_diagnostics()
         if self._executor is not None:
             self._executor.stop(_STOP_SEC)
-            sleep(max(0.0, self._answered + _ANSWER_SEC - monotonic()))
+            if self._services is not None:
+                sleep(max(0.0, self._services.answered + _ANSWER_SEC - monotonic()))
         if self._node is not None:
             self._node.destroy_node()
 
@@ -205,9 +170,8 @@ class ControlNode:
         elif self._diagnostics is not None:
             self._diagnostics.change_period(period_sec)
         elif self._node is not None:
-            system = self._system
             diagnostics = DiagnosticsPublisher(
-                system.state, period_sec, self._health, system.overdue_calls
+                self._system.state, period_sec, self._health, self._overdue_calls
             )
             try:
                 diagnostics.start(self._node)
@@ -223,7 +187,11 @@ class ControlNode:
     def _serve(self) -> None:
         if self._commands is None or self._node is None or self._executor is not None:
             return
-        self._create_services(self._node, self._commands)
+        self._services = services = ControlServices(
+            self._node, self._system, self._commands, self._status, self._top
+        )
+        state = self._system.state
+        Rivals(self._node, services.queries, state.who(), state.begun, self._give_way)
         self._executor = SystemExecutor(self._context, None, log=self._log)
         self._executor.add_node(self._node)
         self._executor.start()
@@ -233,62 +201,11 @@ class ControlNode:
         if not self._ended.is_set():
             system_logger.error(text)
 
-    def _create_services(self, node: RosNode, commands: Commands) -> None:
-        from rcl_interfaces.srv import SetParametersAtomically
-        from std_srvs.srv import Trigger
+    def _status(self) -> Outcome:
+        return status_answer(self._system.state, self._system.list_nodes(), self._diagnostics)
 
-        system, state = self._system, self._system.state
-        queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
-
-        def serve(name: str, answer: Callable[[], Outcome], group: CallbackGroup) -> None:
-            def callback(_request: Any, response: Any) -> Any:
-                outcome = _attempt(answer)
-                response.success, response.message = outcome.succeeded, outcome.text
-                self._answered = monotonic()
-                return response
-
-            node.create_service(Trigger, f'~/{name}', callback, callback_group=group)
-
-        def restart(request: Any, response: Any) -> Any:
-            names = {each.name: each.value.string_value for each in request.parameters}
-            name = names.get('node', '')
-            outcome = _attempt(lambda: self._when_up(lambda: self._restart(name)))
-            response.result.successful, response.result.reason = outcome.succeeded, outcome.text
-            return response
-
-        def status() -> Outcome:
-            return status_answer(state, system.list_nodes(), self._diagnostics)
-
-        serve(protocol.STATUS, status, queries)
-        serve(protocol.TOP, lambda: top_answer(state, self._diagnostics), queries)
-        serve(protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries)
-        serve(protocol.DOWN, self._stop_system, queries)
-        serve(protocol.PLAN, lambda: commands.plan(system), changes)
-        serve(protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes)
-        # Beside a reload that waits for a goal.
-        serve(
-            protocol.RELOAD_NOW,
-            lambda: self._when_up(lambda: commands.reload_now(system)),
-            queries,
-        )
-        node.create_service(
-            SetParametersAtomically, f'~/{protocol.RESTART}', restart, callback_group=changes
-        )
-        Rivals(node, queries, state.who(), state.begun, self._give_way)
-
-    def _when_up(self, answer: Callable[[], Outcome]) -> Outcome:
-        if self._system.state.is_up:
-            return answer()
-        return Outcome(succeeded=False, text='the system is still starting')
-
-    def _restart(self, name: str) -> Outcome:
-        if name not in self._system.list_nodes():
-            return Outcome(succeeded=False, text=f"the system has no node '{name}'")
-        return self._system.restart_node(name)
-
-    def _stop_system(self) -> Outcome:
-        self._system.request_stop()
-        return Outcome(succeeded=True, text=f'{self._system.state.name} stops')
+    def _top(self) -> Outcome:
+        return top_answer(self._system.state, self._diagnostics)
 
     def _give_way(self, rival: Mapping[str, Any]) -> None:
         system_logger.error(f'{self._describe_rival(rival)}; so this one ends')
@@ -299,12 +216,3 @@ class ControlNode:
         known = [f'{key} {rival[key]}' for key in ('host', 'pid', 'file') if key in rival]
         domain = f'ROS_DOMAIN_ID {self._context.get_domain_id()}'
         return f'{what} ({", ".join([domain, *known])})'
-
-
-def _attempt(answer: Callable[[], Outcome]) -> Outcome:
-    """Return an answer whatever happens: without one, who asked would wait in vain."""
-    try:
-        return answer()
-    except Exception as error:  # noqa: BLE001 - a bug in Composer, or a behaviour that broke it
-        system_logger.error(format_internal_error(error))
-        return Outcome(succeeded=False, text=f'it failed: {error!r}')

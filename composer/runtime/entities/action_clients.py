@@ -45,7 +45,7 @@ class ActionClient:
     def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
         action_class: Any = import_interface(spec.type)
         self._node = node
-        self._name = node.resolve_action_name(spec.action)
+        self._name = node.ros.resolve_action_name(spec.action)
         self._logger = EscapingLogger(node.ros.get_logger())
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)

@@ -21,7 +21,8 @@ from composer.runtime.entities.timers import Timer
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from composer.runtime.nodes.live_node import LiveEntity, LiveNode
+    from composer.runtime.nodes.live_entity import LiveEntity
+    from composer.runtime.nodes.live_node import LiveNode
 
 # By section, in the order of creation: each takes the node and the record of one entity, and
 # is what is kept of it in `LiveNode.entities`.

@@ -9,11 +9,13 @@ from composer.runtime.behaviours.calls import return_result
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.qos_profiles import create_qos_profile
+from composer.runtime.messages.read_only import protector_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from composer.language.specs import SubscriptionSpec
+    from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.live_node import LiveNode
 
 
@@ -53,11 +55,27 @@ class Subscription:
 
     def _create_callback(self, spec: SubscriptionSpec) -> Callable[..., Any]:
         node, behaviour = self._node, spec.behaviour
-        return node.call(
+        call = node.call(
             self._owner,
             spec.path,
             return_result if behaviour is None else node.bind(behaviour, self._owner),
             options=spec,
             deliver=node.publish_to(spec.publish),
             may_begin=node.gate.allows_events,
-        ).run
+        )
+        protect = protector_for(import_interface(spec.type)) if spec.read_only else None
+        return call.run if protect is None else _protecting(protect, call)
+
+
+def _protecting(protect: Callable[[Any], None], call: BehaviourCall) -> Callable[[Any], Any]:
+    """Return a callback that gets messages without leave to write to their NumPy arrays."""
+
+    def receive(message: Any) -> Any:
+        protect(message)
+        return call.run(message)
+
+    async def receive_async(message: Any) -> Any:
+        protect(message)
+        return await call.run(message)
+
+    return receive_async if call.is_async else receive

@@ -9,14 +9,16 @@ from __future__ import annotations
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Protocol
 
+from composer.entity_kinds import ENTITY_KINDS
 from composer.processes.backoff import Backoff
 from composer.runtime.behaviours.running_calls import RunningCall
 from composer.runtime.behaviours.waits import CODES_OF_ABSENCE
 from composer.runtime.health.watcher import Watcher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
+    from composer.language.specs import SystemSpec
     from composer.runtime.behaviours.error_reports import ErrorReporter
     from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 
@@ -119,32 +121,49 @@ class HangWatcher(Watcher):
     """The thread that checks the running calls.
 
     Args:
-        nodes: Returns the present nodes.
-        limits_sec: The limits of all entities.
+        nodes: By their full names.
         errors: Logs the errors outside all behaviours.
     """
 
     def __init__(
         self,
-        nodes: Callable[[], Iterable[WatchedNode]],
-        limits_sec: Iterable[float | None],
+        nodes: Mapping[str, WatchedNode],
+        spec: SystemSpec,
         errors: ErrorReporter,
     ) -> None:
         super().__init__('composer-watch', self._check_calls, _LONGEST_PAUSE_SEC)
         self._nodes = nodes
         self._errors = errors
-        self.follow(limits_sec)
+        self.follow(spec)
 
-    def follow(self, limits_sec: Iterable[float | None]) -> None:
-        """Check as often as these limits of all entities need."""
-        shortest = min((limit for limit in limits_sec if limit is not None), default=float('inf'))
+    def follow(self, spec: SystemSpec) -> None:
+        """Check as often as the shortest `warn_after` of a system needs."""
+        limits_sec = (limit for limit in _limits(spec) if limit is not None)
+        shortest = min(limits_sec, default=float('inf'))
         pause_sec = max(shortest / _CHECKS_PER_LIMIT, _SHORTEST_PAUSE_SEC)
         self._pause_sec = min(pause_sec, _LONGEST_PAUSE_SEC)
 
+    def overdue_calls(self) -> list[tuple[str, RunningCall]]:
+        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
+        return [
+            (full_name, call)
+            for full_name, node in list(self._nodes.items())
+            for call in node.running.calls()
+            if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
+        ]
+
     def _check_calls(self) -> None:
-        for node in self._nodes():
+        for node in list(self._nodes.values()):
             for token, entry in list(node.running.entries.items()):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
                     limit.check(node.running, token, RunningCall(*entry))
             node.errors.flush_old()
         self._errors.flush_old()
+
+
+def _limits(spec: SystemSpec) -> Iterator[float | None]:
+    for node in spec.nodes.values():
+        yield node.warn_after_sec
+        for kind in ENTITY_KINDS:
+            for entity in getattr(node, kind.section).values():
+                yield getattr(entity, 'warn_after_sec', None)

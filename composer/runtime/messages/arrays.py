@@ -39,6 +39,11 @@ _FLOAT_CODES: Final = frozenset({'f', 'd'})
 _OCTET_FORMATS: Final = frozenset({'B', 'c'})
 
 
+def is_numpy_array(field_type: FieldType) -> bool:
+    """Tell whether the values of a field are NumPy arrays."""
+    return field_type.array == 'fixed' and field_type.kind in _TYPE_CODES
+
+
 def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
     """Return the function that reads arrays of a type.
 

@@ -85,7 +85,7 @@ class LocalPublisher:
     @property
     def outside(self) -> int:
         """How many subscriptions listen that are not the system's own."""
-        return max(0, self._count() - len(self._inboxes) - len(self._shared))
+        return max(0, self._count() - self._size)
 
     def connect(self, subscriptions: Iterable[LocalSubscription]) -> None:
         """Hand messages over to those of the system's subscriptions that match."""
@@ -112,7 +112,7 @@ class LocalPublisher:
         """
         if self.reason:
             self._send(message)
-        elif self._has_sent or self._count() != self._size or self._is_full():
+        elif self._has_sent or self._count() != self._size or (self._limited and self._is_full()):
             self._send_or_return(message, is_held=is_held)
         else:
             self._hand_over(message, is_held=is_held)

@@ -9,16 +9,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
-from composer.ament import remaps_actions
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import SystemStoppingError
 from composer.language.specs import REENTRANT
-from composer.names import expand_name
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
@@ -44,70 +42,17 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
     from composer.executor.sources.inbox import Inbox
-    from composer.language.specs import (
-        BehaviourSpec,
-        EntitySpec,
-        NodeSpec,
-        OnError,
-        ParameterSpec,
-    )
+    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec
     from composer.runtime.health.statistics import EntityHealth
     from composer.runtime.health.unmatched import TopicEndpoint
+    from composer.runtime.nodes.live_entity import (
+        BehaviourOptions,
+        LiveEntity,
+        NodeParameters,
+        Suspended,
+    )
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.yaml_text.positions import DataPath
-
-
-class Suspended(Protocol):
-    """A behaviour that has begun, and is suspended until its next turn."""
-
-    def close(self, timeout_sec: float) -> None:
-        """End it; what it raises is reported."""
-
-
-class LiveEntity(Protocol):
-    """An entity of a node that runs."""
-
-    def change(self, spec: Any) -> None:
-        """Do as `spec` says from the next call on; what ROS fixes is the same as before."""
-
-    def destroy(self) -> None:
-        """Remove it from the node and the graph; its behaviours are not called any more."""
-
-
-class NodeParameters(Protocol):
-    """The declared parameters of a node that runs.
-
-    Attributes:
-        specs: What they are declared as.
-        set_live: The names of those that somebody has set since they were declared.
-    """
-
-    specs: dict[str, ParameterSpec]
-    set_live: set[str]
-
-    def declare(self, spec: ParameterSpec) -> None:
-        """Declare a parameter."""
-
-    def undeclare(self, name: str) -> None:
-        """Remove a parameter."""
-
-    def set(self, spec: ParameterSpec, value: Any) -> None:
-        """Set a parameter to a value of the files."""
-
-    def ask(self, behaviour: BehaviourSpec | None) -> None:
-        """Ask this behaviour about changes from now on."""
-
-
-class BehaviourOptions(Protocol):
-    """What the file says about the behaviours of an entity, or of a node."""
-
-    @property
-    def on_error(self) -> OnError:
-        """What is done when one raises."""
-
-    @property
-    def warn_after_sec(self) -> float | None:
-        """How long one may run before that is reported."""
 
 
 @dataclass(slots=True)
@@ -164,12 +109,6 @@ class LiveNode:
             kind = GatedReentrantGroup if key == REENTRANT else GatedMutuallyExclusiveGroup
             self._groups[key] = kind(self.gate)
         return self._groups[key]
-
-    def resolve_action_name(self, name: str) -> str:
-        """Return the full name of an action, which newer versions of ROS remap as a topic."""
-        if remaps_actions():
-            return str(self.ros.resolve_topic_name(name))
-        return expand_name(name, self.ros.get_name(), self.ros.get_namespace())
 
     def place(self, path: DataPath) -> str:
         """Return `file:line` of a place in the file, as it is now."""
@@ -322,16 +261,12 @@ class LiveNode:
 
     def drop_limits(self, noun: str, name: str = '') -> None:
         """Forget how long behaviours of an entity, or of the node itself, may run."""
-        for owner in list(self.limits):
-            if (owner.kind, owner.name) == (noun, name):
-                del self.limits[owner]
+        _drop(self.limits, noun, name)
 
     def forget(self, noun: str, name: str) -> None:
         """Forget what is known of an entity that is gone: its limits and `own_state`."""
         self.drop_limits(noun, name)
-        for owner in list(self._views):
-            if (owner.kind, owner.name) == (noun, name):
-                del self._views[owner]
+        _drop(self._views, noun, name)
 
     def take_over(self, old: LiveNode) -> None:
         """Begin where a node that was the same ended: with its state and parameters."""
@@ -366,6 +301,12 @@ class LiveNode:
         warn = EscapingLogger(self.ros.get_logger()).warning
         place = partial(self.place, path)
         self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
+
+
+def _drop(by_owner: dict[Owner, Any], noun: str, name: str) -> None:
+    for owner in list(by_owner):
+        if (owner.kind, owner.name) == (noun, name):
+            del by_owner[owner]
 
 
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:

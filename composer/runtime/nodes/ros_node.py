@@ -43,7 +43,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
+from composer.ament import remaps_actions
 from composer.language.paths import resolve_path
+from composer.names import expand_name
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.overrides import find_overrides, parse_command_line
 from composer.runtime.logs import has_rosout_publisher
@@ -109,6 +111,12 @@ class ComposedRosNode(Node):
             lambda: self.create_publisher(msg_type, topic, *arguments, **options)
         )
         return self._late_events
+
+    def resolve_action_name(self, name: str) -> str:
+        """Return the full name of an action, which newer versions of ROS remap as a topic."""
+        if remaps_actions():
+            return str(self.resolve_topic_name(name))
+        return expand_name(name, self.get_name(), self.get_namespace())
 
     def follow_files(self, entries: Mapping[str, ParameterEntry]) -> None:
         """Let parameters that are declared from now on have the values of parameter files.

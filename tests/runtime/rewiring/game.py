@@ -15,6 +15,7 @@ from composer.errors import StartError
 from composer.planning.differences import compare
 from composer.planning.plan import Action
 from composer.runtime import system as system_module
+from composer.runtime.rewiring.node_changes import NodeChange
 from composer.runtime.rewiring.rewire import Rewiring
 from tests.running import DEADLINE_SEC
 from tests.runtime.rewiring.descriptions import describe
@@ -38,7 +39,13 @@ _OWN_REASONS = (
 # Topics of every node; that of its clock comes and goes with `use_sim_time`.
 _OF_NODES = ('/parameter_events', '/rosout', '/clock')
 # After steps of these a failure strikes.
-_STEPS = ('_begin', '_change_entity', '_change_node', '_replace_record', '_end_nodes')
+_STEPS = (
+    (Rewiring, '_begin'),
+    (Rewiring, '_end_nodes'),
+    (NodeChange, 'change_entity'),
+    (NodeChange, 'change_node'),
+    (NodeChange, 'replace_record'),
+)
 
 
 class Game:
@@ -138,9 +145,9 @@ class Game:
             done.append(f'(fails at step {left})')
         with ExitStack() as stack:
             stack.enter_context(mock.patch.object(system_module, 'compare', seeing))
-            for name in _STEPS if left else ():
-                step = counting(getattr(Rewiring, name))
-                stack.enter_context(mock.patch.object(Rewiring, name, step))
+            for owner, name in _STEPS if left else ():
+                step = counting(getattr(owner, name))
+                stack.enter_context(mock.patch.object(owner, name, step))
             yield
 
     def _set_live(self, done):

@@ -57,7 +57,7 @@ def _ask(observer, node, section, spec):
     elif section == 'services':
         observer.wait(observer.begin_call(node.ros.resolve_service_name(spec.service), spec.type))
     elif section == 'actions':
-        name = node.resolve_action_name(spec.action)
+        name = node.ros.resolve_action_name(spec.action)
         observer.wait(observer.send_goal(name, spec.type, order=1))
 
 

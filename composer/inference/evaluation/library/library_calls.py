@@ -105,6 +105,7 @@ class LibraryCalls(Part):
             self._evaluator.run.moves += 1
         if name in _TESTING_ITEMS:
             self._check_awaited(arguments)
+        self._evaluator.read_only.check_call(name, arguments, place)
         known = self._compute(name, arguments, place)
         if known is not None:
             return known
@@ -127,7 +128,8 @@ class LibraryCalls(Part):
                 return Scalar(result.kind, chosen)
             return result
         self._evaluator.calls.escape_all(arguments)
-        return Unknown(chosen_by(arguments))
+        is_view = self._evaluator.read_only.gives_view(name, arguments)
+        return Unknown(chosen_by(arguments), is_read_only=is_view)
 
     def _check_awaited(self, arguments: Arguments) -> None:
         """Report coroutines in what is tested or counted: each of them counts as true."""

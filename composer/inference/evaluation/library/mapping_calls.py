@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.library.known_values import Leaf, NotKnownError, leaves_of
@@ -43,7 +44,7 @@ class MappingCalls(Part):
             'collections.ChainMap': self._chain,
             'collections.defaultdict': self._default,
             'copy.copy': self._copy,
-            'copy.deepcopy': self._copy,
+            'copy.deepcopy': self._copy_deeply,
             'copy.replace': self._replace,
             'dataclasses.asdict': self._vars,
             'dataclasses.replace': self._replace,
@@ -124,7 +125,12 @@ class MappingCalls(Part):
         first = arguments.get(0, 'x')
         return join(map(self.copied, alternatives(first.value if first else UNKNOWN)))
 
-    def copied(self, value: Value) -> Value:
+    def _copy_deeply(self, arguments: Arguments, _: Place) -> Value:
+        first = arguments.get(0, 'x')
+        several = alternatives(first.value if first else UNKNOWN)
+        return join(self.copied(each, is_deep=True) for each in several)
+
+    def copied(self, value: Value, *, is_deep: bool = False) -> Value:
         """Return a copy of a value: what is changed in one is not in the other."""
         match value:
             case Mapping() as given:
@@ -133,10 +139,16 @@ class MappingCalls(Part):
                     dict(given.entries), given.has_unknown, depth, given.is_lost, given.others
                 )
             case Sequence() as given:
-                return Sequence(list(given.items), given.kind, given.is_open, given.is_lost)
+                items = [
+                    (self.copied(each) if is_deep and isinstance(each, Message) else each, at)
+                    for each, at in given.items
+                ]
+                return Sequence(items, given.kind, given.is_open, given.is_lost)
             case Instance() as given:
                 return Instance(given.of, dict(given.attributes))
-            case Message() | Constant() | Scalar():
+            case Message():
+                return replace(value, is_read_only=False)
+            case Constant() | Scalar():
                 return value
         return UNKNOWN
 

@@ -1,0 +1,145 @@
+"""The services of a control node: what is asked of a system, and done with it."""
+
+from __future__ import annotations
+
+from functools import partial
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+
+from composer.errors import ExitCode
+from composer.runtime.behaviours.tracebacks import format_internal_error
+from composer.runtime.control import protocol
+from composer.runtime.control.answers import snapshot_answer
+from composer.runtime.health.system_state import Outcome, SystemState
+from composer.runtime.logs import system_logger
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node as RosNode
+
+    from composer.planning.snapshot import Snapshot
+
+
+class ControlledSystem(Protocol):
+    """A system that is asked."""
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What it runs as."""
+
+    @property
+    def state(self) -> SystemState:
+        """Its state."""
+
+    def list_nodes(self) -> list[str]:
+        """Return the full names of its nodes."""
+
+    def restart_node(self, full_name: str) -> Outcome:
+        """Build a node anew."""
+
+    def request_stop(self, code: int = ExitCode.DONE) -> None:
+        """Let it stop."""
+
+
+class Commands(Protocol):
+    """What is done with the files of a running system."""
+
+    def reload(self, system: Any) -> Outcome:
+        """Read the files, and let the system become what they say."""
+
+    def reload_now(self, system: Any) -> Outcome:
+        """Do as `reload`, but abort goals that it would wait for, or that it waits for."""
+
+    def plan(self, system: Any) -> Outcome:
+        """Read the files, and tell what `reload` would do."""
+
+
+class ControlServices:
+    """Serves commands and queries on a node.
+
+    Args:
+        status: Returns what the system says of itself.
+        top: Returns the health of its entities.
+
+    Attributes:
+        queries: The callback group of what changes no node: it is served beside a reload, which
+            may wait for a goal.
+        answered: When it answered last, a time of `time.monotonic`.
+    """
+
+    def __init__(
+        self,
+        node: RosNode,
+        system: ControlledSystem,
+        commands: Commands,
+        status: Callable[[], Outcome],
+        top: Callable[[], Outcome],
+    ) -> None:
+        from rcl_interfaces.srv import SetParametersAtomically
+        from std_srvs.srv import Trigger
+
+        self._system = system
+        self.answered = float('-inf')
+        self.queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        services = (
+            (protocol.STATUS, status, self.queries),
+            (protocol.TOP, top, self.queries),
+            (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), self.queries),
+            (protocol.DOWN, self._stop_system, self.queries),
+            (protocol.PLAN, lambda: commands.plan(system), changes),
+            (protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes),
+            (
+                protocol.RELOAD_NOW,
+                lambda: self._when_up(lambda: commands.reload_now(system)),
+                self.queries,
+            ),
+        )
+        for name, answer, group in services:
+            node.create_service(
+                Trigger, f'~/{name}', partial(self._serve, answer), callback_group=group
+            )
+        node.create_service(
+            SetParametersAtomically,
+            f'~/{protocol.RESTART}',
+            self._serve_restart,
+            callback_group=changes,
+        )
+
+    def _serve(self, answer: Callable[[], Outcome], _request: Any, response: Any) -> Any:
+        outcome = _attempt(answer)
+        response.success, response.message = outcome.succeeded, outcome.text
+        self.answered = monotonic()
+        return response
+
+    def _serve_restart(self, request: Any, response: Any) -> Any:
+        names = {each.name: each.value.string_value for each in request.parameters}
+        name = names.get('node', '')
+        outcome = _attempt(lambda: self._when_up(lambda: self._restart(name)))
+        response.result.successful, response.result.reason = outcome.succeeded, outcome.text
+        return response
+
+    def _when_up(self, answer: Callable[[], Outcome]) -> Outcome:
+        if self._system.state.is_up:
+            return answer()
+        return Outcome(succeeded=False, text='the system is still starting')
+
+    def _restart(self, name: str) -> Outcome:
+        if name not in self._system.list_nodes():
+            return Outcome(succeeded=False, text=f"the system has no node '{name}'")
+        return self._system.restart_node(name)
+
+    def _stop_system(self) -> Outcome:
+        self._system.request_stop()
+        return Outcome(succeeded=True, text=f'{self._system.state.name} stops')
+
+
+def _attempt(answer: Callable[[], Outcome]) -> Outcome:
+    """Return an answer whatever happens: without one, who asked would wait in vain."""
+    try:
+        return answer()
+    except Exception as error:  # noqa: BLE001 - a bug in Composer, or a behaviour that broke it
+        system_logger.error(format_internal_error(error))
+        return Outcome(succeeded=False, text=f'it failed: {error!r}')

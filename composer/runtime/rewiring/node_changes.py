@@ -1,0 +1,164 @@
+"""A running node becomes what the files say now: its record, state, parameters and entities."""
+
+from __future__ import annotations
+
+import copy
+from contextlib import suppress
+from time import monotonic, sleep
+from typing import TYPE_CHECKING, Any
+
+from rclpy.parameter import Parameter
+
+from composer.errors import StartError
+from composer.planning.plan import COMING, Action
+from composer.runtime.entities.creators import create_entity
+from composer.runtime.logs import set_level
+from composer.runtime.rewiring.parameter_changes import ParameterChange
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from composer.language.specs import NodeSpec
+    from composer.planning.plan import Operation, Target
+    from composer.runtime.nodes.live_entity import LiveEntity
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.rewiring.transaction import Transaction
+
+_POLL_SEC = 0.02
+_GONE_SEC = 1.0
+
+
+class NodeChange:
+    """Changes of one node that runs on.
+
+    Args:
+        after: What it is declared as now.
+        old: What the system was read into before.
+        new: What it is read into now.
+        clashing: The entities whose topic has another type after the edit.
+        transaction: Takes what undoes each change.
+    """
+
+    def __init__(
+        self,
+        node: LiveNode,
+        after: NodeSpec,
+        old: Reading,
+        new: Reading,
+        clashing: Collection[Target],
+        transaction: Transaction,
+    ) -> None:
+        self._node = node
+        self._before, self._after = node.spec, after
+        self._old, self._new = old, new
+        self._clashing = clashing
+        self._transaction = transaction
+
+    def replace_record(self) -> None:
+        """Let the node have its new record, and the state that this declares."""
+        node, before, spec = self._node, self._before, self._after
+        state = vars(node.behaviour_node.state)
+        gone = {
+            key: state.pop(key) for key in before.state if key not in spec.state and key in state
+        }
+        come = {
+            key: copy.deepcopy(value)
+            for key, value in spec.state.items()
+            if key not in before.state and key not in state
+        }
+        state.update(come)
+        self._follow(spec, self._new)
+
+        def put_back() -> None:
+            self._follow(before, self._old)
+            for key in come:
+                state.pop(key, None)
+            state.update(gone)
+
+        self._transaction.on_undo(put_back)
+
+    def _follow(self, spec: NodeSpec, reading: Reading) -> None:
+        node = self._node
+        node.spec, node.functions = spec, reading.functions
+        entries = reading.snapshot.overrides.get(node.full_name, {})
+        if entries or node.ros.from_files:
+            node.ros.follow_files(entries)
+
+    def change_entity(self, operation: Operation) -> None:
+        """Add, change or remove an entity or a parameter.
+
+        Raises:
+            ComposerError: It cannot be created, or the parameter refuses its value.
+        """
+        node, transaction = self._node, self._transaction
+        _, section, name = operation.target
+        if section == 'parameters':
+            change = ParameterChange(node, self._before, self._after)
+            transaction.on_undo(change.apply(operation))
+            return
+        entities = node.entities[section]
+        before = entities.get(name)
+        spec = getattr(self._after, section).get(name)
+        if operation.action is Action.CHANGE and before is not None:
+            old = getattr(self._before, section)[name]
+            transaction.on_undo(node.change, operation.noun, old, before)
+            node.change(operation.noun, spec, before)
+            return
+        if operation.action in COMING:
+            node.drop_limits(operation.noun, name)
+            created = self._create(operation.target, spec)
+            transaction.on_undo(created.destroy)
+            if section == 'timers':
+                transaction.on_commit(_start_timer, created)
+            transaction.on_undo(entities.pop, name, None)
+            entities[name] = created
+        if before is not None:
+            transaction.on_undo(entities.__setitem__, name, before)
+            transaction.on_commit(before.destroy)
+        if operation.action is Action.REMOVE:
+            entities.pop(name, None)
+            transaction.on_commit(node.forget, operation.noun, name)
+
+    def _create(self, target: Target, spec: Any) -> LiveEntity:
+        """Create an entity; one whose topic gets another type when the old ends have gone."""
+        deadline = monotonic() + (_GONE_SEC if target in self._clashing else 0.0)
+        while True:
+            try:
+                return create_entity(self._node, target[1], spec)
+            except StartError:
+                # The middleware may still deliver to one of them.
+                if monotonic() > deadline:
+                    raise
+            sleep(_POLL_SEC)
+
+    def change_node(self, operation: Operation) -> None:
+        """Change what the node itself does."""
+        node, before, spec, transaction = self._node, self._before, self._after, self._transaction
+        keys = {each.top_key for each in operation.changes}
+        if 'use_sim_time' in keys:
+            transaction.on_undo(_set_sim_time, node, value=not spec.use_sim_time)
+            _set_sim_time(node, value=spec.use_sim_time)
+        if 'log_level' in keys:
+            transaction.on_undo(set_level, before)
+            set_level(spec)
+        if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
+            transaction.on_undo(node.parameters.ask, before.on_parameters)
+            node.parameters.ask(spec.on_parameters)
+        if keys & {'on_error', 'warn_after'}:
+            # Their behaviours have no such keys of their own.
+            for name, client_spec in spec.action_clients.items():
+                client = node.entities['action_clients'][name]
+                old = before.action_clients.get(name, client_spec)
+                transaction.on_undo(node.change, 'action client', old, client)
+                node.change('action client', client_spec, client)
+
+
+def _set_sim_time(node: LiveNode, *, value: bool) -> None:
+    node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+
+
+def _start_timer(timer: Any) -> None:
+    with suppress(Exception):
+        # A behaviour may have destroyed it.
+        timer.ros.reset()
