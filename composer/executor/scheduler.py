@@ -346,7 +346,7 @@ class Scheduler:
         """Count so many more callbacks as waiting: others run in their places."""
         with self.lock:
             self.waiting += number
-            may_begin = number > 0 and len(self) > 0
+            may_begin = number > 0 and not self.is_empty()
         if may_begin:
             self._wake()
 
