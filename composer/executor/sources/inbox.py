@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Inbox:
-    """The queue of a subscription, a service or an action for what does not come through the middleware.
+    """The queue of an entity for what does not come through the middleware.
 
     They are executed before those of the middleware. It holds as many as the middleware would: a
     newer message pushes out the oldest.
