@@ -84,8 +84,8 @@ class ServiceClient:
         return self._local.server is not None or self._client.service_is_ready()
 
     def delivery(self) -> tuple[str, str]:
-        """Return which way requests go, and why."""
-        return ('sent', '') if self._local.server is None else ('local', '')
+        """Return which way requests go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
 
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 Deliveries: TypeAlias = 'dict[EntityKey, Delivery]'
 
-_SENDING = {'publishers': 'publisher', 'service_clients': 'service client'}
+_SENDING = {
+    'publishers': 'publisher',
+    'service_clients': 'service client',
+    'action_clients': 'action client',
+}
 
 
 @record
@@ -36,7 +40,7 @@ class Delivery:
 
 
 def find_deliveries(nodes: Iterable[LiveNode]) -> Deliveries:
-    """Return the way of each publisher and service client."""
+    """Return the way of each publisher and client."""
     return {
         (node.full_name, Owner(noun, name)): Delivery(*entity.delivery())  # type: ignore[attr-defined]
         for node in nodes

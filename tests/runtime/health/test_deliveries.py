@@ -25,6 +25,7 @@ nodes:
     service_clients:
       ask: std_srvs/srv/Trigger
       far: {type: std_srvs/srv/Trigger, external: true}
+    action_clients: {go: test_msgs/action/Fibonacci}
     timers:
       say: {rate: 50, publish: near, message: 1}
   ear:
@@ -33,10 +34,14 @@ nodes:
       kept: {type: std_msgs/msg/Int32, behaviour: parts:hear}
     services:
       ask: {type: std_srvs/srv/Trigger, behaviour: parts:answer}
+    actions: {go: {type: test_msgs/action/Fibonacci, behaviour: parts:go}}
 """
 CODE = """
 def hear(node, message):
     pass
+
+def go(node, goal):
+    return [1]
 
 def answer(node, request):
     return {'success': True, 'message': ''}
@@ -66,7 +71,8 @@ def test_the_way_is_told_and_changes_in_place(compose, peer, wait_for, capsys):
         'kept': ('sent', 'durability: transient_local'),
         'nowhere': ('', ''),
         'ask': ('local', ''),
-        'far': ('sent', ''),
+        'far': ('sent', 'its server is outside'),
+        'go': ('local', ''),
     }
     near = '/mouth: publisher near'
     wait_for(lambda: status(near) == 'local', 'the way in diagnostics')
