@@ -29,6 +29,8 @@ class Subject:
 SUBJECTS = {
     'round_trips': Subject('benchmarks.round_trips', 2.0),
     'calls': Subject('benchmarks.calls', 2.0),
+    'large_messages': Subject('benchmarks.large_messages', 3.0),
+    'nobody': Subject('benchmarks.nobody', 1.0),
     'overhead': Subject('benchmarks.message_overhead'),
     'forty': Subject('benchmarks.forty'),
     'further_node': Subject('benchmarks.further_node'),

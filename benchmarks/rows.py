@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+Figure = Callable[[float, float], float]
+
 
 @dataclass(frozen=True, slots=True)
 class Job:
@@ -35,7 +37,7 @@ class Row:
     what: str
     ours: Side
     other: Side | None
-    figure: Callable[[float, float], float]
+    figure: Figure
     sense: Literal['>=', '<=']
     target: float
 
@@ -97,6 +99,27 @@ def _calls() -> list[Row]:
         return Row(what, _side('calls', side, 0, 'rate'), other, times, '>=', 3)
 
     return [row('node.call', 'composer'), row('node.call_async', 'composer_async')]
+
+
+def _large_messages() -> list[Row]:
+    def row(what: str, kind: str, readers: int, figure: Figure, target: float) -> Row:
+        ours, other = (
+            _side('large_messages', f'{way}_{kind}', readers, 'us') for way in ('local', 'dds')
+        )
+        return Row(what, ours, other, figure, '<=' if figure is alone else '>=', target)
+
+    image, shared = '6 MB image, us from publish to callback', '1 MB to 10 read_only subscriptions'
+    kept, kept_over_dds = (
+        _side('large_messages', f'{way}_shared', 10, 'kept_share') for way in ('local', 'dds')
+    )
+    nobody = _side('nobody', 'composer', 0, 'us')
+    return [
+        row(f'{image}, against DDS', 'image', 1, times_less, 20),
+        row(f'{image} (other: DDS)', 'image', 1, alone, 150),
+        row(f'{shared}, us, against DDS', 'shared', 10, times_less, 10),
+        Row(f'{shared}, copies of one kept (other: DDS)', kept, kept_over_dds, alone, '<=', 1.1),
+        Row('us to publish to nobody', nobody, None, alone, '<=', 3),
+    ]
 
 
 def _overhead() -> list[Row]:
@@ -166,7 +189,7 @@ def _start_stop() -> list[Row]:
     def side(name: str, key: str) -> Side:
         return _side('start_stop', name, 500, key)
 
-    def row(what: str, key: str, figure: Callable[[float, float], float], target: float) -> Row:
+    def row(what: str, key: str, figure: Figure, target: float) -> Row:
         what = f'500 nodes with parameter services, {what}'
         return Row(what, side('composer', key), side('rclpy', key), figure, '<=', target)
 
@@ -245,6 +268,7 @@ def _soak() -> list[Row]:
 ROWS: list[Row] = [
     *_round_trips(),
     *_calls(),
+    *_large_messages(),
     *_overhead(),
     *_forty(),
     *_further_node(),

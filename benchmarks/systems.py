@@ -7,9 +7,10 @@ import yaml
 _TYPE = 'std_msgs/msg/Empty'
 
 
-def render_system(nodes: dict[str, Any]) -> str:
+def render_system(nodes: dict[str, Any], *, local_delivery: bool = True) -> str:
     """Return a file that declares `nodes`."""
-    return yaml.safe_dump({'version': 1, 'nodes': nodes}, sort_keys=False)
+    defaults = {'local_delivery': local_delivery}
+    return yaml.safe_dump({'version': 1, 'defaults': defaults, 'nodes': nodes}, sort_keys=False)
 
 
 def idle_nodes(count: int, *, parameters: bool = False) -> dict[str, Any]:

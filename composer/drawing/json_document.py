@@ -18,6 +18,9 @@
      "service client"; "service server" and "action server", "name", "node": <id>, "channel": <id>,
      "from": <id>, "to": <id>,              the way of messages, requests and goals
      "type", "qos": {"depth": 5},           policies that differ from the default; durations in s
+     "delivery": "local" | "sent" | "both" | "",   whether messages, calls and goals are handed
+                                            over within the process; empty without another end
+     "delivery_reason": "durability: transient_local",   why they are sent
      "findings", "file", "line"}],
   "waits": [{"node": <id>, "for": <id>, "file", "line"}],
   "findings": [                those of `composer check`; above they are indices into this list
@@ -102,6 +105,8 @@ def _edge(picture: Picture, edge: Edge) -> dict[str, Any]:
         'to': end,
         'type': edge.type,
         'qos': dict(edge.qos),
+        'delivery': edge.delivery.way,
+        'delivery_reason': edge.delivery.reason,
         'findings': list(edge.findings),
         **_place_of(picture, edge.path),
     }

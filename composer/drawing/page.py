@@ -149,4 +149,6 @@ def _describe_channel(channel: ChannelBox) -> dict[str, Any]:
 
 def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:
     qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
-    return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': [edge.type, *qos]}
+    delivery = [f'delivery: {edge.delivery}'] if edge.delivery.way else []
+    facts = [edge.type, *qos, *delivery]
+    return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': facts}

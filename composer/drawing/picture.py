@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.drawing.delivery import deliveries_of
 from composer.drawing.finding_places import FindingPlaces
 from composer.drawing.qos_labels import differing_policies
 from composer.names import expand_name, expand_namespace, join_names
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from composer.checks.connections.topology import Endpoint, Topology
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
     from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -74,6 +76,7 @@ class Edge:
         role: Its kind in words, as in `service client` and `service server`.
         begins_at_node: Whether messages, requests or goals leave the node here.
         qos: The policies that differ from the default of ROS; durations in seconds.
+        delivery: Which way its messages, calls or goals go.
         findings: Its findings, as indices into those of the picture.
     """
 
@@ -85,6 +88,7 @@ class Edge:
     channel: str
     type: str
     qos: Mapping[str, Any]
+    delivery: Delivery
     path: DataPath
     findings: tuple[int, ...]
 
@@ -202,6 +206,7 @@ def _edges(
     context: CheckContext, topology: Topology, places: FindingPlaces, ids: Mapping[DataPath, str]
 ) -> Iterator[Edge]:
     for channel in topology.channels.values():
+        deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
             node = ids[end.node.path]
             yield Edge(
@@ -213,6 +218,7 @@ def _edges(
                 f'{channel.kind}:{channel.name}',
                 end.entity.type,
                 differing_policies(end.qos, context.spec.qos),
+                deliveries[end.path],
                 end.path,
                 places.of_edge(end.path),
             )

@@ -9,6 +9,7 @@ import textwrap
 from dataclasses import field
 from typing import TYPE_CHECKING
 
+from composer.drawing.delivery import OUTSIDE
 from composer.drawing.picture import sends
 from composer.drawing.qos_labels import describe_policies
 from composer.records import record
@@ -186,14 +187,16 @@ def _channel_shape(token: str, channel: ChannelBox, remarks: _Remarks) -> Shape:
 
 def _edge_line(edge: Edge, tokens: dict[str, str], remarks: _Remarks) -> Line:
     start, end = edge.ends
-    policies = describe_policies(edge.qos)
+    # External ends are drawn.
+    delivery = '' if edge.delivery.reason == OUTSIDE else str(edge.delivery)
+    details = filter(None, (describe_policies(edge.qos), delivery))
     return Line(
         tokens[edge.id],
         edge.id,
         edge.channel.partition(':')[0],
         tokens[start],
         tokens[end],
-        (escape(policies),) if policies else (),
+        tuple(map(escape, details)),
         remarks.take(edge.findings),
         remarks.mark(edge.findings),
     )

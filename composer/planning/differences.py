@@ -114,6 +114,11 @@ _OF_THE_SYSTEM = (
     'diagnostics_period_sec',
 )
 _AT_ITS_START = ('on_start', 'wait_for')
+# Parameters of every node, and the keys of a node that set them where parameter files do not.
+_GIVEN_BY_ROS = {
+    'use_sim_time': 'use_sim_time',
+    'start_type_description_service': 'type_description_service',
+}
 
 
 def compare(old: Snapshot, new: Snapshot) -> Plan:
@@ -175,6 +180,7 @@ class _Comparison:
         if old is not None and new is not None:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
             further += compare_entries(*readings, 'state', old.state, new.state)
+            further += self._changed_by_files(*readings)
         own = list(self._compare(_NODES, (full_name, 'nodes', ''), old, new, further))
         yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
@@ -206,6 +212,24 @@ class _Comparison:
             for operation in self._compare(rules, target, *entity, further, (old, new)):
                 is_new = operation.action is Action.ADD
                 yield operation if is_new else with_notes(operation, old, self._old)
+
+    @staticmethod
+    def _changed_by_files(old: Reading, new: Reading) -> Iterator[Change]:
+        """Yield the keys of a node for which its parameter files say something else now."""
+        for name, key in _GIVEN_BY_ROS.items():
+            entries = [
+                side.snapshot.overrides.get(side.record.full_name, {}).get(name)
+                for side in (old, new)
+            ]
+            if any(entries):
+                (before, old_span), (after, new_span) = (
+                    (entry.value, entry.value_span)
+                    if entry
+                    else (getattr(side.record, key), side.find_span(key))
+                    for side, entry in zip((old, new), entries, strict=True)
+                )
+                if before != after:
+                    yield Change(key, before, after, old_span, new_span)
 
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""

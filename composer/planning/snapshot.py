@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import node_bindings
+from composer.language.paths import resolve_path
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 
@@ -176,6 +177,8 @@ def _read_overrides(nodes: Sequence[NodeSpec]) -> dict[str, Mapping[str, Paramet
     for node in nodes:
         if files := node.parameter_files:
             if files not in merged:
-                merged[files] = MergedFiles(read_parameter_file(Path(each)) for each in files)
+                merged[files] = MergedFiles(
+                    read_parameter_file(resolve_path(each, Path())) for each in files
+                )
             overrides[node.full_name] = merged[files].find_overrides(node.full_name)
     return overrides

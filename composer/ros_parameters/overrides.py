@@ -19,6 +19,7 @@ import bisect
 from collections import ChainMap
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.ros_parameters.node_patterns import PatternIndex
@@ -80,6 +81,17 @@ def parse_command_line(
         if type_name is not None:
             found[name] = value, type_name
     return found
+
+
+def find_names_given(ros_arguments: Sequence[str], full_name: str) -> set[str]:
+    """Return the names of the parameters that the command line gives a node a value of."""
+    files = [text for option, text in pairwise(ros_arguments) if option == '--params-file']
+    names = set(parse_command_line(ros_arguments, full_name))
+    if files:
+        from composer.ros_parameters.file_reader import read_parameter_file
+
+        names |= find_overrides(map(read_parameter_file, map(Path, files)), full_name).keys()
+    return names
 
 
 @dataclass(slots=True)

@@ -57,11 +57,20 @@ def log_levels(nodes: Sequence[NodeSpec], requests: Sequence[str]) -> Iterator[N
             set_logger_level(name, severity)
 
 
-def set_level(node: NodeSpec) -> None:
-    """Give the logger of a node the level that the file says now; without one, the default."""
-    name = _logger_name(node)
-    level = LoggingSeverity[node.log_level.upper()] if node.log_level else LoggingSeverity.UNSET
-    set_logger_level(name, level)
+def set_level(node: NodeSpec, requests: Sequence[str], *, exists: bool = True) -> None:
+    """Give the logger of a node its level: that of the command line, of the file, or the default.
+
+    Args:
+        requests: See `log_levels`.
+        exists: Whether there is such a node; if not, what the file said of it does not count.
+    """
+    own_name = _logger_name(node)
+    level: str | None = node.log_level if exists else None
+    for request in requests:
+        name, separator, requested = request.rpartition(':=')
+        if _as_logger_name(name) == own_name or not separator:
+            level = requested
+    set_logger_level(own_name, LoggingSeverity[(level or 'unset').upper()])
 
 
 def warn_of_unknown_loggers(spec: SystemSpec, requests: Sequence[str]) -> None:

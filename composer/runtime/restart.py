@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
 from composer.processes.backoff import Backoff
-from composer.runtime.logs import system_logger
+from composer.runtime.logs import set_level, system_logger
 from composer.runtime.stop import stop_node
 
 if TYPE_CHECKING:
@@ -163,6 +163,7 @@ class NodeRestarter:
             return False
         executor.remove_node(node.ros)
         node.destroy()
+        set_level(node.spec, self._system.log_levels, exists=False)
         if not node.ros.wait_until_gone(_GONE_SEC):
             system_logger.warning(
                 f"node '{name}': something still holds an entity of the node from before its "

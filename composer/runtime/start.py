@@ -14,6 +14,7 @@ from composer.errors import StartError
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
+from composer.runtime.logs import set_level
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
@@ -136,6 +137,8 @@ class Starter:
             self.open([node])
 
     def _create_node(self, spec: NodeSpec) -> LiveNode:
+        if spec.log_level or self._system.log_levels:
+            set_level(spec, self._system.log_levels)
         try:
             node = create_live_node(spec, self._system)
         except Exception as error:

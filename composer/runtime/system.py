@@ -56,7 +56,7 @@ class System:
         guardian: Ends the process if the stop takes too long. If it owns the process, that exits
             after the stop, and nothing uses ROS then.
         ros_arguments: The arguments after `--ros-args` of the command line.
-        log_levels: The log levels of the command line, for external processes.
+        log_levels: The log levels of the command line.
         stop_request: The request to stop it; by default a new one.
         commands: What it does with its files when it is asked; `None` if it is not to be asked.
 
@@ -99,7 +99,7 @@ class System:
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints]
         )
         self._error_policy = ErrorPolicy(self.restart_node, self._stop_request.make)
-        self._handle = self._create_handle(ros_arguments)
+        self._handle = self._create_handle(ros_arguments, log_levels)
         self._processes = ProcessSupervisor(
             spec.processes.values(),
             system_logger,
@@ -117,14 +117,18 @@ class System:
             self, spec, self._handle.health, self._hang_watcher.overdue_calls, commands
         )
 
-    def _create_handle(self, ros_arguments: Sequence[str]) -> SystemHandle:
+    def _create_handle(
+        self, ros_arguments: Sequence[str], log_levels: Sequence[str]
+    ) -> SystemHandle:
         spec = self._reading.spec
         return SystemHandle(
             context=self._context,
             positions=self._reading.positions,
             profiles=spec.qos,
             functions=self._reading.functions,
+            parameter_files=self._reading.snapshot.overrides,
             ros_arguments=ros_arguments,
+            log_levels=log_levels,
             act_on_error=self._error_policy.act,
             shutdown=self._stop_request.make,
             executor=self._executor,

@@ -22,6 +22,7 @@ TINY = {
     'forty': 2,
     'further_node': 1,
     'idle_cpu': 2,
+    'large_messages': 1,
     'overhead': 1,
     'reloads': 5,
     'round_trips': 1,

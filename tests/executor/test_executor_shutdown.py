@@ -165,11 +165,13 @@ def test_no_callback_begins_after_spin_has_returned(node: Any, executor: Any) ->
 
 
 @pytest.mark.parametrize('name', ['SIGINT', 'SIGTERM'])
-@pytest.mark.parametrize('how', ['spin', 'spin_once', 'busy'])
+@pytest.mark.parametrize('how', ['spin', 'spin_once', 'busy', 'sent', 'handed over'])
 @pytest.mark.usefixtures('domain_id')
 def test_signals_end_spin(name: str, how: str, start_program: Any) -> None:
+    """Whatever goes on: short callbacks, or messages without an end, sent or handed over."""
     program = f"""
 import rclpy, time
+from std_msgs.msg import Empty
 from composer.executor import ComposerExecutor
 from composer.executor.c_bindings import Readiness
 from composer.executor.spinner import Notifier
@@ -179,6 +181,13 @@ executor = ComposerExecutor()
 executor.add_node(node)
 if {how!r} == 'busy':
     node.create_timer(0.001, lambda: time.sleep(0.0005))
+if {how!r} in ('sent', 'handed over'):
+    subscription = node.create_subscription(Empty, 'endless', lambda m: send(m), 10)
+    inbox = executor.open_inbox(node, subscription, 10)
+    publisher = node.create_publisher(Empty, 'endless', 10)
+    send = publisher.publish if {how!r} == 'sent' else inbox.put
+    for _ in range(5):
+        send(Empty())
 executor.create_task(print, 'spinning', flush=True)
 try:
     rclpy.spin(node, executor) if {how!r} == 'spin_once' else executor.spin()

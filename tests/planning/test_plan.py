@@ -54,6 +54,22 @@ VALUES = 'talker:\n  ros__parameters:\n    speed: 2.0\n'
 EDITS = [
     ('period: 0.5', 'rate: 4', None, ["~ timer 'say' of 'talker': period 0.5 → 0.25 (13 → 13)"]),
     (
+        'speed: 2.0',
+        'speed: 2.0\n    use_sim_time: true',
+        'values.yaml',
+        ["~ node 'talker': use_sim_time false → true (5 → values.yaml:4)"],
+    ),
+    (
+        'speed: 2.0',
+        'speed: 2.0\n    start_type_description_service: true',
+        'values.yaml',
+        [
+            "± node 'talker': type_description_service false → true (5 → values.yaml:4); "
+            'ROS reads this when the node is created; '
+            'lost: its state, parameters set while it ran, all that is queued'
+        ],
+    ),
+    (
         'depth: 3',
         'depth: 4',
         None,

@@ -217,7 +217,9 @@ class SubscriptionSource(EventSource):
         if not self.has_data():
             self.parts.scheduler.set_empty(self, revision)
         elif self.inbox is not None:
-            self.inbox.limit_beside(pending if pending < _MOST_KNOWN else 1)
+            event_fd = self.event_fd
+            is_known = pending < _MOST_KNOWN and event_fd is not None and not event_fd.is_shared
+            self.inbox.limit_beside(pending if is_known else 1)
 
     def _run_taken(self) -> Any:
         entity = self.entity

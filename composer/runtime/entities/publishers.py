@@ -35,6 +35,7 @@ class Publisher:
             message_class,
             spec.topic,
             profile,
+            callback_group=node.events,
             event_callbacks=self._endpoint.publisher_events(),
         )
         node.endpoints.append(self._endpoint)

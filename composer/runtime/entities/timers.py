@@ -95,8 +95,11 @@ class _Constant:
         self.message()
 
     def message(self) -> Any:
-        """Return the message."""
-        type_name = self._node.spec.publishers[self._spec.publish or ''].type
+        """Return the message; `None` if an edit has just taken the publisher away."""
+        publisher = self._node.spec.publishers.get(self._spec.publish or '')
+        if publisher is None:
+            return None
+        type_name = publisher.type
         if type_name != self._type:
             convert = converter_for(import_interface(type_name)).convert
             self._message, self._type = convert(self._spec.message), type_name

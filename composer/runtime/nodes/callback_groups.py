@@ -73,7 +73,19 @@ class Gate:
         return self.serves
 
 
-class _GatedGroup(CallbackGroup):
+class _TidyGroup(CallbackGroup):
+    """Holds an entity until it is gone; the base class would keep a dead reference to it."""
+
+    def add_entity(self, entity: Any) -> None:
+        """See the base class."""
+        self.entities.add(ref(entity, self.entities.discard))
+
+
+class EventGroup(_TidyGroup, MutuallyExclusiveCallbackGroup):
+    """One callback at a time, of the middleware's events."""
+
+
+class _GatedGroup(_TidyGroup):
     """Asks its gate first, then the kind of group that it is mixed with.
 
     Attributes:
@@ -85,10 +97,6 @@ class _GatedGroup(CallbackGroup):
     def __init__(self, gate: Gate) -> None:
         super().__init__()
         self._gate = gate
-
-    def add_entity(self, entity: Any) -> None:
-        """Add an entity until it is gone; the base class would keep a dead reference to it."""
-        self.entities.add(ref(entity, self.entities.discard))
 
     def can_execute(self, entity: Any) -> bool:
         """See the base class."""

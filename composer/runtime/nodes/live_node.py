@@ -26,6 +26,7 @@ from composer.runtime.health.missed import count_missed
 from composer.runtime.messages.ownership import UNHELD_RESULT
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
+    EventGroup,
     Gate,
     GatedMutuallyExclusiveGroup,
     GatedReentrantGroup,
@@ -65,6 +66,7 @@ class LiveNode:
         has_begun: Whether `on_start` has been called, so that `on_stop` has something to stop.
         waits: How its behaviours wait.
         background: A callback group without behaviours: its responses are always taken.
+        events: The callback group of its publishers' events.
         serving: The callback group of requests to action servers.
         functions: The behaviours, by their names, as they were when the node was created or
             changed: one that goes calls those that it has known.
@@ -83,6 +85,7 @@ class LiveNode:
     entities: defaultdict[str, dict[str, LiveEntity]]
     waits: Waits
     background: CallbackGroup
+    events: CallbackGroup
     gate: Gate
     serving: CallbackGroup
     functions: Mapping[str, Callable[..., Any]]
@@ -284,7 +287,8 @@ class LiveNode:
             return
         self._is_destroyed = True
         self.flush_counts()
-        for end in self.at_destruction:
+        # Some take themselves out of it.
+        for end in list(self.at_destruction):
             with suppress(InvalidHandle):
                 # A behaviour may have destroyed it.
                 end()
@@ -311,7 +315,8 @@ def _drop(by_owner: dict[Owner, Any], noun: str, name: str) -> None:
 
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
-    ros = ComposedRosNode(spec, system.context, system.ros_arguments)
+    entries = system.parameter_files.get(spec.full_name, {})
+    ros = ComposedRosNode(spec, system.context, system.ros_arguments, entries)
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
@@ -331,6 +336,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         entities=entities,
         waits=waits,
         background=background,
+        events=EventGroup(),
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),
         functions=system.functions,

@@ -27,15 +27,13 @@ So a node has
 
 The file turns each of them on or off.
 
-Parameter files are read by rcl itself. Values of `-p` on the command line win over them: rcl would
-prefer a value that a file gives to this node by name, or one whose type comes first (see
-`composer.ros_parameters.overrides`).
+What parameter files say is given as overrides, as it was when the system was read: a node that
+starts again while they are edited is as it was. What the command line gives wins over them.
 """
 
 from __future__ import annotations
 
 import threading
-from pathlib import Path
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -44,14 +42,12 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
 from composer.ament import remaps_actions
-from composer.language.paths import resolve_path
 from composer.names import expand_name
-from composer.ros_parameters.file_reader import read_parameter_file
-from composer.ros_parameters.overrides import find_overrides, parse_command_line
+from composer.ros_parameters.overrides import find_names_given
 from composer.runtime.logs import has_rosout_publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent
     from rclpy.context import Context
@@ -62,6 +58,7 @@ if TYPE_CHECKING:
 
 _PARAMETER_EVENTS = '/parameter_events'
 _TYPE_DESCRIPTION = 'start_type_description_service'
+_SIM_TIME = 'use_sim_time'
 _POLL_SEC = 0.001
 
 
@@ -71,14 +68,23 @@ class ComposedRosNode(Node):
     Args:
         ros_arguments: The arguments after `--ros-args` of the command line.
 
+    Args:
+        entries: What the parameter files of the node say, by the names of the parameters; the
+            command line wins over them.
+
     Attributes:
         from_files: The parameters that the node has from its parameter files, by name.
     """
 
-    def __init__(self, spec: NodeSpec, context: Context, ros_arguments: Sequence[str]) -> None:
-        files = [str(resolve_path(text, Path())) for text in spec.parameter_files]
-        overrides = parse_command_line(ros_arguments, spec.full_name) if files else {}
-        self.from_files = _read_files(files, spec.full_name, overrides)
+    def __init__(
+        self,
+        spec: NodeSpec,
+        context: Context,
+        ros_arguments: Sequence[str],
+        entries: Mapping[str, ParameterEntry],
+    ) -> None:
+        given = find_names_given(ros_arguments, spec.full_name)
+        self.from_files = {name: entries[name] for name in entries if name not in given}
         self._late_events: _LatePublisher | None = None
         has_parameters = bool(spec.parameters) or spec.on_parameters is not None
         self._events_are_late = not has_parameters
@@ -89,16 +95,17 @@ class ComposedRosNode(Node):
             spec.name,
             context=context,
             namespace=spec.namespace,
-            cli_args=_node_arguments(spec, files, self.from_files, ros_arguments),
-            parameter_overrides=[
-                Parameter(name, Parameter.Type[type_name.upper()], value)
-                for name, (value, type_name) in overrides.items()
-            ],
+            cli_args=_node_arguments(spec, self.from_files, ros_arguments),
+            parameter_overrides=_as_overrides(self.from_files),
             use_global_arguments=False,
             enable_rosout=spec.rosout,
             start_parameter_services=spec.parameter_services and has_parameters,
             enable_logger_service=spec.logger_services,
         )
+        for name in (_SIM_TIME, _TYPE_DESCRIPTION):
+            if name not in self.from_files and name not in given:
+                # The file of the system says it, and parameter files that come win over that.
+                self._parameter_overrides.pop(name, None)
         if self._late_events is not None:
             self._late_events.open()
 
@@ -128,14 +135,7 @@ class ComposedRosNode(Node):
         for name in self.from_files:
             overrides.pop(name, None)
         self.from_files = {name: entries[name] for name in entries if name not in overrides}
-        overrides.update(
-            {
-                name: Parameter(name, Parameter.Type[entry.type.upper()], entry.value)
-                for name, entry in self.from_files.items()
-                # An empty list has no type.
-                if entry.type is not None
-            }
-        )
+        overrides.update({each.name: each for each in _as_overrides(self.from_files)})
 
     def find_override(self, name: str) -> Any:
         """Return the value that a file or the command line gives a parameter; `None` for none."""
@@ -208,16 +208,13 @@ class _LatePublisher:
 
 def _node_arguments(
     spec: NodeSpec,
-    files: Sequence[str],
     from_files: Mapping[str, ParameterEntry],
     ros_arguments: Sequence[str],
 ) -> list[str]:
     """Return the node's arguments: of remapping rules the first wins, of parameters the last."""
     arguments = ['--ros-args']
-    for file in files:
-        arguments += ['--params-file', file]
-    if spec.use_sim_time and 'use_sim_time' not in from_files:
-        arguments += ['-p', 'use_sim_time:=true']
+    if spec.use_sim_time and _SIM_TIME not in from_files:
+        arguments += ['-p', f'{_SIM_TIME}:=true']
     if not spec.type_description_service and _TYPE_DESCRIPTION not in from_files:
         arguments += ['-p', f'{_TYPE_DESCRIPTION}:=false']
     arguments += ros_arguments
@@ -226,9 +223,10 @@ def _node_arguments(
     return arguments
 
 
-def _read_files(
-    files: Sequence[str], full_name: str, overrides: Collection[str]
-) -> dict[str, ParameterEntry]:
-    read = [read_parameter_file(Path(file)) for file in files]
-    found = find_overrides(read, full_name)
-    return {name: entry for name, entry in found.items() if name not in overrides}
+def _as_overrides(entries: Mapping[str, ParameterEntry]) -> list[Parameter]:
+    return [
+        Parameter(name, Parameter.Type[entry.type.upper()], entry.value)
+        for name, entry in entries.items()
+        # An empty list has no type.
+        if entry.type is not None
+    ]

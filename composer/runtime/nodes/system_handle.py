@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.language.specs import OnError, QosSpec
+    from composer.ros_parameters.file_reader import ParameterEntry
     from composer.runtime.health.statistics import HealthRegistry
     from composer.runtime.messages.local_delivery import LocalTopics
     from composer.runtime.messages.local_services import LocalServices
@@ -55,7 +56,9 @@ class SystemHandle:
         positions: Where the parts of the system were written.
         profiles: The named QoS profiles of the file.
         functions: The behaviours, by their names.
+        parameter_files: What the parameter files of nodes say, see `Snapshot.overrides`.
         ros_arguments: The arguments after `--ros-args` of the command line.
+        log_levels: The log levels of the command line, see `composer.runtime.logs.log_levels`.
         act_on_error: Takes a node's full name and what to do after an error in it.
         shutdown: Ends the system with an exit code.
         executor: Runs the callbacks of all nodes.
@@ -73,7 +76,9 @@ class SystemHandle:
     positions: SourceMap
     profiles: Mapping[str, QosSpec]
     functions: Mapping[str, Callable[..., Any]]
+    parameter_files: Mapping[str, Mapping[str, ParameterEntry]]
     ros_arguments: Sequence[str]
+    log_levels: Sequence[str]
     act_on_error: Callable[[str, OnError], None]
     shutdown: Callable[[int], None]
     executor: SystemExecutor

@@ -16,10 +16,10 @@ from composer.runtime.logs import set_level
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Mapping
 
     from composer.language.specs import NodeSpec
-    from composer.planning.plan import Operation, Target
+    from composer.planning.plan import Operation, Plan, Target
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
@@ -136,12 +136,10 @@ class NodeChange:
         """Change what the node itself does."""
         node, before, spec, transaction = self._node, self._before, self._after, self._transaction
         keys = {each.top_key for each in operation.changes}
-        if 'use_sim_time' in keys:
-            transaction.on_undo(_set_sim_time, node, value=not spec.use_sim_time)
-            _set_sim_time(node, value=spec.use_sim_time)
         if 'log_level' in keys:
-            transaction.on_undo(set_level, before)
-            set_level(spec)
+            requests = node.system.log_levels
+            transaction.on_undo(set_level, before, requests)
+            set_level(spec, requests)
         if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
             transaction.on_undo(node.parameters.ask, before.on_parameters)
             node.parameters.ask(spec.on_parameters)
@@ -154,8 +152,34 @@ class NodeChange:
                 node.change('action client', client_spec, client)
 
 
+def set_sim_times(plan: Plan, nodes: Mapping[str, LiveNode], transaction: Transaction) -> None:
+    """Change `use_sim_time` of nodes, as the last of all changes.
+
+    rclpy has the subscription to `/clock` come and go with it: one that goes cannot be brought
+    back as it was if anything else fails. So those that go, go after those that come.
+
+    Raises:
+        StartError: An `on_parameters` refuses it.
+    """
+    values = {}
+    for operation in plan.operations:
+        node = nodes.get(operation.target[0])
+        keys = {each.key for each in operation.changes}
+        if node and operation.action is Action.CHANGE and 'use_sim_time' in keys:
+            given = node.ros.find_override('use_sim_time')
+            values[node.full_name] = node.spec.use_sim_time if given is None else given
+    for full_name in sorted(values, key=values.__getitem__, reverse=True):
+        node = nodes[full_name]
+        before = node.ros.get_parameter('use_sim_time').value
+        _set_sim_time(node, value=values[full_name])
+        transaction.on_undo(_set_sim_time, node, value=before)
+
+
 def _set_sim_time(node: LiveNode, *, value: bool) -> None:
-    node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+    (result,) = node.ros.set_parameters([Parameter('use_sim_time', value=value)])
+    if not result.successful:
+        message = f"parameter 'use_sim_time' of '{node.spec.key}': {result.reason}"
+        raise StartError(message)
 
 
 def _start_timer(timer: Any) -> None:

@@ -18,7 +18,7 @@ from composer.runtime.entities.creators import create_entity
 from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.goals_in_flight import find_going_actions, wait_for_goals
-from composer.runtime.rewiring.node_changes import NodeChange
+from composer.runtime.rewiring.node_changes import NodeChange, set_sim_times
 from composer.runtime.rewiring.transaction import Transaction
 
 if TYPE_CHECKING:
@@ -127,6 +127,7 @@ class Rewiring:
         handle.positions = reading.positions
         handle.profiles = spec.qos
         handle.functions = reading.functions
+        handle.parameter_files = reading.snapshot.overrides
         handle.without_parameter_services = spec.without_parameter_services
 
     def _are_in_the_way(self, plan: Plan, clashing: Collection[Target]) -> bool:
@@ -234,6 +235,7 @@ class Rewiring:
         for operation in plan.operations:
             if operation.target[1] == 'nodes' and operation.action is Action.CHANGE:
                 changes[operation.target[0]].change_node(operation)
+        set_sim_times(plan, self._nodes, self._transaction)
 
     def _pause(self, full_names: Collection[str]) -> Callable[[], None]:
         """Let no behaviour of these nodes begin until what is returned is called.

@@ -4,9 +4,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from std_msgs.msg import Int32
 from std_srvs.srv import Empty
 
-from composer.runtime.nodes.callback_groups import Gate, GatedReentrantGroup
+from composer.runtime.nodes.callback_groups import EventGroup, Gate, GatedReentrantGroup
 from composer.runtime.stop_request import StopRequest
 from tests.running import wait_for
 
@@ -133,11 +134,13 @@ def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(no
     assert gate.allows_requests()
 
 
-def test_a_group_keeps_nothing_of_an_entity_that_is_gone(node):
-    group = GatedReentrantGroup(Gate(StopRequest()))
+@pytest.mark.parametrize('group', [GatedReentrantGroup(Gate(StopRequest())), EventGroup()])
+def test_a_group_keeps_nothing_of_an_entity_that_is_gone(node, group):
     for _ in range(3):
         service = node.create_service(Empty, 'served', print, callback_group=group)
+        publisher = node.create_publisher(Int32, 'sent', 1, callback_group=group)
         assert group.has_entity(service)
         node.destroy_service(service)
-    del service
+        node.destroy_publisher(publisher)
+    del service, publisher
     wait_for(lambda: not group.entities, 'the entities to be gone')

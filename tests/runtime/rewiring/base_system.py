@@ -306,7 +306,7 @@ SYSTEM = {
         },
     },
     'processes': {
-        'sleeper': {'command': ['sleep', '1000']},
+        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000']},
         'packaged': {'package': 'sleeping', 'executable': 'sleeper', 'name': 'dreamer'},
     },
 }

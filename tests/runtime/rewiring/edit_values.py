@@ -25,6 +25,8 @@ _CONDITION = [{'node': 'listener'}, {'service': '/ask', 'timeout': 9.0}, {'proce
 _WAIT_FOR = [*_CONDITION, _CONDITION, {'topic': '/nowhere', 'timeout': 0.1}, [], None]
 _FILES = [['parameters.yaml'], ['parameters.yaml', 'others.yaml'], ['absent.yaml'], None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
+# Whatever its arguments are.
+_SLEEP = ['sh', '-c', 'exec sleep 900']
 _TICK = {'period': 0.03, 'behaviour': 'parts:tick'}
 
 VALUES = {
@@ -194,11 +196,11 @@ VALUES = {
         {'behaviour': 'parts:decide', 'with': {'most': 30.0}},
         None,
     ],
-    'system.processes': [{}, {'sleeper': {'command': ['sleep', '900']}}, {'sleeper': []}, None],
+    'system.processes': [{}, {'sleeper': {'command': _SLEEP}}, {'sleeper': []}, None],
     'process.foreach': _FOREACH,
     'process.when': _WHEN,
     'process.description': _STRINGS,
-    'process.command': [['sleep', '1000'], ['sleep', 2000], ['slepe', '1'], [], None],
+    'process.command': [_SLEEP, [*_SLEEP, 'well', 7], ['slepe', '1'], [], None],
     'process.package': ['sleeping', 'waking', None],
     'process.executable': ['sleeper', 'waker', None],
     'process.arguments': [['600'], [700], 'all', None],

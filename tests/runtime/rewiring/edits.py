@@ -42,7 +42,8 @@ _LINES = (
     ),
 )
 _RENAMES = (('def tick(', 'def tock('), ('def hear(', 'def haer('), ('node, text=', 'node, txt='))
-_LIMITS = ('5', '8', '1.5', 'many', '[1', '[1, 2]')
+_LIMITS = ('5', '8', '1.5', 'many', '[1', '[1, 2]', '5\n    use_sim_time: true')
+_LIMITS = (*_LIMITS, '8\n    start_type_description_service: true')
 
 
 class Project:

@@ -36,8 +36,8 @@ _OWN_REASONS = (
     'its value was set while the system ran',
     ': no',  # What `decide` returns.
 )
-# Topics of every node; that of its clock comes and goes with `use_sim_time`.
-_OF_NODES = ('/parameter_events', '/rosout', '/clock')
+# Topics of every node.
+_OF_NODES = ('/parameter_events', '/rosout')
 # After steps of these a failure strikes.
 _STEPS = (
     (Rewiring, '_begin'),
@@ -97,6 +97,12 @@ class Game:
             self._project.go_back()
             return done, text
         plan = compare(self._old, self._system.snapshot)
+        if not plan and self._random.random() > self._checked:
+            # It was compared before, and must be the same now, but for the lines of the files.
+            self._check_graph(self._graph, done)
+            self._check_untouched((), done)
+            self._project.keep()
+            return done, text
         # It has passed the check in this process, as it does in any other.
         self._fresh.begin(checks=self._random.random() < self._checked)
         try:
@@ -193,10 +199,18 @@ class Game:
         assert not lost, f'{done} changed also {lost}'
         touched = {each.target for each in operations if each.action is not Action.CHANGE}
         nodes = {target[0] for target in touched if target[1] == 'nodes'}
+        # Their subscriptions to `/clock` come and go.
+        timed = {
+            each.target[0]
+            for each in operations
+            if 'use_sim_time' in {change.key for change in each.changes}
+        }
         changed = {target[:2] for target in touched}
         now = see_graph(self._observer.node)[1]
         for (node, kind, topic), gids in self._gids.items():
             if node not in nodes and (node, kind) not in changed and topic[0] != '_':
+                if topic == '/clock' and node in timed:
+                    continue
                 if topic in _OF_NODES or '/_action/' in topic:
                     continue
                 assert now.get((node, kind, topic)) == gids, (done, node, kind, topic)
@@ -239,7 +253,8 @@ def playing(folder, seed, domains, checked=0.1):
 
     Args:
         domains: Two ROS domains; the second is for fresh starts.
-        checked: The share of the fresh starts that are checked first.
+        checked: The share of the fresh starts that are checked first, and of the edits of which the
+            plan says that they change nothing for which there is a fresh start.
     """
     project = Project(folder, seed)
     project.write()

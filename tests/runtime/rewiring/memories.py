@@ -27,6 +27,8 @@ class Same:
         self._text = repr(thing)
 
     def __eq__(self, other):
+        if not isinstance(other, Same):
+            return False
         return self._find() is not None and self._find() == other._find()
 
     def __hash__(self):
@@ -157,6 +159,10 @@ def _stays(key, operation):
         return True
     if operation.action is Action.RECREATE:
         return key.startswith(('own_state', 'health'))
+    changed = {each.top_key for each in operation.changes}
     if key == 'phase':
-        return not {'period', 'rate'} & {each.key for each in operation.changes}
+        return not {'period', 'rate'} & changed
+    if key.startswith('health') and key.endswith(')'):
+        # As of `action 'count' (accept)`: the edit may remove just that.
+        return key.rpartition('(')[2][:-1] not in changed
     return key not in ('bound', 'value', 'descriptor')

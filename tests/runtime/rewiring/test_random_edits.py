@@ -1,7 +1,6 @@
 """After any edits, a running system equals a fresh start of its files; all else was untouched.
 
-`python -m tests.runtime.rewiring.test_random_edits SEED COUNT` plays on, and prints each edit;
-with `keys` for SEED, each value of each key of the schema is tried alone.
+`python -m tests.runtime.rewiring.test_random_edits SEED COUNT` plays on, and prints each edit.
 """
 
 import os

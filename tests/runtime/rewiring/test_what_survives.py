@@ -90,7 +90,9 @@ import json
 
 
 def probe(node, request):
-    return {'success': True, 'message': json.dumps(vars(node.state), default=repr)}
+    level = node.ros.get_logger().get_effective_level().name
+    found = {**vars(node.state), 'level': level}
+    return {'success': True, 'message': json.dumps(found, default=repr)}
 """
 # Modules that import each other in each way that there is.
 LIBRARY = {
@@ -226,6 +228,15 @@ class Edited:
     def read(self):
         """Return what a behaviour finds in the modules of the library."""
         return json.loads(self.call(Trigger, '/read').message)
+
+    def list_nodes(self):
+        """Return the names of the nodes on the graph."""
+        return self._peer.node.get_node_names()
+
+    def see_clock(self):
+        """Return the IDs of the subscriptions to `/clock`."""
+        found = self._peer.node.get_subscriptions_info_by_topic('/clock')
+        return [bytes(end.endpoint_gid) for end in found]
 
     def get(self, name):
         """Return the value of a parameter of the clock."""
@@ -375,6 +386,48 @@ def test_values_set_live_survive_a_new_node_that_cannot_start(edited):
     _, said = edited.edit({**failing, **code})
     assert said.startswith("not reloaded: node 'clock': on_start raised OSError")
     assert edited.get('speed') == 4.0
+
+
+def test_clocks_and_parameter_files_stay_if_something_else_fails(edited):
+    clock = {'  clock:': '  clock:\n    use_sim_time: true'}
+    edited.edit(clock)
+    (before,) = wait_for(edited.see_clock, 'the subscription to /clock')
+    failing = {
+        'FIRST = 0': 'FIRST = 0\n\n\ndef fail(change, changes):\n    return "no"\n',
+        '  ear:': '  ear:\n    use_sim_time: true\n    on_parameters: parts:fail',
+        'size: 7': 'size: 9, use_sim_time: false',
+    }
+    _, said = edited.edit({**clock, **failing})
+    assert said == "not reloaded: parameter 'use_sim_time' of 'ear': no"
+    assert edited.see_clock() == [before]
+    # Also if the node itself is created again, as the files said.
+    _, said = edited.edit({**failing, '  clock:': '  clock:\n    rosout: false'})
+    assert said.startswith('not reloaded: ')
+    assert (edited.get('size'), edited.get('use_sim_time')) == (7, True)
+
+
+def test_a_node_with_an_action_server_and_client_goes(edited):
+    both = """  ear:
+    actions: {run: {type: test_msgs/action/Fibonacci, behaviour: parts:run}}
+    action_clients: {run: {type: test_msgs/action/Fibonacci, external: true}}"""
+    run = {'FIRST = 0': 'FIRST = 0\n\n\ndef run(node, goal):\n    return {}\n'}
+    _, said = edited.edit({**run, '  ear:': both})
+    assert said.startswith('reloaded in '), said
+    wait_for(lambda: 'ear' in edited.list_nodes(), 'the node')
+    edited.edit({'  ear:': '  ear2:'})
+    wait_for(lambda: 'ear' not in edited.list_nodes(), 'the end of the node')
+
+
+def test_nodes_that_come_or_are_recreated_have_their_log_levels(edited):
+    edited.edit(
+        {
+            '  clock:': '  clock:\n    rosout: false\n    log_level: warn',
+            '  ear:': '  ear2:\n    log_level: error',
+        }
+    )
+    assert (edited.probe('clock')['level'], edited.probe('ear2')['level']) == ('WARN', 'ERROR')
+    edited.edit({'  clock:': '  clock:\n    rosout: false'})
+    assert edited.probe('clock')['level'] == 'INFO'
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,136 @@
+"""Which way messages, calls and goals go, as the drawing says it."""
+
+import json
+
+import pytest
+
+from composer.drawing import render_picture
+
+TOPIC = """
+    version: 1
+    {top}
+    nodes:
+      talker:
+        publishers: {{words: {{type: std_msgs/msg/String, {publisher}}}}}
+        timers: {{t: {{rate: 1, publish: words, message: hello}}}}
+      ear:
+        subscriptions: {{words: {{type: std_msgs/msg/String, publish: echo, {subscription}}}}}
+        publishers: {{echo: {{type: std_msgs/msg/String, external: true}}}}
+"""
+CALLS = """
+    version: 1
+    {top}
+    nodes:
+      server:
+        services: {{add: {{type: std_srvs/srv/Trigger, behaviour: parts:add, {service}}}}}
+        actions: {{go: {{type: test_msgs/action/Fibonacci, behaviour: parts:go}}}}
+      client:
+        {client}
+        service_clients: {{add: std_srvs/srv/Trigger}}
+        action_clients: {{go: test_msgs/action/Fibonacci}}
+"""
+OFF = 'local_delivery: false'
+
+
+def ways(picture):
+    """Return the way and the reason of each edge."""
+    edges = json.loads(render_picture(picture, 'json'))['edges']
+    return {each['id']: (each['delivery'], each['delivery_reason']) for each in edges}
+
+
+@pytest.mark.parametrize(
+    ('publisher', 'subscription', 'way'),
+    [
+        ('', '', ('local', '')),
+        ('qos: sensor_data', 'qos: sensor_data', ('local', '')),
+        ('qos: {history: keep_all}', '', ('local', '')),
+        ('local_delivery: true', 'read_only: true', ('local', '')),
+        ('local_delivery: false', '', ('sent', OFF)),
+        ('external: true', '', ('sent', 'external: true')),
+        ('', 'external: true', ('local', '')),
+        ('qos: {durability: transient_local}', '', ('sent', 'durability: transient_local')),
+        ('', 'qos: system_default', ('sent', 'durability: system_default')),
+        ('qos: {lifespan: 1}', '', ('sent', 'lifespan')),
+        ('qos: {deadline: 1}', 'qos: {deadline: 1}', ('sent', 'deadline')),
+        ('', 'qos: {liveliness: manual_by_topic}', ('', '')),
+        ('qos: {liveliness: manual_by_topic}', '', ('sent', 'liveliness: manual_by_topic')),
+    ],
+)
+def test_the_way_of_messages(draw, publisher, subscription, way):
+    text = TOPIC.format(top='', publisher=publisher, subscription=subscription)
+    found = ways(draw(text))
+    assert found['publisher:/talker:words'] == way
+    assert found['subscription:/ear:words'] == way
+    assert found['publisher:/ear:echo'] == ('sent', 'external: true')
+
+
+def test_a_topic_with_publishers_of_both_ways(draw):
+    found = ways(
+        draw("""
+    version: 1
+    defaults: {local_delivery: false}
+    nodes:
+      one: {publishers: {words: std_msgs/msg/String}}
+      two: {publishers: {words: {type: std_msgs/msg/String, local_delivery: true}}}
+      ear:
+        subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hear}}
+    """)
+    )
+    assert found == {
+        'publisher:/one:words': ('sent', OFF),
+        'publisher:/two:words': ('local', ''),
+        'subscription:/ear:words': ('both', OFF),
+    }
+
+
+@pytest.mark.parametrize(
+    ('changed', 'service', 'action'),
+    [
+        ({}, ('local', ''), ('local', '')),
+        ({'top': 'defaults: {local_delivery: false}'}, ('sent', OFF), ('sent', OFF)),
+        ({'client': 'local_delivery: false'}, ('sent', OFF), ('sent', OFF)),
+        (
+            {'service': 'qos: {durability: transient_local}'},
+            ('sent', 'durability: transient_local'),
+            ('local', ''),
+        ),
+    ],
+)
+def test_the_way_of_calls_and_goals(draw, changed, service, action):
+    text = CALLS.format(**{'top': '', 'service': '', 'client': '', **changed})
+    found = ways(draw(text))
+    assert found['service:/server:add'] == found['service client:/client:add'] == service
+    assert found['action:/server:go'] == found['action client:/client:go'] == action
+
+
+def test_arrows_say_the_way_but_to_the_outside(draw):
+    text = TOPIC.format(top='', publisher=OFF, subscription='')
+    for form in ('mermaid', 'dot'):
+        drawn = render_picture(draw(text), form)
+        assert drawn.count('sent, local_delivery: false') == 2
+        assert 'external: true' not in drawn
+
+
+@pytest.mark.ros
+def test_the_drawing_and_a_running_publisher_agree():
+    pytest.importorskip('rclpy')
+    from composer.drawing import delivery
+    from composer.language.parsing.entry_parser import parse_entity_qos
+    from composer.language.qos import resolve_qos
+    from composer.runtime.messages import local_delivery
+    from composer.runtime.messages.qos_profiles import create_qos_profile
+
+    policies = [
+        *({'durability': each} for each in ('system_default', 'volatile', 'transient_local')),
+        *({'history': each} for each in ('system_default', 'keep_last', 'keep_all')),
+        *({'reliability': each} for each in ('system_default', 'reliable', 'best_effort')),
+        *({'liveliness': each} for each in ('system_default', 'automatic', 'manual_by_topic')),
+        *({each: 'best_available'} for each in ('durability', 'reliability', 'liveliness')),
+        *({each: 1.5} for each in ('deadline', 'lifespan', 'liveliness_lease_duration')),
+        *({each: 'infinite'} for each in ('deadline', 'lifespan')),
+        *({'profile': each} for each in ('sensor_data', 'system_default', 'best_available')),
+    ]
+    for each in policies:
+        spec = parse_entity_qos({'qos': each}, ())
+        running = local_delivery.why_sent(create_qos_profile(spec, {}))
+        assert delivery.why_sent(resolve_qos(spec, {})) == running, each
