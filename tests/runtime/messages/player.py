@@ -80,7 +80,7 @@ class _Game:
         self._published = Counter()
         self._gates = {name: threading.Event() for name in scenario.subscriptions}
         self._blocked = set()
-        self._inside = {}  # The visitors that are there: what was published before, and counts.
+        self._inside = {}  # The visitors that are there, and what was published before.
         self.open_all()
 
     def open_all(self):
@@ -104,16 +104,8 @@ class _Game:
             self._outsider.advertise(name, f'/topic{topic}', _OUTSIDE_QOS)
             self._wait_until_met(name, topic)
         self._find_mixed()
-        for kind, events, *topics in scenario.steps:
-            if kind == 'burst':
-                self._burst(events, *topics)
-            elif kind == 'flood':
-                for event in events:
-                    self._happen(*event)
-            else:
-                for kind_of_event, name, *number in events:
-                    for _ in range(*number or [1]):
-                        self._trickle(kind_of_event, name)
+        for step in scenario.steps:
+            self._take(*step)
             self._wait_until_idle()
         for name in list(self._inside):
             self._leave(name)
@@ -122,6 +114,17 @@ class _Game:
         for name, end in scenario.subscriptions.items():
             health = self._health.entity(f'/{end.node}', Owner('subscription', name))
             self.outcome.overruns[name] = health._count_missed().overruns
+
+    def _take(self, kind, events, *topics):
+        if kind == 'burst':
+            self._burst(events, *topics)
+            return
+        for event, name, *number in events:
+            if kind == 'flood':
+                self._happen(event, name, *number)
+            else:
+                for _ in range(*number or [1]):
+                    self._trickle(event, name)
 
     def _trickle(self, kind, name):
         topic = self._topic_of(name)
@@ -184,8 +187,14 @@ class _Game:
         wait_for(lambda: not select.select(fds, [], [], 0)[0], 'what was announced')
         before = [source.observer._arrived for source in sources]
         self._outsider.publish(name, texts)
-        for source, number in zip(sources, before, strict=True):
-            wait_for(lambda: source.observer._arrived >= number + len(texts), f'texts of {name}')
+
+        def has_come():
+            return all(
+                source.observer._arrived >= number + len(texts)
+                for source, number in zip(sources, before, strict=True)
+            )
+
+        wait_for(has_come, f'texts of {name}')
 
     def _next_text(self, name):
         self._published[name] += 1
@@ -194,16 +203,15 @@ class _Game:
     def _join(self, name):
         topic, policies, has_context = self._scenario.visitors[name]
         met = self._met_by(topic, policies)
-        before = {publisher: ros.get_subscription_count() for publisher, ros in met.items()}
-        self._inside[name] = before, {each: self._published[each] for each in met}
+        before = {ros: ros.get_subscription_count() for ros in met.values()}
+        self._inside[name] = {each: self._published[each] for each in met}
         self._outsider.join(name, f'/topic{topic}', policies, has_context=has_context)
-        for publisher, ros in met.items():
-            wait_for(lambda: ros.get_subscription_count() > before[publisher], f'{name}')
+        wait_for(lambda: all(ros.get_subscription_count() > before[ros] for ros in before), name)
 
     def _leave(self, name):
         topic, policies, _ = self._scenario.visitors[name]
         met = self._met_by(topic, policies)
-        before, published = self._inside.pop(name)
+        published = self._inside.pop(name)
         last = {
             f'{each}:{self._published[each]}'
             for each, ros in met.items()
@@ -216,12 +224,9 @@ class _Game:
             f'the last messages to {name}',
         )
         self.outcome.stays.append((name, self._outsider.heard(name)))
+        before = {ros: ros.get_subscription_count() for ros in met.values()}
         self._outsider.leave(name)
-        for publisher, ros in met.items():
-            others = sum(publisher in each[0] for each in self._inside.values())
-            fewest = len(self._local_to(ros)) + others
-            wait_for(lambda: ros.get_subscription_count() <= max(fewest, 0), f'end of {name}')
-        del before
+        wait_for(lambda: all(ros.get_subscription_count() < before[ros] for ros in before), name)
 
     def _met_by(self, topic, policies):
         """Return the rclpy publishers that match a visitor."""
@@ -232,14 +237,6 @@ class _Game:
             if end.topic == topic
             and _is_match((ros := self._ros_of('publishers', name, end)).qos_profile, profile)
         }
-
-    def _local_to(self, ros):
-        return [
-            each
-            for name, end in self._scenario.subscriptions.items()
-            if (each := self._ros_of('subscriptions', name, end)).topic_name == ros.topic_name
-            and _is_match(ros.qos_profile, each.qos_profile)
-        ]
 
     def _ros_of(self, section, name, end):
         return self._nodes[end.node].entities[section][name]._ros

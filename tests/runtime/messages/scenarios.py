@@ -200,7 +200,9 @@ class _Maker:
         if kind == 'come and go':
             return ('trickle', self._events(1, 3))
         if kind == 'burst':
-            topics = sorted(chance.sample(range(scenario.topics), chance.randint(1, scenario.topics)))
+            topics = sorted(
+                chance.sample(range(scenario.topics), chance.randint(1, scenario.topics))
+            )
             return ('burst', self._events(1, 15, topics), topics)
         name = chance.choice(list(scenario.publishers))
         is_flood = kind == 'flood' and scenario.loses_nothing([scenario.publishers[name].topic])
@@ -222,5 +224,7 @@ class _Maker:
             if visitors and chance.random() < 0.35:
                 events.append(('come or go', chance.choice(visitors)))
             if outside and chance.random() < 0.35:
-                events.append(('from outside', chance.choice(outside), chance.randint(least, most)))
+                events.append(
+                    ('from outside', chance.choice(outside), chance.randint(least, most))
+                )
         return events
