@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import Iterator
 
     from std_msgs.msg import Empty, Int64
     from std_srvs.srv import SetBool
@@ -69,7 +69,7 @@ def call_often(node: Node, seconds: float) -> Iterator[None]:
     yield
 
 
-async def call_often_async(node: Node, seconds: float) -> AsyncIterator[None]:
+async def call_often_async(node: Node, seconds: float) -> None:
     """As `call_often`, without holding a thread."""
     begin = time.monotonic()
     count = 0
@@ -77,7 +77,6 @@ async def call_often_async(node: Node, seconds: float) -> AsyncIterator[None]:
         await node.call_async('ask', {'data': True})
         count += 1
     _tell_rate(node, count, begin)
-    yield
 
 
 def _tell_rate(node: Node, count: int, begin: float) -> None:

@@ -144,8 +144,9 @@ class ComposerExecutor(MultiThreadedExecutor):
         """Return a new queue by which something gets to an entity without the middleware.
 
         Args:
-            entity: A subscription, which gets messages; or a service, which gets objects with the
-                request as `message`, and `respond(response)`.
+            entity: A subscription, which gets messages; a service, which gets objects with the
+                request as `message`, and `respond(response)`; or an action, which gets functions
+                that return what is awaited.
             depth: How many it holds; `None` for any number.
         """
         return self._spinner.registry.open_inbox(node, entity, depth)

@@ -346,7 +346,9 @@ class Scheduler:
         """Count so many more callbacks as waiting: others run in their places."""
         with self.lock:
             self.waiting += number
-        self._wake()
+            may_begin = number > 0 and not self.is_empty()
+        if may_begin:
+            self._wake()
 
     def close(self) -> None:
         """Start nothing any more."""

@@ -86,14 +86,22 @@ class StopRequest:
         Returns:
             Whether that is still to come; after the request, `wake` is not called.
         """
+        is_to_come = self.add_callback(wake)
+        try:
+            yield is_to_come
+        finally:
+            self.remove_callback(wake)
+
+    def add_callback(self, wake: Callable[[], None]) -> bool:
+        """As `waking`, until `remove_callback`."""
         if self.is_set:
-            yield False
-            return
+            return False
         self._callbacks[wake] = None
         if self.is_set:
             # It was made while the line above ran.
             wake()
-        try:
-            yield True
-        finally:
-            del self._callbacks[wake]
+        return True
+
+    def remove_callback(self, wake: Callable[[], None]) -> None:
+        """Undo `add_callback`."""
+        self._callbacks.pop(wake, None)

@@ -1,4 +1,4 @@
-"""What is handed to a subscription or a service within the process."""
+"""What is handed to a subscription, a service or an action within the process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Inbox:
-    """The queue of a subscription or a service for what does not come through the middleware.
+    """The queue of an entity for what does not come through the middleware.
 
     They are executed before those of the middleware. It holds as many as the middleware would: a
     newer message pushes out the oldest.

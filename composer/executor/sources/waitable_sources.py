@@ -71,12 +71,11 @@ class ActionSource(EventSource):
 
     def close(self) -> None:
         """See the base class."""
-        self.alive = False
         for timer in self._timers:
             self.parts.deadlines.set(timer, None)
         if self._clock is not None:
             self.parts.deadlines.unfollow(self._clock, self)
-        self.parts.event_fds.detach(self)
+        super().close()
 
     def watch(self, fd: int | None) -> None:
         """See the base class."""
@@ -98,6 +97,9 @@ class ActionSource(EventSource):
 
     def run(self) -> Any:
         """See the base class."""
+        if self.local:
+            with suppress(IndexError):  # Another thread took it.
+                return self._serve(self.local.popleft())
         revision = self.revision
         data = None
         try:
@@ -115,14 +117,17 @@ class ActionSource(EventSource):
         self._note_taken()
         return self._execute(data)
 
-    async def _execute(self, data: Any) -> None:
+    def _execute(self, data: Any) -> Any:
+        return self._serve(lambda: _execute_waitable(self.entity, data, self.parts.executor))
+
+    async def _serve(self, serve: Callable[[], Any]) -> None:
         with ExitStack() as stack:
             try:
                 # rclpy uses it after the user's callbacks.
                 stack.enter_context(self.hold_entity())
             except InvalidHandle:
                 return
-            await _execute_waitable(self.entity, data, self.parts.executor)
+            await serve()
 
 
 class WaitSetSource(EventSource):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from dataclasses import field
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from rclpy.task import Future
 
@@ -83,8 +82,11 @@ class Requests:
     async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
         """As `send`, without holding a thread while it waits."""
         begun = monotonic()
-        is_there = self.waits.until_true_async(self._has_server, timeout_sec, self.notice)
-        if not await is_there:
+        # The server is there, nearly always.
+        waits, has_server = self.waits, self._has_server
+        if not has_server() and not await waits.until_true_async(
+            has_server, timeout_sec, self.notice
+        ):
             raise self.unavailable(timeout_sec or 0.0)
         future = self._begin(send)
         try:
@@ -97,26 +99,29 @@ class Requests:
         return future.result()
 
     def _has_server(self) -> bool:
-        with self._ending():
-            return self.is_available()
+        try:
+            is_available = self.is_available()
+        except InvalidHandle:
+            self._raise_end()
+            raise
+        self._raise_end()
+        return is_available
 
     def _begin(self, send: Callable[[], Future]) -> Future:
-        with self._ending():
+        try:
             future = send()
+        except InvalidHandle:
+            self._raise_end()
+            raise
+        self._raise_end()
         self.waiting.add(future)
         future.add_done_callback(self.waiting.discard)
         if self.ended and not future.done():
             future.set_exception(self.ended[0])
         return future
 
-    @contextmanager
-    def _ending(self) -> Iterator[None]:
+    def _raise_end(self) -> None:
         """Raise why the client is gone, if it is."""
-        try:
-            yield
-        except InvalidHandle:
-            if not self.ended:
-                raise
         if self.ended:
             raise self.ended[0]
 

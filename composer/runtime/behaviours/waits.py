@@ -7,9 +7,9 @@ waits for nodes, servers and messages that are not there yet.
 
 from __future__ import annotations
 
-import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from queue import Empty, SimpleQueue
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,6 @@ from rclpy.task import Future
 from composer.errors import SystemStoppingError
 
 if TYPE_CHECKING:
-    import queue
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
@@ -91,22 +90,25 @@ class Waits:
             SystemStoppingError: A stop was requested meanwhile; or before, and the wait has no
                 limit.
         """
-        woken = threading.Event()
-
-        def wake(_future: Future | None = None) -> None:
-            woken.set()
-
-        future.add_done_callback(wake)
         if future.done():
             return True
-        with self._ended_by_stop(wake, timeout_sec) as is_ended:
-            if not is_ended():
-                with self.make_room():
-                    woken.wait(timeout_sec)
-        return self._finish(future, wake, is_ended=is_ended())
+        woken: SimpleQueue[Any] = SimpleQueue()
+        wake = partial(woken.put, None)
+        future.add_done_callback(woken.put)
+        is_before_stop = self.stop.add_callback(wake)
+        ends = is_before_stop or (timeout_sec is None and not self._may_wait_at_stop)
+        try:
+            if not (ends and self.stop.is_set):
+                with self.make_room(), suppress(Empty):
+                    woken.get(timeout=timeout_sec)
+        finally:
+            self.stop.remove_callback(wake)
+        return self._finish(future, woken.put, is_ended=ends and self.stop.is_set)
 
     async def until_done_async(self, future: Future, timeout_sec: float | None) -> bool:
         """As `until_done`, for coroutines."""
+        if future.done():
+            return True
         first: Future = Future()
 
         def wake(_future: Future | None = None) -> None:
@@ -123,7 +125,7 @@ class Waits:
                 await self._with_timeout(timeout_sec, wake, first)
         return self._finish(future, wake, is_ended=is_ended())
 
-    def until_next(self, items: queue.SimpleQueue[Any]) -> Any:
+    def until_next(self, items: SimpleQueue[Any]) -> Any:
         """Wait without a limit for the next item of a queue, and return it.
 
         Raises:
@@ -166,6 +168,8 @@ class Waits:
         self, condition: Callable[[], bool], timeout_sec: float | None, notice: WaitNotice
     ) -> bool:
         """As `until_true`, for coroutines."""
+        if condition():
+            return True
         begun = monotonic()
         while not condition():
             if self._is_refused():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
 from action_msgs.msg import GoalStatus
-from rclpy.action import ActionClient as RosActionClient
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
 from composer.errors import (
@@ -22,6 +23,7 @@ from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.waits import WaitNotice
+from composer.runtime.entities.local_goals import GoalClient
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 from composer.terminal import EscapingLogger
@@ -49,6 +51,10 @@ class ActionClient:
         self._logger = EscapingLogger(node.ros.get_logger())
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
+        services = node.system.services
+        self._local = services.add_client(node.ros, self._client, (self._name, action_class))
+        self._client.local = self._local
+        self._local.allow(is_allowed=spec.local_delivery)
         self._requests = Requests(
             node.waits,
             self._client.server_is_ready,
@@ -82,9 +88,14 @@ class ActionClient:
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way goals go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
+
     def change(self, spec: ActionClientSpec) -> None:
         """See `LiveEntity`."""
         self._behaviours.change(spec)
+        self._local.allow(is_allowed=spec.local_delivery)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
@@ -93,6 +104,7 @@ class ActionClient:
         self._requests.end(error)
         for goal in list(self._goals):
             goal.lose(error)
+        self._node.system.services.remove(self._local)
         self._client.destroy()
         self._behaviours.destroy()
 
@@ -116,7 +128,7 @@ class ActionClient:
             self._behaviours.put('result', response.result)
 
 
-class _Client(RosActionClient):
+class _Client(GoalClient):
     """A client whose goals get all their feedback in order, and before their result.
 
     The stock one may take an answer before it has registered the request, and then drops it.
@@ -222,7 +234,9 @@ class _Behaviours:
         """Let the behaviour under a key, if there is one, be called with an item."""
         if call := self._calls.get(key):
             self._items.append((call, item))
-            self._guard.trigger()
+            # A server of the same system may be faster than the end of its client.
+            with suppress(AttributeError, InvalidHandle):
+                self._guard.trigger()
 
     def _drain(self) -> None:
         while self._items:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
-from rclpy.action import ActionServer as RosActionServer
 from rclpy.action import CancelResponse, GoalResponse
 from rclpy.action.server import RCLError
 from rclpy.qos import QoSProfile
@@ -19,6 +18,7 @@ from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner, Progress
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
+from composer.runtime.entities.local_goals import GoalServer
 from composer.runtime.messages.payloads import converter_for
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _CANCEL_SEC = 5.0
 _SERVICE_QOS = QoSProfile(depth=1000)
 
 
-class ActionServer(RosActionServer):
+class ActionServer(GoalServer):
     """An action server whose plain and generator behaviours run in threads of their own.
 
     The stock server executes goals in the threads of the executor, where goals that sleep keep
@@ -61,6 +61,10 @@ class ActionServer(RosActionServer):
             cancel_service_qos_profile=_SERVICE_QOS,
         )
 
+        key = node.ros.resolve_action_name(spec.action), self.action_type
+        services = node.system.services
+        self.local = services.add_server(node.ros, self, key, _SERVICE_QOS.depth)
+        self.local.allow(is_allowed=spec.local_delivery)
         node.at_destruction.append(self.destroy)
 
     def retire(self, *, is_retired: bool, aborts: bool = False) -> None:
@@ -81,6 +85,7 @@ class ActionServer(RosActionServer):
     def change(self, spec: ActionSpec) -> None:
         """See `LiveEntity`: goals that have begun end as they began."""
         self._queue.concurrency = spec.concurrency
+        self.local.allow(is_allowed=spec.local_delivery)
         self._execution = _Execution(self._live_node, spec, self._queue)
         self._accept = self._create_accept(spec)
 
@@ -88,6 +93,7 @@ class ActionServer(RosActionServer):
         """See `LiveEntity`."""
         with suppress(ValueError):
             self._live_node.at_destruction.remove(self.destroy)
+        self._live_node.system.services.remove(self.local)
         super().destroy()
 
     def add_future(self, future: Any) -> None:

@@ -42,7 +42,9 @@ class ServiceClient:
             qos_profile=create_qos_profile(spec.qos, node.system.profiles),
             callback_group=node.background,
         )
-        self._local = node.system.services.add_client(node.ros, self._client, self._service)
+        self._local = node.system.services.add_client(
+            node.ros, self._client, (self._service, service_class)
+        )
         self._local.allow(is_allowed=spec.local_delivery)
         self._requests = Requests(
             node.waits,
@@ -81,6 +83,10 @@ class ServiceClient:
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way requests go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
+
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""
         self._local.allow(is_allowed=spec.local_delivery)
@@ -89,7 +95,7 @@ class ServiceClient:
         """See `LiveEntity`."""
         message = f"an edit took the client of '{self._service}' away, which this call waited for"
         self._requests.end(ServiceNotAvailableError(message))
-        self._node.system.services.remove_client(self._local)
+        self._node.system.services.remove(self._local)
         self._node.ros.destroy_client(self._client)
 
     def _unavailable(self, timeout_sec: float) -> CallError:

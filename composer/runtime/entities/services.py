@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED
 from composer.runtime.behaviours.running_calls import Owner
+from composer.runtime.messages.local_delivery import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError
@@ -30,8 +31,10 @@ class Service:
             qos_profile=create_qos_profile(spec.qos, node.system.profiles),
             callback_group=node.group(spec.group),
         )
-        name = node.ros.resolve_service_name(spec.service)
-        self._local = node.system.services.add_server(node.ros, self._ros, name)
+        key = node.ros.resolve_service_name(spec.service), self._ros.srv_type
+        self._local = node.system.services.add_server(
+            node.ros, self._ros, key, queue_depth(self._ros.qos_profile)
+        )
         self._local.allow(is_allowed=spec.local_delivery)
 
     def change(self, spec: ServiceSpec) -> None:
@@ -41,7 +44,7 @@ class Service:
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
-        self._node.system.services.remove_server(self._local)
+        self._node.system.services.remove(self._local)
         self._node.ros.destroy_service(self._ros)
 
 

@@ -16,6 +16,7 @@ import threading
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any, Final
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -87,6 +88,18 @@ class LocalPublisher:
     def outside(self) -> int:
         """How many subscriptions listen that are not the system's own."""
         return max(0, self._count() - self._size)
+
+    def delivery(self) -> tuple[str, str]:
+        """Return which way messages go now: `local` or `sent`, if anywhere; and why sent."""
+        try:
+            listening, outside = self._count(), self.outside
+        except InvalidHandle:
+            return '', ''  # It is being destroyed.
+        if not listening:
+            return '', ''
+        if self.reason or not outside:
+            return ('sent', self.reason) if self.reason else ('local', '')
+        return 'sent', f'{outside} subscription{"" if outside == 1 else "s"} outside'
 
     def connect(self, subscriptions: Iterable[LocalSubscription]) -> None:
         """Hand messages over to those of the system's subscriptions that match."""

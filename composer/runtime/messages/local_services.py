@@ -1,4 +1,4 @@
-"""Requests to services of the system are handed over, and so are the responses.
+"""Requests to services and actions of the system are handed over, and so are the responses.
 
 A call is sent as before if the client and the server would not meet, if somebody else of the
 system serves the same name, and while the client or the server is introspected: the events of
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
+from contextlib import suppress
 from sys import getrefcount
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -16,15 +17,13 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.task import Future
 
-from composer.runtime.messages.local_delivery import queue_depth, why_sent
+from composer.runtime.messages.local_delivery import why_sent
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rclpy.client import Client as RosClient
     from rclpy.qos import QoSProfile
-    from rclpy.service import Service as RosService
 
     from composer.executor import ComposerExecutor
     from composer.executor.sources.inbox import Inbox
@@ -34,34 +33,42 @@ _Key: TypeAlias = 'tuple[str, type]'
 
 
 class LocalEnd:
-    """A service or a client of the system.
+    """A server or a client of the system, of a service or an action.
 
     Args:
         node: The rclpy node that it belongs to.
-        name: Its name in the graph.
         connect: Called with the key when it may be connected otherwise.
 
     Attributes:
-        key: The name and the type.
+        ros: What rclpy has for it.
+        key: Its name in the graph, and the type.
     """
 
-    def __init__(
-        self, node: Any, ros: RosService | RosClient, name: str, connect: Callable[[_Key], None]
-    ) -> None:
+    def __init__(self, node: Any, ros: Any, key: _Key, connect: Callable[[_Key], None]) -> None:
         self.node = node
         self.ros = ros
-        self.key: _Key = (name, ros.srv_type)
+        self.key = key
         self._connect = connect
         self._is_allowed = True
         self._is_introspected = False
-        self._configure: Callable[..., None] = ros.configure_introspection
-        ros.configure_introspection = self._configure_introspection
+        # Before rclpy 9, actions have none.
+        self._configure = getattr(ros, 'configure_introspection', None)
+        if self._configure is not None:
+            ros.configure_introspection = self._configure_introspection
 
     @property
-    def is_local(self) -> bool:
-        """Whether its requests may be handed over."""
-        is_sent = self._is_introspected or bool(why_sent(self.ros.qos_profile))
-        return self._is_allowed and not is_sent
+    def profile(self) -> QoSProfile | None:
+        """The QoS; of actions, it is the same for all."""
+        return getattr(self.ros, 'qos_profile', None)
+
+    @property
+    def own_reason(self) -> str:
+        """Why its requests are sent; empty if they may be handed over."""
+        if not self._is_allowed:
+            return 'local_delivery: false'
+        if self._is_introspected:
+            return 'introspection'
+        return '' if self.profile is None else why_sent(self.profile)
 
     def allow(self, *, is_allowed: bool) -> None:
         """Let its requests be handed over, or have all of them sent."""
@@ -69,40 +76,33 @@ class LocalEnd:
         self._connect(self.key)
 
     def _configure_introspection(self, clock: Any, qos: QoSProfile, state: Any) -> None:
-        self._configure(clock, qos, state)
+        if self._configure is not None:
+            self._configure(clock, qos, state)
         self._is_introspected = state != ServiceIntrospectionState.OFF
         self._connect(self.key)
 
 
-class LocalService(LocalEnd):
-    """A service of the system.
+class LocalServer(LocalEnd):
+    """A server of the system.
 
-    Args:
-        inbox: Takes requests.
+    Attributes:
+        inbox: Takes requests: objects as `executor.open_inbox` says.
+        clients: How many clients of the system have its name and type.
     """
 
-    def __init__(
-        self,
-        node: Any,
-        ros: RosService,
-        name: str,
-        connect: Callable[[_Key], None],
-        inbox: Inbox,
-    ) -> None:
-        super().__init__(node, ros, name, connect)
-        self._inbox = inbox
-        self._requests = ownership_of(ros.srv_type.Request)
-        self._responses = ownership_of(ros.srv_type.Response)
+    inbox: Inbox
+    clients = 0
 
     def call(self, request: Any, *, is_held: bool) -> Future:
-        """Hand a request over, and return the future of its response.
+        """Hand a request to a service over, and return the future of its response.
 
         Args:
             is_held: Whether somebody else refers to the request.
         """
+        service_class = self.ros.srv_type
         future = Future()
-        taken = self._requests.take(request, is_held=is_held)
-        self._inbox.put(_Request(taken, future, self._responses.take))
+        taken = ownership_of(service_class.Request).take(request, is_held=is_held)
+        self.inbox.put(_Request(taken, future, ownership_of(service_class.Response).take))
         return future
 
 
@@ -134,71 +134,88 @@ _UNHELD: Final = _Probe().respond([None].copy())
 
 
 class LocalClient(LocalEnd):
-    """A service client of the system.
+    """A client of the system.
 
     Attributes:
         server: The server to which it hands requests; `None` if it sends them.
+        reason: Why it sends them.
     """
 
-    server: LocalService | None = None
+    server: LocalServer | None = None
+    reason = ''
+
+    def delivery(self) -> tuple[str, str]:
+        """Return which way requests go now, `local` or `sent`, and why they are sent."""
+        return ('sent', self.reason) if self.server is None else ('local', '')
 
 
 class LocalServices:
-    """The services of one system and their clients, by name in the graph and type."""
+    """The services and actions of one system and their clients."""
 
     def __init__(self, executor: ComposerExecutor) -> None:
         self._executor = executor
-        self._servers: defaultdict[_Key, list[LocalService]] = defaultdict(list)
+        self._servers: defaultdict[_Key, list[LocalServer]] = defaultdict(list)
         self._clients: defaultdict[_Key, list[LocalClient]] = defaultdict(list)
         self._lock = threading.Lock()
 
-    def add_server(self, node: Any, ros: RosService, name: str) -> LocalService:
-        """Take in a service of an rclpy node, which `allow` connects."""
-        inbox = self._executor.open_inbox(node, ros, queue_depth(ros.qos_profile))
-        server = LocalService(node, ros, name, self._connect, inbox)
+    def add_server(self, node: Any, ros: Any, key: _Key, depth: int | None) -> LocalServer:
+        """Take in a server of an rclpy node, which `allow` connects.
+
+        Args:
+            key: Its name in the graph, and the type.
+            depth: How many requests wait for it; `None` for any number.
+        """
+        server = LocalServer(node, ros, key, self._connect)
+        server.inbox = self._executor.open_inbox(node, ros, depth)
         with self._lock:
-            self._servers[server.key].append(server)
+            self._servers[key].append(server)
         return server
 
-    def add_client(self, node: Any, ros: RosClient, name: str) -> LocalClient:
-        """Take in a service client of an rclpy node, which `allow` connects."""
-        client = LocalClient(node, ros, name, self._connect)
+    def add_client(self, node: Any, ros: Any, key: _Key) -> LocalClient:
+        """Take in a client of an rclpy node, which `allow` connects."""
+        client = LocalClient(node, ros, key, self._connect)
         with self._lock:
-            self._clients[client.key].append(client)
+            self._clients[key].append(client)
         return client
 
-    def remove_server(self, server: LocalService) -> None:
-        """Forget a service."""
-        with self._lock:
-            self._servers[server.key].remove(server)
-        self._connect(server.key)
-
-    def remove_client(self, client: LocalClient) -> None:
-        """Forget a service client."""
-        with self._lock:
-            self._clients[client.key].remove(client)
+    def remove(self, end: LocalEnd) -> None:
+        """Forget a server or a client."""
+        known: Any = self._servers if isinstance(end, LocalServer) else self._clients
+        with self._lock, suppress(ValueError):
+            known[end.key].remove(end)
+        self._connect(end.key)
 
     def forget(self, node: Any) -> None:
         """Forget all that belongs to an rclpy node."""
         with self._lock:
-            gone = [each for known in self._servers.values() for each in known]
-            gone = [each for each in gone if each.node is node]
-            for clients in self._clients.values():
-                clients[:] = [each for each in clients if each.node is not node]
-        for server in gone:
-            self.remove_server(server)
+            servers = [each for known in self._servers.values() for each in known]
+            clients = [each for known in self._clients.values() for each in known]
+        for end in (*servers, *clients):
+            if end.node is node:
+                self.remove(end)
 
     def _connect(self, key: _Key) -> None:
         """Find out to which server each client of a name and a type hands its requests."""
         with self._lock:
-            servers = self._servers[key]
-            server = servers[0] if len(servers) == 1 and servers[0].is_local else None
-            for client in self._clients[key]:
-                meet = server is not None and client.is_local and _do_meet(client.ros, server.ros)
-                client.server = server if meet else None
+            servers, clients = self._servers[key], self._clients[key]
+            for server in servers:
+                server.clients = len(clients)
+            for client in clients:
+                client.reason = client.own_reason or _why_sent(client, servers)
+                client.server = None if client.reason else servers[0]
 
 
-def _do_meet(client: RosClient, server: RosService) -> bool:
-    asked, served = client.qos_profile, server.qos_profile
+def _why_sent(client: LocalClient, servers: list[LocalServer]) -> str:
+    if len(servers) != 1:
+        return 'several servers' if servers else 'its server is outside'
+    if not _do_meet(client, servers[0]):
+        return 'its QoS and that of the server do not match'
+    return servers[0].own_reason
+
+
+def _do_meet(client: LocalClient, server: LocalServer) -> bool:
+    asked, served = client.profile, server.profile
+    if asked is None or served is None:
+        return True
     checks = (qos_check_compatible(*each) for each in ((asked, served), (served, asked)))
     return all(compatibility != QoSCompatibility.ERROR for compatibility, _ in checks)

@@ -46,14 +46,14 @@ def test_nor_does_one_for_the_next_item_of_a_queue(waits):
 
 def test_a_stop_ends_waits_that_begin_at_any_moment_before_it(waits):
     """A stop between the look at it and the wait was lost."""
-    waits.stop.waking = partial(stop_first, waits.stop, waits.stop.waking)
+    waits.stop.add_callback = partial(stop_first, waits.stop, waits.stop.add_callback)
     with pytest.raises(SystemStoppingError):
         waits.until_done(Future(), None)
 
 
-def stop_first(stop, waking, wake):
+def stop_first(stop, add_callback, wake):
     stop.make()
-    return waking(wake)
+    return add_callback(wake)
 
 
 def test_one_with_an_end_does_for_what_must_be_switched_off(waits):
