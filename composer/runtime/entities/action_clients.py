@@ -88,6 +88,10 @@ class ActionClient:
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way goals go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
+
     def change(self, spec: ActionClientSpec) -> None:
         """See `LiveEntity`."""
         self._behaviours.change(spec)
