@@ -235,7 +235,8 @@ class _Behaviours:
         """Let the behaviour under a key, if there is one, be called with an item."""
         if call := self._calls.get(key):
             # Who holds the goal gets it, too.
-            self._items.append((call, ownership_of(type(item)).copy(item)))
+            message_class: type = type(item)
+            self._items.append((call, ownership_of(message_class).copy(item)))
             # A server of the same system may be faster than the end of its client.
             with suppress(AttributeError, InvalidHandle):
                 self._guard.trigger()
