@@ -15,7 +15,9 @@ _SPARE_SEC = 30.0
 
 
 def measure(side: str, size: int, seconds: float) -> dict[str, float]:
-    """Return start time (s), memory (MB) and, for `composer`, round trips/s beside `size` nodes.
+    """Return start time (s) and memory (MB) of `size` nodes; and, for `composer`, of a rally.
+
+    That is round trips/s (`rate`), and the µs that each of the two messages takes (`hop_us`).
 
     Args:
         side: `composer`, or `rclpy`: the leanest nodes that rclpy can make, created in a loop.
@@ -25,4 +27,5 @@ def measure(side: str, size: int, seconds: float) -> dict[str, float]:
             return start_figures(programs, BARE_READY)
     with composed(render_system({**idle_nodes(size), **rally(seconds)})) as program:
         figures = start_figures([program], READY)
-        return figures | printed_figures(program, seconds + _SPARE_SEC)
+        figures |= printed_figures(program, seconds + _SPARE_SEC)
+        return figures | {'hop_us': 1e6 / (2 * figures['rate'])}

@@ -162,7 +162,9 @@ class EventLoop:
             workers.hand_over(me)
         if me.session is not None and workers.is_alone():
             self._notify()  # Nobody will take over.
-        outcome = self._runner.execute(work)
+        runner = self._runner
+        is_task = type(work) is ScheduledTask
+        outcome = runner.execute_task(work) if is_task else runner.execute(work)
         now = monotonic()
         work.slow = now - me.busy_since > TAKEOVER_SEC
         me.busy_since = 0.0
@@ -217,24 +219,18 @@ class CallbackRunner:
         self._deadlines = parts.deadlines
         self._paused: set[ScheduledTask] = set()
 
-    def execute(self, work: Any) -> object:
-        """Execute a source or a task.
-
-        Returns:
-            `RAN` or `NOTHING` if the scheduler must still be told that it has ended; otherwise
-            `ENDED`, or `DEFERRED` if it has not run.
-        """
-        if type(work) is ScheduledTask:
-            self._execute_task(work)
-            return ENDED
-        return self._execute_source(work)
-
     def resume_paused(self) -> None:
         """Resume at once the tasks that await nothing known."""
         for task in tuple(self._paused):
             self._resume(task)
 
-    def _execute_source(self, source: EventSource) -> object:
+    def execute(self, source: EventSource) -> object:
+        """Execute a source.
+
+        Returns:
+            `RAN` or `NOTHING` if the scheduler must still be told that it has ended; otherwise
+            `ENDED`, or `DEFERRED` if it has not run.
+        """
         begun = suspended = False
         outcome: Any = NOTHING
         try:
@@ -310,7 +306,8 @@ class CallbackRunner:
         self._suspend(ScheduledTask(ExecutorTask(coroutine, executor=self._executor), source))
         return True
 
-    def _execute_task(self, scheduled: ScheduledTask) -> None:
+    def execute_task(self, scheduled: ScheduledTask) -> object:
+        """Execute a task; returns `ENDED`."""
         task = scheduled.task
         suspended = False
         try:
@@ -329,6 +326,7 @@ class CallbackRunner:
             elif scheduled.source is not None:
                 self._end_execution(scheduled.source)
             self._scheduler.finish(scheduled.source, suspended=suspended)
+        return ENDED
 
     def _report(self, error: BaseException) -> None:
         if self._executor.is_forked:

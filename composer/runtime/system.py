@@ -14,6 +14,7 @@ from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
+from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from composer.planning.snapshot import Snapshot
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.control.control_services import Commands
+    from composer.runtime.health.deliveries import Deliveries
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
 
@@ -280,6 +282,10 @@ class System:
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
         return list(self._nodes)
+
+    def find_deliveries(self) -> Deliveries:
+        """Return which way the messages of each publisher and the calls of each client go."""
+        return find_deliveries(list(self._nodes.values()))
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again."""

@@ -28,8 +28,10 @@ TOP: Final[Form] = {
     'entities': [
         {
             **dict.fromkeys(('node', 'kind', 'name', 'key'), str),
-            **dict.fromkeys(('mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued'), _FIGURE),
-            **dict.fromkeys(('rate_hz', 'errors', 'dropped', 'late', 'skipped'), float),
+            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued'), _FIGURE),
+            **dict.fromkeys(('errors', 'dropped', 'late', 'skipped'), float),
+            'delivery': (NoneType, str),
+            'delivery_reason': str,
         }
     ],
 }

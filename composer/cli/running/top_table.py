@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.cli.running.tables import render_table
 from composer.records import record
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -43,6 +44,11 @@ def _missed(entity: Mapping[str, Any]) -> int:
     return int(entity['late']) + int(entity['skipped'])
 
 
+def _delivery(entity: Mapping[str, Any]) -> str | None:
+    parts = filter(None, (entity['delivery'], entity['delivery_reason']))
+    return escape(', '.join(parts)) or None
+
+
 COLUMNS = (
     Column('ENTITY', _describe, str),
     Column('RATE/S', _field('rate_hz'), lambda value: f'{value:.1f}'),
@@ -54,6 +60,7 @@ COLUMNS = (
     Column('DROPPED', _field('dropped'), str),
     Column('LATE', _missed, str),
     Column('ERRORS', _field('errors'), str),
+    Column('DELIVERY', _delivery, str),
 )
 SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
@@ -82,7 +89,7 @@ def select_entities(entities: Sequence[Mapping[str, Any]], view: View) -> list[M
     shown = [each for each in entities if view.text.lower() in _describe(each).lower()]
     shown.sort(key=_describe)
     known = [each for each in shown if column.value(each) is not None]
-    is_text = column is COLUMNS[0]
+    is_text = column in (COLUMNS[0], COLUMNS[-1])
     known.sort(key=column.value, reverse=is_text == view.is_reversed)
     return known + [each for each in shown if column.value(each) is None]
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.planning.snapshot import Snapshot
+    from composer.runtime.health.deliveries import Deliveries, Delivery
     from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
     from composer.runtime.health.statistics import EntityKey, EntityReport
     from composer.runtime.health.system_state import SystemState
@@ -36,8 +37,14 @@ def status_answer(
     return _answer({**state.document(), 'nodes': list(nodes), 'health': health})
 
 
-def top_answer(state: SystemState, diagnostics: DiagnosticsPublisher | None) -> Outcome:
-    """Return the health of each entity in the last period, and have more measured in the next."""
+def top_answer(
+    state: SystemState, diagnostics: DiagnosticsPublisher | None, deliveries: Deliveries
+) -> Outcome:
+    """Return the health of each entity in the last period, and have more measured in the next.
+
+    Args:
+        deliveries: Which way publishers and clients deliver, which have no figures else.
+    """
     if diagnostics is None:
         text = "the system measures nothing: its file says 'diagnostics: false'"
         return Outcome(succeeded=False, text=text)
@@ -52,7 +59,8 @@ def top_answer(state: SystemState, diagnostics: DiagnosticsPublisher | None) -> 
             'entities': [
                 _describe_entity(key, report, has_cpu=latest.has_cpu)
                 for key, report in latest.by_entity.items()
-            ],
+            ]
+            + [_describe_delivery(key, each) for key, each in deliveries.items()],
         }
     )
 
@@ -99,6 +107,26 @@ def _describe_entity(key: EntityKey, report: EntityReport, *, has_cpu: bool) -> 
         'dropped': missed.overruns,
         'late': missed.late_ticks,
         'skipped': missed.skipped_ticks,
+        'delivery': None,
+        'delivery_reason': '',
+    }
+
+
+def _describe_delivery(key: EntityKey, delivery: Delivery) -> dict[str, Any]:
+    node, owner = key
+    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
+    none = ('calls', 'errors', 'dropped', 'late', 'skipped')
+    return {
+        'node': node,
+        'kind': owner.kind,
+        'name': owner.name,
+        'key': owner.key,
+        'level': _LEVELS[0],
+        'message': '',
+        **dict.fromkeys(unknown),
+        **dict.fromkeys(none, 0),
+        'delivery': delivery.way,
+        'delivery_reason': delivery.reason,
     }
 
 

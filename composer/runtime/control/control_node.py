@@ -171,7 +171,11 @@ class ControlNode:
             self._diagnostics.change_period(period_sec)
         elif self._node is not None:
             diagnostics = DiagnosticsPublisher(
-                self._system.state, period_sec, self._health, self._overdue_calls
+                self._system.state,
+                period_sec,
+                self._health,
+                self._overdue_calls,
+                self._system.find_deliveries,
             )
             try:
                 diagnostics.start(self._node)
@@ -205,7 +209,7 @@ class ControlNode:
         return status_answer(self._system.state, self._system.list_nodes(), self._diagnostics)
 
     def _top(self) -> Outcome:
-        return top_answer(self._system.state, self._diagnostics)
+        return top_answer(self._system.state, self._diagnostics, self._system.find_deliveries())
 
     def _give_way(self, rival: Mapping[str, Any]) -> None:
         system_logger.error(f'{self._describe_rival(rival)}; so this one ends')

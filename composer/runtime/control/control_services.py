@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.planning.snapshot import Snapshot
+    from composer.runtime.health.deliveries import Deliveries
 
 
 class ControlledSystem(Protocol):
@@ -36,6 +37,9 @@ class ControlledSystem(Protocol):
 
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
+
+    def find_deliveries(self) -> Deliveries:
+        """Return which way the messages of each publisher and the calls of each client go."""
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew."""

@@ -24,6 +24,7 @@ from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.entities.local_goals import GoalClient
+from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 from composer.terminal import EscapingLogger
@@ -87,6 +88,10 @@ class ActionClient:
         self._goals.add(goal)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         return goal
+
+    def delivery(self) -> tuple[str, str]:
+        """Return which way goals go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
 
     def change(self, spec: ActionClientSpec) -> None:
         """See `LiveEntity`."""
@@ -229,7 +234,9 @@ class _Behaviours:
     def put(self, key: str, item: Any) -> None:
         """Let the behaviour under a key, if there is one, be called with an item."""
         if call := self._calls.get(key):
-            self._items.append((call, item))
+            # Who holds the goal gets it, too.
+            message_class: type = type(item)
+            self._items.append((call, ownership_of(message_class).copy(item)))
             # A server of the same system may be faster than the end of its client.
             with suppress(AttributeError, InvalidHandle):
                 self._guard.trigger()

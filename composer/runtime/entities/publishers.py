@@ -51,6 +51,10 @@ class Publisher:
 
         self.publish: Publish = publish
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way messages go now, and why; see `LocalPublisher.delivery`."""
+        return self._local.delivery()
+
     def change(self, spec: PublisherSpec) -> None:
         """See `LiveEntity`."""
         topics = self._node.system.topics

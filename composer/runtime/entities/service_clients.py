@@ -83,6 +83,10 @@ class ServiceClient:
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way requests go now, and why; see `LocalClient.delivery`."""
+        return self._local.delivery()
+
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""
         self._local.allow(is_allowed=spec.local_delivery)

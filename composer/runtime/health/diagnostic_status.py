@@ -14,6 +14,7 @@ from composer.entity_kinds import KIND_OF_NOUN
 
 if TYPE_CHECKING:
     from composer.runtime.behaviours.running_calls import Owner
+    from composer.runtime.health.deliveries import Delivery
     from composer.runtime.health.statistics import EntityReport
     from composer.runtime.health.system_state import SystemState
 
@@ -33,8 +34,7 @@ class StatusWriter:
         kind = KIND_OF_NOUN.get(owner.kind)
         self._missed = kind.missed if kind else {}
         self._values: dict[str, KeyValue] = {}
-        task = str(owner).replace("'", '')
-        self._status = DiagnosticStatus(name=f'{node}: {task}', hardware_id=system)
+        self._status = DiagnosticStatus(name=_name(node, owner), hardware_id=system)
 
     def write(self, report: EntityReport) -> DiagnosticStatus:
         """Return the status; the message is the same one each time."""
@@ -76,6 +76,28 @@ def summarize_report(report: EntityReport) -> tuple[bytes, str]:
     if text:
         return DiagnosticStatus.WARN, text
     return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
+
+
+def delivery_status(node: str, owner: Owner, delivery: Delivery, system: str) -> DiagnosticStatus:
+    """Return the status of a publisher or a client, which has no behaviour: its way.
+
+    Args:
+        node: The full name of its node.
+        system: The system's name.
+    """
+    values = {'delivery': delivery.way, 'delivery reason': delivery.reason}
+    return DiagnosticStatus(
+        name=_name(node, owner),
+        hardware_id=system,
+        level=DiagnosticStatus.OK,
+        message=str(delivery) or 'nobody listens',
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
+def _name(node: str, owner: Owner) -> str:
+    task = str(owner).replace("'", '')
+    return f'{node}: {task}'
 
 
 def system_status(node: str, state: SystemState) -> DiagnosticStatus:

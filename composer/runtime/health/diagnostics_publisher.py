@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.runtime.behaviours.running_calls import RunningCall
+    from composer.runtime.health.deliveries import Deliveries
     from composer.runtime.health.statistics import EntityKey, EntityReport, HealthRegistry
     from composer.runtime.health.system_state import SystemState
 
@@ -49,6 +50,7 @@ class DiagnosticsPublisher:
         state: The state of the system itself.
         period_sec: Seconds between two messages.
         overdue: Returns the calls that exceed their `warn_after`, with their nodes' full names.
+        find_deliveries: Returns which way publishers and clients deliver.
 
     Attributes:
         latest: The health in the last period.
@@ -60,7 +62,9 @@ class DiagnosticsPublisher:
         period_sec: float,
         registry: HealthRegistry,
         overdue: Callable[[], Iterable[tuple[str, RunningCall]]],
+        find_deliveries: Callable[[], Deliveries],
     ) -> None:
+        self._find_deliveries = find_deliveries
         self.latest = Reports(0, has_cpu=False, by_entity={})
         self.period_sec = period_sec
         self._state = state
@@ -105,7 +109,11 @@ class DiagnosticsPublisher:
     def _run(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
 
-        from composer.runtime.health.diagnostic_status import StatusWriter, system_status
+        from composer.runtime.health.diagnostic_status import (
+            StatusWriter,
+            delivery_status,
+            system_status,
+        )
 
         writers: dict[EntityKey, StatusWriter] = {}
         begun = monotonic()
@@ -128,6 +136,10 @@ class DiagnosticsPublisher:
                 if key not in writers:
                     writers[key] = StatusWriter(*key, self._state.name)
                 statuses.append(writers[key].write(report))
+            statuses += [
+                delivery_status(*key, each, self._state.name)
+                for key, each in self._find_deliveries().items()
+            ]
             stamp = self._node.get_clock().now().to_msg()
             for start in range(0, len(statuses), _MOST_STATUSES):
                 message: Any = DiagnosticArray(status=statuses[start : start + _MOST_STATUSES])

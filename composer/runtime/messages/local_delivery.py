@@ -16,6 +16,7 @@ import threading
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any, Final
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -77,8 +78,9 @@ class LocalPublisher:
         self._send = ros.publish
         self._has_sent = False
         self._lock = threading.RLock()  # A finalizer may publish.
+        # In one variable: another thread may hand over meanwhile.
+        self._receivers: tuple[tuple[Inbox, ...], tuple[Inbox, ...]] = ((), ())
         self._inboxes: tuple[Inbox, ...] = ()
-        self._shared: tuple[Inbox, ...] = ()
         self._limited: tuple[Inbox, ...] = ()
         self._size = _NOWHERE
 
@@ -87,6 +89,18 @@ class LocalPublisher:
         """How many subscriptions listen that are not the system's own."""
         return max(0, self._count() - self._size)
 
+    def delivery(self) -> tuple[str, str]:
+        """Return which way messages go now: `local` or `sent`, if anywhere; and why sent."""
+        try:
+            listening, outside = self._count(), self.outside
+        except InvalidHandle:
+            return '', ''  # It is being destroyed.
+        if not listening:
+            return '', ''
+        if self.reason or not outside:
+            return ('sent', self.reason) if self.reason else ('local', '')
+        return 'sent', f'{outside} subscription{"" if outside == 1 else "s"} outside'
+
     def connect(self, subscriptions: Iterable[LocalSubscription]) -> None:
         """Hand messages over to those of the system's subscriptions that match."""
         profile = self.ros.qos_profile
@@ -94,8 +108,11 @@ class LocalPublisher:
         # Nothing is handed over meanwhile: the middleware never counts so few.
         self._size = _NOWHERE
         inboxes = [(each, each.inbox) for each in matched if each.inbox is not None]
-        self._inboxes = tuple(inbox for each, inbox in inboxes if not each.read_only)
-        self._shared = tuple(inbox for each, inbox in inboxes if each.read_only)
+        self._receivers = (
+            tuple(inbox for each, inbox in inboxes if not each.read_only),
+            tuple(inbox for each, inbox in inboxes if each.read_only),
+        )
+        self._inboxes = tuple(inbox for _, inbox in inboxes)
         self._limited = tuple(inbox for _, inbox in inboxes if inbox.depth is None)
         turned_off = '' if self.is_local else 'local_delivery: false'
         reasons = [turned_off, self._own_reason, *(each.reason for each in matched)]
@@ -112,7 +129,12 @@ class LocalPublisher:
         """
         if self.reason:
             self._send(message)
-        elif self._has_sent or self._count() != self._size or (self._limited and self._is_full()):
+        elif (
+            self._has_sent
+            or self._count() != self._size
+            or (self._limited and self._is_full())
+            or (self._returns and self._is_behind())
+        ):
             self._send_or_return(message, is_held=is_held)
         else:
             self._hand_over(message, is_held=is_held)
@@ -121,22 +143,36 @@ class LocalPublisher:
         """Tell whether the middleware must hold back who publishes."""
         return any(len(inbox.messages) >= _MOST_KEPT for inbox in self._limited)
 
+    def _is_behind(self) -> bool:
+        """Tell whether messages of others may wait in the middleware.
+
+        Those are older: if the queue is full, they must be dropped first.
+        """
+        for inbox in self._inboxes:
+            source = inbox.source
+            if source is not None and source.pending:
+                return True
+        return False
+
     def _send_or_return(self, message: Any, *, is_held: bool) -> None:
         with self._lock:
-            self._has_sent = self._has_sent and not self._may_return()
-            if self._has_sent or self._count() != self._size or self._is_full():
-                self._has_sent = True
+            self._has_sent = (
+                (self._has_sent and not self._returns)
+                or self._count() != self._size
+                or self._is_full()
+                or (self._returns and not self._is_drained())
+            )
+            if self._has_sent:
                 self._send(message)
                 return
         self._hand_over(message, is_held=is_held)
 
-    def _may_return(self) -> bool:
+    def _is_drained(self) -> bool:
         """Tell whether all that was sent has been taken."""
-        inboxes = self._inboxes + self._shared
-        return self._returns and all(inbox.is_drained() for inbox in inboxes)
+        return all(inbox.is_drained() for inbox in self._inboxes)
 
     def _hand_over(self, message: Any, *, is_held: bool) -> None:
-        inboxes, shared = self._inboxes, self._shared
+        inboxes, shared = self._receivers
         if not inboxes and not shared:
             return
         ownership = self._ownership

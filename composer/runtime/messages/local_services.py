@@ -62,10 +62,13 @@ class LocalEnd:
         return getattr(self.ros, 'qos_profile', None)
 
     @property
-    def is_local(self) -> bool:
-        """Whether its requests may be handed over."""
-        reason = '' if self.profile is None else why_sent(self.profile)
-        return self._is_allowed and not self._is_introspected and not reason
+    def own_reason(self) -> str:
+        """Why its requests are sent; empty if they may be handed over."""
+        if not self._is_allowed:
+            return 'local_delivery: false'
+        if self._is_introspected:
+            return 'introspection'
+        return '' if self.profile is None else why_sent(self.profile)
 
     def allow(self, *, is_allowed: bool) -> None:
         """Let its requests be handed over, or have all of them sent."""
@@ -135,9 +138,15 @@ class LocalClient(LocalEnd):
 
     Attributes:
         server: The server to which it hands requests; `None` if it sends them.
+        reason: Why it sends them.
     """
 
     server: LocalServer | None = None
+    reason = ''
+
+    def delivery(self) -> tuple[str, str]:
+        """Return which way requests go now, `local` or `sent`, and why they are sent."""
+        return ('sent', self.reason) if self.server is None else ('local', '')
 
 
 class LocalServices:
@@ -191,10 +200,17 @@ class LocalServices:
             servers, clients = self._servers[key], self._clients[key]
             for server in servers:
                 server.clients = len(clients)
-            only = servers[0] if len(servers) == 1 and servers[0].is_local else None
             for client in clients:
-                meet = only is not None and client.is_local and _do_meet(client, only)
-                client.server = only if meet else None
+                client.reason = client.own_reason or _why_sent(client, servers)
+                client.server = None if client.reason else servers[0]
+
+
+def _why_sent(client: LocalClient, servers: list[LocalServer]) -> str:
+    if len(servers) != 1:
+        return 'several servers' if servers else 'its server is outside'
+    if not _do_meet(client, servers[0]):
+        return 'its QoS and that of the server do not match'
+    return servers[0].own_reason
 
 
 def _do_meet(client: LocalClient, server: LocalServer) -> bool:

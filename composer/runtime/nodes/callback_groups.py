@@ -110,6 +110,22 @@ class _GatedGroup(_TidyGroup):
 class GatedMutuallyExclusiveGroup(_GatedGroup, MutuallyExclusiveCallbackGroup):
     """One callback at a time, and none while the gate is closed."""
 
+    _active_entity: Any
+
+    # These are called for each message, and the lock of the base class is not needed: CPython
+    # switches threads only at calls and jumps back.
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """See the base class."""
+        if not self._gate.allows(entity) or self._active_entity is not None:
+            return False
+        self._active_entity = entity
+        return True
+
+    def ending_execution(self, _entity: Any) -> None:
+        """See the base class."""
+        self._active_entity = None
+
 
 class GatedReentrantGroup(_GatedGroup, ReentrantCallbackGroup):
     """Any number of callbacks at a time, and none while the gate is closed."""

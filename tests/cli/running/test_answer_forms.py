@@ -36,6 +36,8 @@ ENTITY = {
     'dropped': 0,
     'late': 0,
     'skipped': 0,
+    'delivery': None,
+    'delivery_reason': '',
 }
 TOP_ANSWER = {'version': 1, 'period_sec': 1, 'has_cpu': False, 'entities': [ENTITY]}
 # What stands in place of a value, as JSON.

@@ -46,7 +46,9 @@ def hear(node, message):
 def entity(node, name, **figures):
     known = dict.fromkeys(('mean_ms', 'p99_ms', 'max_ms', 'cpu'))
     counts = dict.fromkeys(('rate_hz', 'queued', 'dropped', 'late', 'skipped', 'errors'), 0)
-    return {'node': node, 'kind': 'timer', 'name': name, 'key': '', **known, **counts, **figures}
+    way = {'delivery': None, 'delivery_reason': ''}
+    owner = {'node': node, 'kind': 'timer', 'name': name, 'key': ''}
+    return {**owner, **known, **counts, **way, **figures}
 
 
 ENTITIES = [
@@ -74,10 +76,10 @@ def test_entities_are_sorted_and_filtered(view, names):
 
 def test_figures_stand_to_the_right():
     assert '\n'.join(render_entities(ENTITIES)) == (
-        'ENTITY          RATE/S  MEAN MS  P99 MS  MAX MS    CPU  QUEUE  DROPPED  LATE  ERRORS\n'
-        '/b: timer slow     0.0   20.000  21.000  22.500   1.0%      0        0     3       0\n'
-        '/a: timer fast  1000.0        -       -       -  50.0%      0        0     0       7\n'
-        '/a: timer new      0.0        -       -       -      -      0        0     0       0'
+        'ENTITY          RATE/S  MEAN MS  P99 MS  MAX MS    CPU  QUEUE  DROPPED  LATE  ERRORS  DELIVERY\n'
+        '/b: timer slow     0.0   20.000  21.000  22.500   1.0%      0        0     3       0         -\n'
+        '/a: timer fast  1000.0        -       -       -  50.0%      0        0     0       7         -\n'
+        '/a: timer new      0.0        -       -       -      -      0        0     0       0         -'
     )
 
 

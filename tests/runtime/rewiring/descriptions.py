@@ -106,7 +106,7 @@ def describe_entity(node, section, name, entity):
         described['type'] = f'{ros.msg_type.__module__} {ros.msg_type.__name__}'
     elif section in ('services', 'service_clients'):
         described['qos'] = describe_qos(ros.qos_profile)
-        described['name'] = ros.srv_name
+        described['name'] = ros.service_name
         described['type'] = ros.srv_type.__name__
     elif section == 'timers':
         described['period'] = ros.timer_period_ns
