@@ -25,6 +25,10 @@ The way of a message:
 6. If the callback awaits something, the rest of it comes back through the scheduler as a task
    (`tasks`).
 
+What is handed over within the process (`inbox`) begins at step 3. While something is ready, or
+comes, the leader stays at steps 2 to 5, for half a millisecond at a time; then it looks at all
+else, such as a stop. Events are put down without a lock (`Scheduler.add_events`).
+
 Beside that way: `deadlines` makes timers ready, `qos_events` QoS events, `wait_set_thread` all
 else that is not announced, and `entity_registry` keeps the sources in step with the entities of
 the nodes. `spinner` puts these parts together for `composer_executor`, whose methods are rclpy's.

@@ -74,8 +74,8 @@ class Requests:
             if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
                 raise self.unanswered(timeout_sec or 0.0, begun)
         finally:
+            self.waiting.discard(future)
             if not future.done():
-                self.waiting.discard(future)
                 self.forget(future)
         return future.result()
 
@@ -90,11 +90,11 @@ class Requests:
             raise self.unavailable(timeout_sec or 0.0)
         future = self._begin(send)
         try:
-            if not await self.waits.until_done_async(future, _remaining(timeout_sec, begun)):
+            if not await self.waits.until_answered_async(future, _remaining(timeout_sec, begun)):
                 raise self.unanswered(timeout_sec or 0.0, begun)
         finally:
+            self.waiting.discard(future)
             if not future.done():
-                self.waiting.discard(future)
                 self.forget(future)
         return future.result()
 
@@ -115,7 +115,6 @@ class Requests:
             raise
         self._raise_end()
         self.waiting.add(future)
-        future.add_done_callback(self.waiting.discard)
         if self.ended and not future.done():
             future.set_exception(self.ended[0])
         return future

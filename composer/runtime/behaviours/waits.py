@@ -125,6 +125,30 @@ class Waits:
                 await self._with_timeout(timeout_sec, wake, first)
         return self._finish(future, wake, is_ended=is_ended())
 
+    async def until_answered_async(self, future: Future, timeout_sec: float | None) -> bool:
+        """As `until_done_async`, for a future that nobody else waits for: one in vain cancels it.
+
+        Every call of a service waits here, so it does with that one future.
+        """
+        if future.done():
+            return True
+        cancel = future.cancel
+        is_before_stop = self.stop.add_callback(cancel)
+        ends = is_before_stop or (timeout_sec is None and not self._may_wait_at_stop)
+        timeout = None
+        try:
+            if not (ends and self.stop.is_set):
+                if timeout_sec is not None:
+                    timeout = self._executor.call_later(timeout_sec, cancel)
+                await future
+        finally:
+            if timeout is not None:
+                timeout.cancel()
+            self.stop.remove_callback(cancel)
+        if not future.done() and ends and self.stop.is_set:
+            raise stopping_error()
+        return bool(future.done())
+
     def until_next(self, items: SimpleQueue[Any]) -> Any:
         """Wait without a limit for the next item of a queue, and return it.
 

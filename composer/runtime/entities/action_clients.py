@@ -24,6 +24,7 @@ from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.entities.local_goals import GoalClient
+from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
 from composer.terminal import EscapingLogger
@@ -233,7 +234,9 @@ class _Behaviours:
     def put(self, key: str, item: Any) -> None:
         """Let the behaviour under a key, if there is one, be called with an item."""
         if call := self._calls.get(key):
-            self._items.append((call, item))
+            # Who holds the goal gets it, too.
+            message_class: type = type(item)
+            self._items.append((call, ownership_of(message_class).copy(item)))
             # A server of the same system may be faster than the end of its client.
             with suppress(AttributeError, InvalidHandle):
                 self._guard.trigger()

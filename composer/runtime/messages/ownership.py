@@ -12,6 +12,7 @@ from array import array
 from functools import cache
 from sys import getrefcount
 from typing import TYPE_CHECKING, Any, Final
+from weakref import getweakrefcount
 
 from composer.interfaces.class_fields import describe_class
 from composer.interfaces.classes import import_interface
@@ -172,10 +173,16 @@ def _mover_for(field_type: FieldType) -> Callable[[Any], Any] | None:
 
 
 def _is_of_another(values: Any) -> bool:
-    """Tell whether it is a NumPy array of another's memory, or one that subscriptions share."""
-    if type(values) is list or type(values) is array:
+    """Tell whether somebody may change it without a reference to it.
+
+    That is by a weak reference, or in a NumPy array of another's memory. One that subscriptions
+    share is write-protected.
+    """
+    if type(values) is list:
         return False
-    return values.base is not None or not values.flags.writeable
+    if type(values) is not array and (values.base is not None or not values.flags.writeable):
+        return True
+    return getweakrefcount(values) > 0
 
 
 def _item_mover(field_type: FieldType) -> Callable[[Any], Any] | None:

@@ -3,6 +3,7 @@
 import struct
 from array import array
 from sys import getrefcount
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -189,6 +190,15 @@ def test_an_array_array_with_a_view_is_copied():
     taken = ownership_of(JointState).take(message, is_held=False)
     taken.position[0] = 5.0
     assert view[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ('message', 'name'), [(PoseWithCovariance(), 'covariance'), (JointState(), 'position')]
+)
+def test_an_array_with_a_weak_reference_is_copied(message, name):
+    weak = ref(getattr(message, name))
+    taken = ownership_of(type(message)).take(message, is_held=False)
+    assert weak() is not getattr(taken, name)
 
 
 def changeable(value, path=''):
