@@ -241,15 +241,22 @@ class Peer:
     def call_all(self, service_class, names, /, **fields):
         """Call several services at the same time and return their responses."""
         clients = [self.run(self.node.create_client, service_class, name) for name in names]
+        responses = self.call_by(clients, service_class.Request(**fields))
+        for client in clients:
+            self.run(self.node.destroy_client, client)
+        return responses
+
+    def call_by(self, clients, request):
+        """Call services by clients that are there, at the same time; return their responses."""
         for client in clients:
             assert client.wait_for_service(DEADLINE_SEC), f'there is no {client.srv_name}'
-        request = service_class.Request(**fields)
         calls = [client.call_async(request) for client in clients]
         sent = time.monotonic()
 
         def all_done():
             nonlocal sent
-            # A server that has not found the client's end yet answers into the void.
+            # A server that has not found the client's end yet answers into the void, and one that
+            # is built anew may not have been found by the client itself.
             if time.monotonic() > sent + PATIENCE_SEC:
                 sent = time.monotonic()
                 for index, client in enumerate(clients):
@@ -257,9 +264,7 @@ class Peer:
                         calls[index] = client.call_async(request)
             return all(call.done() for call in calls)
 
-        wait_for(all_done, f'the responses of {names}')
-        for client in clients:
-            self.run(self.node.destroy_client, client)
+        wait_for(all_done, f'the responses of {[client.srv_name for client in clients]}')
         return [call.result() for call in calls]
 
     def meet_action_server(self, name):

@@ -149,7 +149,8 @@ def test_an_editor_composer_and_the_compiled_schema_have_the_same_verdict():
         verdicts.append(check_agreement(data))
 
     agree()
-    assert 10 < sum(verdicts) < len(verdicts) - 10
+    # One in ten is right. Which ones are tried depends on the modules that are imported by then.
+    assert 2 < sum(verdicts) < len(verdicts) - 10
 
 
 def problem_of(error):

@@ -16,6 +16,7 @@ import threading
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any, Final
 
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import (
     DurabilityPolicy,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 _LONGEST_NS: Final = 2**62
 # What Fast DDS keeps for a subscription whose history is `keep_all`.
 _MOST_KEPT: Final = 5000
+_AT_ONCE: Final = Duration(nanoseconds=0)
 _SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
 # Each names a file that may change how Fast DDS delivers.
 _PROFILE_VARIABLES: Final = (
@@ -168,8 +170,13 @@ class LocalPublisher:
         self._hand_over(message, is_held=is_held)
 
     def _is_drained(self) -> bool:
-        """Tell whether all that was sent has been taken."""
-        return all(inbox.is_drained() for inbox in self._inboxes)
+        """Tell whether all that was sent has been taken.
+
+        A subscription that is just created may get some of it again: it did not know the publisher
+        yet.
+        """
+        is_known = self.ros.wait_for_all_acked(_AT_ONCE)
+        return is_known and all(inbox.is_drained() for inbox in self._inboxes)
 
     def _hand_over(self, message: Any, *, is_held: bool) -> None:
         inboxes, shared = self._receivers
