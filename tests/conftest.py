@@ -25,6 +25,13 @@ settings.load_profile('steady')
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_terminal_summary(terminalreporter):
+    """Show why tests failed that were run once more, whatever came of that."""
+    for report in terminalreporter.stats.get('rerun', ()):
+        terminalreporter.section(f'first run of {report.nodeid}')
+        terminalreporter.line(report.longreprtext)
+
+
 @pytest.fixture(name='wait_for')
 def wait_for_fixture():
     return wait_for

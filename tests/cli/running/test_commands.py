@@ -109,10 +109,13 @@ def test_what_cannot_be_asked_is_told(composer, domain_id, name):
 
 
 def test_several_systems_are_told_apart(compose, composer):
+    systems = []
     for name in ('first', 'second', 'third'):
         text = SYSTEM.replace('arm:', f'arm_{name}:').replace('stuck:', f'stuck_{name}:')
         words = ['--no-control'] if name == 'third' else []
-        compose.run(compose.write(text, CODE, name).name, *words).wait_until_ready()
+        systems.append(compose.run(compose.write(text, CODE, name).name, *words))
+    for system in systems:
+        system.wait_until_ready()
     code, _, errors = composer('reload')
     assert code == 2
     assert errors.endswith('name one of them: first, second\n')
@@ -144,7 +147,7 @@ def test_a_behaviour_that_hangs_stops_no_answer(compose, composer, peer, wait_fo
     assert errors == "system: node 'stuck' hangs, and is left as it is: subscription 'trigger'\n"
 
 
-def test_a_system_that_cannot_answer_is_told_of(compose, composer, monkeypatch):
+def test_a_system_that_cannot_answer_is_told_of(compose, composer):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
     os.kill(child.pid, signal.SIGSTOP)

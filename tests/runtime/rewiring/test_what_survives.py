@@ -16,6 +16,8 @@ pytestmark = pytest.mark.ros
 
 SYSTEM = """\
 version: 1
+# New code of what waits for a response waits for it as long.
+executor: {shutdown_timeout: 1}
 nodes:
   clock:
     state: {steps: [], once: 0}
