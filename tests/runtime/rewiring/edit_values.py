@@ -21,7 +21,11 @@ _QOS = [None, 5, 'near', 'sensor_data', 'nearest', {'depth': 7}, {'dept': 1}]
 _TRIGGERS = ['std_srvs/srv/Trigger', 'std_srvs/srv/Empty', 'std_srvs/srv/Trager']
 _ACTIONS = ['test_msgs/action/Fibonacci', 'test_msgs/action/NestedMessage', 'a/action/B']
 _HEARING = ['parts:hear', 'parts:hear_later', 'peer:hear', 'parts:nothing', 'parts.hear', None]
-_CONDITION = [{'node': 'listener'}, {'service': '/ask', 'timeout': 9.0}, {'process': 'sleeper'}]
+_CONDITION = [
+    {'node': 'listener', 'timeout': 4.0},
+    {'service': '/ask', 'timeout': 4.5},
+    {'process': 'sleeper'},
+]
 _WAIT_FOR = [*_CONDITION, _CONDITION, {'topic': '/nowhere', 'timeout': 0.1}, [], None]
 _FILES = [['parameters.yaml'], ['parameters.yaml', 'others.yaml'], ['absent.yaml'], None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
