@@ -117,7 +117,7 @@ def test_the_drawing_and_a_running_publisher_agree():
     from composer.drawing import delivery
     from composer.language.parsing.entry_parser import parse_entity_qos
     from composer.language.qos import resolve_qos
-    from composer.runtime.messages import local_delivery
+    from composer.runtime.messages import delivery_policies
     from composer.runtime.messages.qos_profiles import create_qos_profile
 
     policies = [
@@ -132,5 +132,5 @@ def test_the_drawing_and_a_running_publisher_agree():
     ]
     for each in policies:
         spec = parse_entity_qos({'qos': each}, ())
-        running = local_delivery.why_sent(create_qos_profile(spec, {}))
+        running = delivery_policies.why_sent(create_qos_profile(spec, {}))
         assert delivery.why_sent(resolve_qos(spec, {})) == running, each

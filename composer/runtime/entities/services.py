@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED
 from composer.runtime.behaviours.running_calls import Owner
-from composer.runtime.messages.local_delivery import queue_depth
+from composer.runtime.messages.delivery_policies import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.system_executor import NoResponseError

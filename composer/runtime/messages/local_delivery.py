@@ -18,40 +18,28 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSCompatibility,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from composer.runtime.messages.delivery_policies import (
+    are_compatible,
+    may_be_late,
+    queue_depth,
+    why_sent,
+)
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
 
     from rclpy.publisher import Publisher as RosPublisher
-    from rclpy.qos import QoSProfile
     from rclpy.subscription import Subscription as RosSubscription
 
     from composer.executor import ComposerExecutor
     from composer.executor.sources.inbox import Inbox
 
-# Longer durations are no limit.
-_LONGEST_NS: Final = 2**62
 # What Fast DDS keeps for a subscription whose history is `keep_all`.
 _MOST_KEPT: Final = 5000
 _AT_ONCE: Final = Duration(nanoseconds=0)
-_SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
-# Each names a file that may change how Fast DDS delivers.
-_PROFILE_VARIABLES: Final = (
-    'FASTDDS_DEFAULT_PROFILES_FILE',
-    'FASTRTPS_DEFAULT_PROFILES_FILE',
-    'RMW_FASTRTPS_USE_QOS_FROM_XML',
-)
 _NOWHERE: Final = -1
 
 
@@ -106,7 +94,7 @@ class LocalPublisher:
     def connect(self, subscriptions: Iterable[LocalSubscription]) -> None:
         """Hand messages over to those of the system's subscriptions that match."""
         profile = self.ros.qos_profile
-        matched = [each for each in subscriptions if _are_compatible(profile, each.ros)]
+        matched = [each for each in subscriptions if are_compatible(profile, each.ros.qos_profile)]
         # Nothing is handed over meanwhile: the middleware never counts so few.
         self._size = _NOWHERE
         inboxes = [(each, each.inbox) for each in matched if each.inbox is not None]
@@ -291,42 +279,3 @@ class LocalTopics:
 
     def _topic(self, ros: RosPublisher | RosSubscription) -> _Topic:
         return self._topics[ros.topic_name, ros.msg_type]
-
-
-def why_sent(profile: QoSProfile) -> str:
-    """Return which policy only the middleware keeps; empty if there is none."""
-    kept: dict[str, tuple[Any, ...]] = {
-        'durability': (DurabilityPolicy.VOLATILE,),
-        'history': (HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL),
-        'reliability': (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT),
-        'liveliness': (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.SYSTEM_DEFAULT),
-    }
-    for name, policies in kept.items():
-        policy = getattr(profile, name)
-        if policy not in policies:
-            return f'{name}: {policy.name.lower()}'
-    for name in ('deadline', 'lifespan'):
-        if 0 < getattr(profile, name).nanoseconds < _LONGEST_NS:
-            return name
-    return ''
-
-
-def may_be_late(middleware: str, environment: Mapping[str, str]) -> bool:
-    """Tell whether a message may be on its way when `publish` has returned."""
-    return (
-        middleware != 'rmw_fastrtps_cpp'
-        or environment.get('RMW_FASTRTPS_PUBLICATION_MODE', '') not in _SYNCHRONOUS
-        or any(environment.get(name) for name in _PROFILE_VARIABLES)
-    )
-
-
-def queue_depth(profile: QoSProfile) -> int | None:
-    """Return how many messages a queue holds; `None` for any number."""
-    depth: int = profile.depth
-    # Where the depth is 0, Fast DDS keeps one.
-    return max(depth, 1) if profile.history == HistoryPolicy.KEEP_LAST else None
-
-
-def _are_compatible(offered: QoSProfile, subscription: RosSubscription) -> bool:
-    compatibility, _ = qos_check_compatible(offered, subscription.qos_profile)
-    return bool(compatibility != QoSCompatibility.ERROR)

@@ -13,11 +13,10 @@ from contextlib import suppress
 from sys import getrefcount
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.task import Future
 
-from composer.runtime.messages.local_delivery import why_sent
+from composer.runtime.messages.delivery_policies import are_compatible, why_sent
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
@@ -217,5 +216,4 @@ def _do_meet(client: LocalClient, server: LocalServer) -> bool:
     asked, served = client.profile, server.profile
     if asked is None or served is None:
         return True
-    checks = (qos_check_compatible(*each) for each in ((asked, served), (served, asked)))
-    return all(compatibility != QoSCompatibility.ERROR for compatibility, _ in checks)
+    return are_compatible(asked, served) and are_compatible(served, asked)

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.language.specs import QosSpec
-from composer.runtime.messages.local_delivery import why_sent
+from composer.runtime.messages.delivery_policies import why_sent
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from tests.runtime.messages.outsider import Outsider
 from tests.runtime.messages.player import play

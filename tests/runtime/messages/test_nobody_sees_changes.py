@@ -36,8 +36,7 @@ def create_node(name, message_class, audience):
     return {'publishers': publishers, 'subscriptions': subscriptions}
 
 
-@pytest.mark.parametrize('local_delivery', [True, False], ids=['handed over', 'sent'])
-def test_nobody_sees_the_changes_of_others(compose, local_delivery):
+def test_nobody_sees_the_changes_of_others(compose):
     nodes = {
         f'{name}_{number}': create_node(name, message_class, audience)
         for name, message_class in CASES.items()
@@ -47,7 +46,7 @@ def test_nobody_sees_the_changes_of_others(compose, local_delivery):
         'publishers': {'go': 'std_msgs/msg/Float64'},
         'timers': {'conduct': {'rate': 100, 'behaviour': 'parts:conduct', 'publish': 'go'}},
     }
-    defaults = {'local_delivery': local_delivery, 'parameter_services': False, 'rosout': False}
+    defaults = {'parameter_services': False, 'rosout': False}
     system = {'version': 1, 'defaults': defaults, 'nodes': nodes}
     code = Path(mutating_behaviours.__file__).read_text()
 

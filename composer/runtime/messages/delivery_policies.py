@@ -1,0 +1,69 @@
+"""Which QoS can be kept without the middleware, and what the middleware itself may do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSCompatibility,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rclpy.qos import QoSProfile
+
+# Longer durations are no limit.
+_LONGEST_NS: Final = 2**62
+_SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
+# Each names a file that may change how Fast DDS delivers.
+_PROFILE_VARIABLES: Final = (
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_USE_QOS_FROM_XML',
+)
+
+
+def why_sent(profile: QoSProfile) -> str:
+    """Return which policy only the middleware keeps; empty if there is none."""
+    kept: dict[str, tuple[Any, ...]] = {
+        'durability': (DurabilityPolicy.VOLATILE,),
+        'history': (HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL),
+        'reliability': (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT),
+        'liveliness': (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.SYSTEM_DEFAULT),
+    }
+    for name, policies in kept.items():
+        policy = getattr(profile, name)
+        if policy not in policies:
+            return f'{name}: {policy.name.lower()}'
+    for name in ('deadline', 'lifespan'):
+        if 0 < getattr(profile, name).nanoseconds < _LONGEST_NS:
+            return name
+    return ''
+
+
+def may_be_late(middleware: str, environment: Mapping[str, str]) -> bool:
+    """Tell whether a message may be on its way when `publish` has returned."""
+    return (
+        middleware != 'rmw_fastrtps_cpp'
+        or environment.get('RMW_FASTRTPS_PUBLICATION_MODE', '') not in _SYNCHRONOUS
+        or any(environment.get(name) for name in _PROFILE_VARIABLES)
+    )
+
+
+def queue_depth(profile: QoSProfile) -> int | None:
+    """Return how many messages a queue holds; `None` for any number."""
+    depth: int = profile.depth
+    # Where the depth is 0, Fast DDS keeps one.
+    return max(depth, 1) if profile.history == HistoryPolicy.KEEP_LAST else None
+
+
+def are_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
+    """Tell whether ends of these QoS meet."""
+    compatibility, _ = qos_check_compatible(offered, requested)
+    return bool(compatibility != QoSCompatibility.ERROR)
