@@ -245,17 +245,18 @@ def check_stay(heard, *, is_whole):
     Args:
         is_whole: Whether it gets every message from its first on.
     """
-    offsets, last = {}, {}
+    offsets, first, last = {}, {}, {}
     for text, sequence_number in heard:
         publisher, number = text.split(':')
         number = int(number)
-        told = publisher, last.get(publisher), text, sequence_number
+        told = publisher, first.get(publisher), last.get(publisher), text, sequence_number
         # The publisher counts what it sends: that was every message.
         assert (
             offsets.setdefault(publisher, number - sequence_number) == number - sequence_number
         ), told
         before = last.get(publisher, 0 if not is_whole else number - 1)
         assert number == before + 1 if is_whole else number > before, told
+        first.setdefault(publisher, number)
         last[publisher] = number
     return len(heard)
 
