@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.specs import (
     DEFAULT_RESTART_DELAY_SEC,
     DEFAULT_WAIT_SEC,
@@ -80,6 +81,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
     """Return a process."""
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
+    nodes, declares_all_ends = parse_declared_nodes(name, data, path)
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
@@ -89,7 +91,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         arguments=tuple(map(format_scalar, data.get('arguments', ()))),
         node_name=data.get('name'),
         namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
-        parameters=MappingProxyType(data.get('parameters', {})),
+        parameters=MappingProxyType(given_values(data.get('parameters', {}))),
         parameter_files=tuple(data.get('parameter_files', ())),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
@@ -104,6 +106,8 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         stop_signal=stop.get('signal', 'SIGINT'),
         stop_timeout_sec=float(stop['timeout']) if 'timeout' in stop else None,
         wait_for=parse_conditions(data, path),
+        nodes=nodes,
+        declares_all_ends=declares_all_ends,
         path=path,
     )
 
