@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
-from composer.expressions import SECTIONS
+from composer.entity_kinds import KIND_OF_SECTION
+from composer.expressions import SECTIONS, has_conditions
 from composer.language.arguments import (
     find_declaration_errors,
     parse_declarations,
@@ -69,12 +70,14 @@ def _has_expressions(positions: SourceMap) -> bool:
 
 
 def _has_conditions(data: Mapping[str, Any]) -> bool:
-    sections = (data.get(section) for section in SECTIONS)
+    if any(has_conditions(data.get(section)) for section in SECTIONS):
+        return True
+    nodes = data.get('nodes')
     return any(
-        isinstance(entry, dict) and ('foreach' in entry or 'when' in entry)
-        for section in sections
-        if isinstance(section, dict)
-        for entry in section.values()
+        key in KIND_OF_SECTION and has_conditions(section)
+        for node in (nodes.values() if isinstance(nodes, dict) else ())
+        if isinstance(node, dict)
+        for key, section in node.items()
     )
 
 

@@ -31,6 +31,8 @@ RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_WAIT_SEC = 30.0
 DEFAULT_RESTART_DELAY_SEC = 1.0
+# `ros2 launch` gives its processes 5 s after SIGINT, and 5 s after SIGTERM, until it kills them.
+DEFAULT_LAUNCH_STOP_SEC = 15.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
@@ -313,7 +315,8 @@ class ProcessSpec:
 
     Attributes:
         command: The program and its arguments; empty if it is an executable of a package.
-        arguments: Those of the executable.
+        launch: The launch file that it runs, if it does: absolute, or `package://name/path`.
+        arguments: Those of the executable; `name:=value` for a launch file.
         node_name: The name of the node in it; `None` for the one that the program gives itself.
         namespace: The namespace of the nodes in it; `None` if the program has none.
         nodes: The nodes in it that the file names or declares.
@@ -331,6 +334,7 @@ class ProcessSpec:
     command: tuple[str, ...]
     package: str | None
     executable: str | None
+    launch: str | None
     arguments: tuple[str, ...]
     node_name: str | None
     namespace: str | None

@@ -94,7 +94,8 @@ _PROCESSES = _Rules(
     'the running process',
     dict.fromkeys(
         (
-            *('command', 'package', 'executable', 'arguments', 'name', 'namespace'),
+            *('command', 'package', 'executable', 'launch', 'arguments'),
+            *('name', 'namespace'),
             *('parameters', 'parameter_files', 'remap', 'log_level', 'env', 'cwd'),
         ),
         'a process takes this when it starts',

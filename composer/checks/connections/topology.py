@@ -16,7 +16,7 @@ from composer.names import expand_name, find_namespace_problem, find_topic_name_
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import (
@@ -146,7 +146,7 @@ class Topology:
         ros_services: The services that ROS itself gives to the nodes: their types by full names.
         possible: Ends that channels may have as well: their names depend on an argument that is
             not given yet, or they are missing or misnamed because of another error.
-        left_out: The channels of nodes that are left out by their `when`.
+        left_out: The channels of nodes and entities that are left out by their `when`.
     """
 
     channels: dict[tuple[ChannelKind, str], Channel]
@@ -197,7 +197,7 @@ def build_topology(
     uncertain = _UncertainNames(system, spec)
     channels: dict[tuple[ChannelKind, str], Channel] = {}
     possible: set[PossibleEnd] = set(uncertain.missing)
-    for node, kind, channel_kind, entity in _ends(spec):
+    for node, kind, channel_kind, entity in _ends(spec.end_owners()):
         name = written_name(entity, kind)
         if uncertain.has(node, entity.path, channel_kind, name):
             possible.add((channel_kind, kind.provides, None))
@@ -210,19 +210,22 @@ def build_topology(
         ends = channel.providers if kind.provides else channel.users
         ends.append(Endpoint(node, entity, kind))
     services = dict(each for node in spec.nodes.values() for each in _services_of_ros(node))
+    unused = system.unused.end_owners() if system.unused else ()
+    used = {node.path: node for node in spec.nodes.values()}
     left_out = (
         (channel_kind, full_name(node, channel_kind, written_name(entity, kind)))
-        for node, kind, channel_kind, entity in (_ends(system.unused) if system.unused else ())
+        for node, kind, channel_kind, entity in _ends(unused)
+        if node.path not in used or entity.name not in getattr(used[node.path], kind.section)
     )
     return Topology(channels, services, frozenset(possible), frozenset(left_out))
 
 
 def _ends(
-    spec: SystemSpec,
+    nodes: Iterable[NodeSpec | DeclaredNodeSpec],
 ) -> Iterator[
     tuple[NodeSpec | DeclaredNodeSpec, EntityKind, ChannelKind, EndSpec | DeclaredEndSpec]
 ]:
-    for node in spec.end_owners():
+    for node in nodes:
         for kind, entity in node.ends():
             if kind.channel:
                 yield node, kind, kind.channel, entity

@@ -135,6 +135,9 @@ class IncludeMerger:
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         whole.chains[new] = (*part.chains.get(old, ()), inclusion.entry.here)
         self._leave_out(new, is_left_out=old in part.left_out)
+        whole.left_out |= {
+            (*new, *path[2:]) for path in part.left_out if len(path) > len(old) and path[:2] == old
+        }
 
     def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
         if is_left_out:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.specs import (
+    DEFAULT_LAUNCH_STOP_SEC,
     DEFAULT_RESTART_DELAY_SEC,
     DEFAULT_WAIT_SEC,
     ConditionSpec,
@@ -16,7 +17,7 @@ from composer.names import expand_namespace
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from composer.language.specs import ConditionKind
     from composer.yaml_text.positions import DataPath
@@ -88,7 +89,8 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         command=tuple(map(format_scalar, data.get('command', ()))),
         package=data.get('package'),
         executable=data.get('executable'),
-        arguments=tuple(map(format_scalar, data.get('arguments', ()))),
+        launch=data.get('launch'),
+        arguments=tuple(_arguments_of(data)),
         node_name=data.get('name'),
         namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         parameters=MappingProxyType(given_values(data.get('parameters', {}))),
@@ -104,12 +106,26 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         restart_delay_sec=float(restart.get('delay', DEFAULT_RESTART_DELAY_SEC)),
         most_restarts=restart.get('max'),
         stop_signal=stop.get('signal', 'SIGINT'),
-        stop_timeout_sec=float(stop['timeout']) if 'timeout' in stop else None,
+        stop_timeout_sec=_stop_timeout_sec(data),
         wait_for=parse_conditions(data, path),
         nodes=nodes,
         declares_all_ends=declares_all_ends,
         path=path,
     )
+
+
+def _arguments_of(data: dict[str, Any]) -> Iterator[str]:
+    written = data.get('arguments', ())
+    if isinstance(written, dict):
+        yield from (f'{name}:={format_scalar(value)}' for name, value in written.items())
+    else:
+        yield from map(format_scalar, written)
+
+
+def _stop_timeout_sec(data: dict[str, Any]) -> float | None:
+    default = DEFAULT_LAUNCH_STOP_SEC if 'launch' in data else None
+    written = data.get('stop', {}).get('timeout', default)
+    return None if written is None else float(written)
 
 
 def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpec, ...]:
