@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
+    *('nodes', 'declares_all_ends'),
     *(kind.section for kind in ENTITY_KINDS),
 }
 # These are part of a node, and what a process is started with.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.specs import (
     DEFAULT_LAUNCH_STOP_SEC,
     DEFAULT_RESTART_DELAY_SEC,
@@ -81,6 +82,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
     """Return a process."""
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
+    nodes, declares_all_ends = parse_declared_nodes(name, data, path)
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
@@ -91,7 +93,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         arguments=tuple(_arguments_of(data)),
         node_name=data.get('name'),
         namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
-        parameters=MappingProxyType(data.get('parameters', {})),
+        parameters=MappingProxyType(given_values(data.get('parameters', {}))),
         parameter_files=tuple(data.get('parameter_files', ())),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
@@ -106,6 +108,8 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         stop_signal=stop.get('signal', 'SIGINT'),
         stop_timeout_sec=_stop_timeout_sec(data),
         wait_for=parse_conditions(data, path),
+        nodes=nodes,
+        declares_all_ends=declares_all_ends,
         path=path,
     )
 
