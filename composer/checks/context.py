@@ -6,11 +6,13 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.ament import find_meant_package
 from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
 from composer.language.bindings import Binding, exit_bindings, node_bindings
+from composer.language.specs import DeclaredEndSpec
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -93,7 +95,7 @@ class CheckContext:
         """Return whether an entry is missing because of an error that was reported already."""
         return path in self.system.dropped
 
-    def has_real_type(self, entity: EndSpec) -> bool:
+    def has_real_type(self, entity: EndSpec | DeclaredEndSpec) -> bool:
         """Return whether the type of an entity is known to be the one that is meant.
 
         It is none that stands in for a missing one, hangs on a sample, or does not exist.
@@ -103,7 +105,19 @@ class CheckContext:
             return False
         if sampled and self.system.positions.value(self.inner(path, 'type')) in sampled:
             return False
-        return not self.catalogue.available or self.catalogue.has(entity.type)
+        return not self.catalogue.available or self.knows_type(entity)
+
+    def knows_type(self, entity: EndSpec | DeclaredEndSpec) -> bool:
+        """Return whether there is the type of an entity.
+
+        An external process may have types of packages that are not installed here.
+        """
+        if self.catalogue.has(entity.type):
+            return True
+        package, known = entity.type.partition('/')[0], self.catalogue.packages()
+        if package in known or not isinstance(entity, DeclaredEndSpec):
+            return False
+        return find_meant_package(package, known, most_edits=1) is None
 
     def at_value(
         self,

@@ -208,7 +208,7 @@ def _edges(
     for channel in topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
-            node = ids[end.node.path]
+            node = ids[end.node.path[:2]]
             yield Edge(
                 f'{end.kind.noun}:{node.partition(":")[2]}:{end.entity.name}',
                 _role(end),

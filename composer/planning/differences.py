@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
+    *('nodes', 'declares_all_ends'),
     *(kind.section for kind in ENTITY_KINDS),
 }
 # These are part of a node, and what a process is started with.
@@ -93,7 +94,8 @@ _PROCESSES = _Rules(
     'the running process',
     dict.fromkeys(
         (
-            *('command', 'package', 'executable', 'arguments', 'name', 'namespace'),
+            *('command', 'package', 'executable', 'launch', 'arguments'),
+            *('name', 'namespace'),
             *('parameters', 'parameter_files', 'remap', 'log_level', 'env', 'cwd'),
         ),
         'a process takes this when it starts',

@@ -105,9 +105,8 @@ class ProcessSupervisor:
         run, tools = process.run, self._tools
         if run is None or tools is None or run.gone.is_set():
             return
-        timeout_sec = self._timeout_of(process.spec)
-        tools.reaper.stop(run.number, signal.Signals[process.spec.stop_signal], timeout_sec)
-        run.gone.wait(timeout_sec + _KILLED_SEC)
+        self._ask_to_end(run, tools)
+        run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
 
     def tell_ends(self) -> None:
         """Log from now on how processes have ended: the system has started, or never will."""
@@ -128,9 +127,7 @@ class ProcessSupervisor:
             return True
         begun = monotonic()
         for run in runs:
-            spec = run.process.spec
-            number = signal.Signals[spec.stop_signal]
-            tools.reaper.stop(run.number, number, self._timeout_of(spec))
+            self._ask_to_end(run, tools)
         for run in runs:
             timeout_sec = self._timeout_of(run.process.spec) + _KILLED_SEC
             run.gone.wait(max(0.0, begun + timeout_sec - monotonic()))
@@ -164,6 +161,13 @@ class ProcessSupervisor:
             tools.reaper.start(run.number, command, environment, folder, output_end)
             os.close(output_end)
             return run
+
+    def _ask_to_end(self, run: ProcessRun, tools: _Tools) -> None:
+        spec = run.process.spec
+        number = signal.Signals[spec.stop_signal]
+        # `ros2 launch` ends what it has started, each in its own time.
+        is_launch = spec.launch is not None
+        tools.reaper.stop(run.number, number, self._timeout_of(spec), alone=is_launch)
 
     def _timeout_of(self, spec: ProcessSpec) -> float:
         return self.timeout_sec if spec.stop_timeout_sec is None else spec.stop_timeout_sec
@@ -229,6 +233,11 @@ class ProcessSupervisor:
 
     def _restart(self, process: ExternalProcess) -> None:
         process.restarts += 1
+        run, tools = process.run, self._tools
+        if process.spec.launch is not None and run is not None and tools is not None:
+            # If `ros2 launch` was killed, what it had started is still there.
+            self._ask_to_end(run, tools)
+            run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
         try:
             self.start(process)
         except StartError as error:
@@ -295,7 +304,7 @@ class _Tools:
 
 
 def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
-    program = spec.command[0] if spec.command else spec.executable
+    program = spec.command[0] if spec.command else spec.executable or 'ros2'
     if answer['doing'] == 'reaper':
         reason = 'the process reaper was killed'
     elif answer['doing'] == 'folder':

@@ -21,7 +21,13 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, SystemSpec
+    from composer.language.specs import (
+        ConditionSpec,
+        DeclaredNodeSpec,
+        NodeSpec,
+        ProcessSpec,
+        SystemSpec,
+    )
     from composer.yaml_text.positions import DataPath
 
 
@@ -200,6 +206,13 @@ class _Providers:
                 self._add(node, 'service', service.service)
             for action in node.actions.values():
                 self._add(node, 'action', action.action)
+        for process in context.spec.processes.values():
+            for declared in process.nodes:
+                if declared.is_named:
+                    self._nodes.setdefault(declared.full_name, process.path)
+                for kind, end in declared.ends():
+                    if kind.provides and kind.channel:
+                        self._add(declared, kind.channel, end.channel, process.path)
 
     def of(
         self, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
@@ -217,5 +230,12 @@ class _Providers:
         # Of several, any one will do.
         return found if len(found) == 1 else []
 
-    def _add(self, node: NodeSpec, kind: ChannelKind, name: str) -> None:
-        self._channels.setdefault((kind, full_name(node, kind, name)), []).append(node.path)
+    def _add(
+        self,
+        node: NodeSpec | DeclaredNodeSpec,
+        kind: ChannelKind,
+        name: str,
+        provider: DataPath | None = None,
+    ) -> None:
+        found = self._channels.setdefault((kind, full_name(node, kind, name)), [])
+        found.append(provider or node.path)

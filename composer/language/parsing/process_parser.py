@@ -6,8 +6,10 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.parsing.entry_parser import behaviour_at, parse_behaviour
 from composer.language.specs import (
+    DEFAULT_LAUNCH_STOP_SEC,
     DEFAULT_RESTART_DELAY_SEC,
     DEFAULT_WAIT_SEC,
     ConditionSpec,
@@ -18,7 +20,7 @@ from composer.names import expand_namespace
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from composer.language.specs import ConditionKind
     from composer.yaml_text.positions import DataPath
@@ -87,16 +89,18 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
     """Return a process."""
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
+    nodes, declares_all_ends = parse_declared_nodes(name, data, path)
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
         command=tuple(map(format_scalar, data.get('command', ()))),
         package=data.get('package'),
         executable=data.get('executable'),
-        arguments=tuple(map(format_scalar, data.get('arguments', ()))),
+        launch=data.get('launch'),
+        arguments=tuple(_arguments_of(data)),
         node_name=data.get('name'),
         namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
-        parameters=MappingProxyType(data.get('parameters', {})),
+        parameters=MappingProxyType(given_values(data.get('parameters', {}))),
         parameter_files=tuple(data.get('parameter_files', ())),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
@@ -109,10 +113,12 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         most_restarts=restart.get('max'),
         on_exit=_parse_exit_actions(data, path),
         stop_signal=stop.get('signal', 'SIGINT'),
-        stop_timeout_sec=float(stop['timeout']) if 'timeout' in stop else None,
+        stop_timeout_sec=_stop_timeout_sec(data),
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
         on_demand=False,
+        nodes=nodes,
+        declares_all_ends=declares_all_ends,
         path=path,
     )
 
@@ -131,6 +137,20 @@ def _parse_exit_action(data: str | dict[str, Any], path: DataPath) -> ExitAction
         return ExitActionSpec(None, None, path)
     behaviour = behaviour_at({'behaviour': data}, path)
     return ExitActionSpec(replace(behaviour, path=path), None, path)
+
+
+def _arguments_of(data: dict[str, Any]) -> Iterator[str]:
+    written = data.get('arguments', ())
+    if isinstance(written, dict):
+        yield from (f'{name}:={format_scalar(value)}' for name, value in written.items())
+    else:
+        yield from map(format_scalar, written)
+
+
+def _stop_timeout_sec(data: dict[str, Any]) -> float | None:
+    default = DEFAULT_LAUNCH_STOP_SEC if 'launch' in data else None
+    written = data.get('stop', {}).get('timeout', default)
+    return None if written is None else float(written)
 
 
 def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpec, ...]:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
+# Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
+_DEPTH_OF_ENTITIES = 4
 # The last version in which equal data are written alike, whoever else holds them.
 _MARSHAL_VERSION = 2
 
@@ -49,9 +51,24 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
             }
             if section in ('nodes', 'processes'):
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
+        _leave_out_entities(system, used, unused)
         system.unused = parse_system(unused, name)
     system.data = used
     system.spec = parse_system(used, name, before)
+
+
+def _leave_out_entities(
+    system: LoadedSystem, used: dict[str, Any], unused: dict[str, Any]
+) -> None:
+    """Take entities that are left out of their nodes; with them, these nodes are unused."""
+    for path in system.left_out:
+        if len(path) != _DEPTH_OF_ENTITIES or path[1] not in used['nodes']:
+            continue
+        _, name, section, entity = path
+        unused['nodes'].setdefault(name, used['nodes'][name])
+        if entity in (rest := used['nodes'][name].get(section, {})):
+            without = {key: rest[key] for key in rest if key != entity}
+            used['nodes'][name] = {**used['nodes'][name], section: without}
 
 
 def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> SystemSpec:
