@@ -43,7 +43,8 @@ class Loader:
         self._launch = launch
         self.context: Any = launch.LaunchContext()
         self._read = _Configurations()
-        self.context._LaunchContext__launch_configurations = self._read
+        # It has no other way to be told what is read.
+        setattr(self.context, '_LaunchContext__launch_configurations', self._read)  # noqa: B010
         self._folders = tuple(
             f'{Path(str(sys.modules[name].__file__)).parent}/' for name in _MODULES
         )
@@ -79,8 +80,9 @@ class Loader:
             except BaseException as error:
                 if isinstance(error, KeyboardInterrupt):
                     raise
-                message = f'{source.location}: {type(error).__name__}: {error}'
-                raise LaunchError(message) from error
+                cause = error.__cause__ or error
+                message = f'{source.location}: {type(cause).__name__}: {cause}'
+                raise LaunchError(message, help=_help_for(cause)) from error
 
     def parse(self, text: str) -> Any:
         """Return the substitutions in a text, as in `$(var side)`."""
@@ -100,6 +102,14 @@ class Loader:
                 yield self._read.names
             finally:
                 self._read.names = before
+
+
+def _help_for(error: BaseException) -> str | None:
+    if type(error).__name__ == 'PackageNotFoundError':
+        return 'source the workspace that has the package, or install it'
+    if isinstance(error, KeyError):
+        return 'if it is an environment variable, set it as for ros2 launch'
+    return None
 
 
 class _Configurations(dict[str, Any]):
@@ -149,7 +159,7 @@ class _Origins:
 
     def _noting(self, original: Any) -> Any:
         def init(entity: Any, *args: Any, **keywords: Any) -> None:
-            entity._composer_origin = self._element() or self._line()
+            vars(entity)['_composer_origin'] = self._element() or self._line()
             original(entity, *args, **keywords)
 
         return init
@@ -198,5 +208,5 @@ def _element_lines(path: Path) -> list[int]:
     lines: list[int] = []
     parser = expat.ParserCreate()
     parser.StartElementHandler = lambda *_: lines.append(parser.CurrentLineNumber)
-    parser.Parse(path.read_bytes(), True)  # noqa: FBT003 - it is the whole file
+    parser.Parse(path.read_bytes(), True)
     return lines

@@ -36,9 +36,7 @@ class OpaqueRuns:
             shown = ', '.join(fixed)
             reader.remark(f'OpaqueFunction was resolved: what it returns depends on {shown}')
 
-    def _attempt(
-        self, entity: Any, marks: frozenset[str]
-    ) -> tuple[DescriptionReader, list[str]]:
+    def _attempt(self, entity: Any, marks: frozenset[str]) -> tuple[DescriptionReader, list[str]]:
         """Return a reader that has read what the function returns, and which names it has read."""
         fork = self._reader.forked()
         context = fork.loader.context

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -149,8 +148,7 @@ class ParameterReader:
                 return
         if Path(path.text).is_file() or not Path(path.text).parent.is_dir():
             read.files.append(path.written())
-            if path.text.startswith(f'{tempfile.gettempdir()}/'):
-                # A helper of the launch file has written it just now.
+            if self._resolver.is_new_file(path.text):
                 self._keep_content(read, path)
         else:
             self._remark(f"there is no parameter file '{path.text}': launch goes on without it")
@@ -211,4 +209,3 @@ def _flat(data: Any, prefix: str) -> Iterable[str]:
     for key, value in data.items():
         # What stands above `ros__parameters` are names of nodes.
         yield from _flat(value, '' if key == 'ros__parameters' else f'{prefix}.{key}'.strip('.'))
-

@@ -141,7 +141,9 @@ class ProgramReader:
         name = resolver.text(target)
         for entry in self._reader.result.entries:
             own, namespace = entry.data.get('name'), entry.data.get('namespace', '')
-            values = [each.value if isinstance(each, Computed) else each for each in (own, namespace)]
+            values = [
+                each.value if isinstance(each, Computed) else each for each in (own, namespace)
+            ]
             full = f'/{values[1] or ""}/{values[0]}'.replace('//', '/').replace('//', '/')
             if entry.section == 'containers' and name.text in (values[0], full, full.lstrip('/')):
                 return entry
@@ -175,7 +177,7 @@ class ProgramReader:
         with reader.scope.under(held):
             when = reader.scope.when
         if when and when != entry.when:
-            data['when'] = Computed(f'{{{{ {when} }}}}', True)  # noqa: FBT003 - a value
+            data['when'] = Computed(f'{{{{ {when} }}}}', True)
         components: dict[str, Any] = entry.data.setdefault('components', {})
         label = name.text or plugin.text.rpartition(':')[2]
         number, free = 2, label
@@ -281,7 +283,9 @@ class ProgramReader:
         if prefix.text.strip():
             reader.remark(f"the prefix '{prefix.text}' cannot be kept")
         self._add_restart(data, action)
-        timeouts = [resolver.text(private(action, f'{each}_timeout')) for each in ('sigterm', 'sigkill')]
+        timeouts = [
+            resolver.text(private(action, f'{each}_timeout')) for each in ('sigterm', 'sigkill')
+        ]
         if any(not each.is_constant or each.text not in ('5', '5.0') for each in timeouts):
             self._add_timeout(data, timeouts)
 
@@ -304,7 +308,9 @@ class ProgramReader:
         if all(each.is_constant for each in timeouts):
             data['stop'] = {'timeout': sum(map(float, (each.text for each in timeouts)))}
         else:
-            terms = (each.text if each.is_constant else f'({each.code} | float)' for each in timeouts)
+            terms = (
+                each.text if each.is_constant else f'({each.code} | float)' for each in timeouts
+            )
             total = sum(float(each.text or 5) for each in timeouts)
             data['stop'] = {'timeout': Computed(f'{{{{ {" + ".join(terms)} }}}}', total)}
 

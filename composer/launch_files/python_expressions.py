@@ -77,7 +77,7 @@ class _Translator:
     def __init__(self, parts: dict[str, Code]) -> None:
         self._parts = parts
 
-    def code(self, node: ast.expr) -> str:
+    def code(self, node: ast.expr) -> str:  # noqa: PLR0911 - one for each kind of node
         if isinstance(node, ast.Constant):
             return self._constant(node.value)
         if isinstance(node, ast.Name) and node.id in self._parts:
@@ -96,7 +96,9 @@ class _Translator:
             sign = 'not ' if isinstance(node.op, ast.Not) else '-'
             return f'({sign}{self.code(node.operand)})'
         if isinstance(node, ast.IfExp):
-            return f'({self.code(node.body)} if {self.code(node.test)} else {self.code(node.orelse)})'
+            return (
+                f'({self.code(node.body)} if {self.code(node.test)} else {self.code(node.orelse)})'
+            )
         if isinstance(node, ast.List | ast.Tuple):
             return f'[{", ".join(map(self.code, node.elts))}]'
         return self._method(node)

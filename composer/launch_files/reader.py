@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,14 +23,13 @@ from composer.launch_files.substitutions import (
     LaunchError,
     Resolver,
     class_names,
-    package_of,
     private,
     truth_of,
 )
 from composer.launch_files.texts import Computed, Text, chosen, joined, one
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from composer.launch_files.loading import Loader
 
@@ -98,6 +98,8 @@ class DescriptionReader:
         self.given = given
         self.scope = Scope()
         self.result = Imported()
+        # Files of before are not written by the launch file.
+        self.started = time.time()
         self._depth = 0
         self._programs = ProgramReader(self)
         self._opaque = OpaqueRuns(self)
@@ -125,8 +127,10 @@ class DescriptionReader:
         }
         for argument in self.result.arguments.values():
             # Expressions may hold several arguments.
-            if any(re.search(rf'(?<![\w.]){re.escape(argument_code(argument.name))}(?!\w)', code)
-                   for code in codes):
+            if any(
+                re.search(rf'(?<![\w.]){re.escape(argument_code(argument.name))}(?!\w)', code)
+                for code in codes
+            ):
                 argument.fixed = True
 
     def read(self, entities: Iterable[Any]) -> None:
@@ -154,9 +158,8 @@ class DescriptionReader:
 
     def _dispatch(self, entity: Any) -> None:
         for name in class_names(entity):
-            method = _ACTIONS.get(name)
-            if method is not None:
-                method(self, entity)
+            if name in _ACTIONS:
+                getattr(self, _ACTIONS[name])(entity)
                 return
         self._read_unknown(entity)
 
@@ -277,9 +280,7 @@ class DescriptionReader:
             # `launch` does not set the file back: what follows sees that of the include.
             self._depth -= 1
 
-    def _description_of(
-        self, source: Any, location: Text, values: list[tuple[str, Text]]
-    ) -> Any:
+    def _description_of(self, source: Any, location: Text, values: list[tuple[str, Text]]) -> Any:
         """Return the description of an included file; `None` if its package is not here."""
         path = Path(location.text)
         is_code = private(source, 'launch_description') is not None and not path.is_file()
@@ -303,8 +304,11 @@ class DescriptionReader:
     def _timer(self, entity: Any) -> None:
         period = self.resolver.text(private(entity, 'period'))
         if self.scope.delay is not None:
-            period = one(f'{_number(self.scope.delay)} + {_number(period)}', str(
-                float(self.scope.delay.text) + float(period.text)), 'number')
+            period = one(
+                f'{_number(self.scope.delay)} + {_number(period)}',
+                str(float(self.scope.delay.text) + float(period.text)),
+                'number',
+            )
         with self.scope.after(None, period):
             self.read(private(entity, 'actions'))
 
@@ -472,6 +476,7 @@ class DescriptionReader:
         other.result.entries = list(self.result.entries)
         other.result.files = list(self.result.files)
         other.origin = self.origin
+        other.started = self.started
         other._depth = self._depth
         return other
 
@@ -513,7 +518,9 @@ def join_namespaces(outer: Any, own: Text) -> Text:
             return own if own.text else outer
         return joined((outer, own), '' if outer.text == '/' else '/')
     inside = joined((outer, own), '/')
-    code = f"({own.code} if {own.code}.startswith('/') else {inside.code} if {own.code} else {outer.code})"
+    is_absolute = f"{own.code}.startswith('/')"
+    relative = f'{inside.code} if {own.code} else {outer.code}'
+    code = f'({own.code} if {is_absolute} else {relative})'
     text = own.text if own.text.startswith('/') else inside.text if own.text else outer.text
     return one(code, text)
 
@@ -523,10 +530,8 @@ def package_path(location: Text) -> str | None:
     if not _is_in_package(location):
         return None
     first, *rest = location.parts
-    assert not isinstance(first, str)
-    package = first.code.removeprefix("find('").removesuffix("')")
-    tail = joined([Text((part,)) for part in rest]).written()
-    return f'{package}{tail}'
+    package = '' if isinstance(first, str) else first.code[len("find('") : -len("')")]
+    return f'{package}{Text(tuple(rest)).text}'
 
 
 def _is_in_package(location: Text) -> bool:
@@ -552,36 +557,36 @@ _STATES = {
     'OnExecutionComplete': 'ended',
     'OnProcessStart': 'running',
 }
-_R = DescriptionReader
-_ACTIONS: dict[str, Callable[[DescriptionReader, Any], None]] = {
-    'LaunchDescription': _R._description,
-    'DeclareLaunchArgument': _R._argument,
-    'SetLaunchConfiguration': _R._set,
-    'UnsetLaunchConfiguration': _R._unset,
-    'ResetLaunchConfigurations': _R._reset,
-    'PushLaunchConfigurations': _R._push_configurations,
-    'PopLaunchConfigurations': _R._pop_configurations,
-    'PushEnvironment': _R._push_environment,
-    'PopEnvironment': _R._pop_environment,
-    'ResetEnvironment': _R._reset_environment,
-    'GroupAction': _R._group,
-    'IncludeLaunchDescription': _R._include,
-    'OpaqueFunction': _R._function,
-    'TimerAction': _R._timer,
-    'RosTimer': _R._timer,
-    'RegisterEventHandler': _R._handler,
-    'SetEnvironmentVariable': _R._variable,
-    'AppendEnvironmentVariable': _R._append_variable,
-    'UnsetEnvironmentVariable': _R._unset_variable,
-    'PushROSNamespace': _R._namespace,
-    'PushRosNamespace': _R._namespace,
-    'SetRemap': _R._remap,
-    'SetParameter': _R._parameter,
-    'SetParametersFromFile': _R._parameter_file,
-    'SetUseSimTime': _R._sim_time,
-    'LogInfo': _R._log,
-    'Shutdown': _R._shutdown,
-    'EmitEvent': _R._event,
-    'LoadComposableNodes': _R._load_components,
-    'ExecuteLocal': _R._program,
+# The method for each class of actions.
+_ACTIONS = {
+    'LaunchDescription': '_description',
+    'DeclareLaunchArgument': '_argument',
+    'SetLaunchConfiguration': '_set',
+    'UnsetLaunchConfiguration': '_unset',
+    'ResetLaunchConfigurations': '_reset',
+    'PushLaunchConfigurations': '_push_configurations',
+    'PopLaunchConfigurations': '_pop_configurations',
+    'PushEnvironment': '_push_environment',
+    'PopEnvironment': '_pop_environment',
+    'ResetEnvironment': '_reset_environment',
+    'GroupAction': '_group',
+    'IncludeLaunchDescription': '_include',
+    'OpaqueFunction': '_function',
+    'TimerAction': '_timer',
+    'RosTimer': '_timer',
+    'RegisterEventHandler': '_handler',
+    'SetEnvironmentVariable': '_variable',
+    'AppendEnvironmentVariable': '_append_variable',
+    'UnsetEnvironmentVariable': '_unset_variable',
+    'PushROSNamespace': '_namespace',
+    'PushRosNamespace': '_namespace',
+    'SetRemap': '_remap',
+    'SetParameter': '_parameter',
+    'SetParametersFromFile': '_parameter_file',
+    'SetUseSimTime': '_sim_time',
+    'LogInfo': '_log',
+    'Shutdown': '_shutdown',
+    'EmitEvent': '_event',
+    'LoadComposableNodes': '_load_components',
+    'ExecuteLocal': '_program',
 }

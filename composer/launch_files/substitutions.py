@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from composer.ament import PACKAGE_INDEX, ament_prefixes, find_share, locate_packages
+from composer.ament import find_share
 from composer.errors import ComposerError
 from composer.launch_files.marks import run_marked
 from composer.launch_files.python_expressions import UnlikeError, translate
@@ -31,11 +31,13 @@ from composer.launch_files.texts import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from composer.launch_files.reader import DescriptionReader
 
 _SHARE = re.compile(r'^(?:file://)?(/[^\s:]*?)/share/([A-Za-z]\w*)(?=/|$)')
+# What `LaunchConfigAsBool` takes for true.
+_TRUE = ('true', '1', 'yes', 'on')
 # Where the files of packages would be that are not installed.
 _ABSENT = '/share/of/package'
 
@@ -91,15 +93,15 @@ class Resolver:
 
     def _substitution(self, written: Any) -> Text:
         for name in class_names(written):
-            method = _KINDS.get(name)
-            if method is not None:
-                return method(self, written)
+            if name in _KINDS:
+                found: Text = getattr(self, _KINDS[name])(written)
+                return found
         return self._performed(written)
 
     def _performed(self, written: Any) -> Text:
         """Return what `launch` makes of a substitution, with marks where arguments are in it."""
         text, fixed = run_marked(
-            self._scope, lambda marks: self._perform(written, marks), _outcome
+            self._scope, lambda marks: self._perform(written, marks), self._outcome
         )
         if fixed:
             self._reader.fix(fixed)
@@ -117,6 +119,19 @@ class Resolver:
                 message = f'{self._reader.origin}: {kind} cannot be resolved: {error}'
                 raise LaunchError(message) from error
 
+    def _outcome(self, text: str) -> str:
+        """Return what a substitution gives: of a new file, what stands in it."""
+        path = unmarked(text)
+        return unmarked(repr(read_file(path))) if self.is_new_file(path) else path
+
+    def is_new_file(self, path: str) -> bool:
+        """Return whether a helper of the launch file has written a file just now."""
+        try:
+            is_new = Path(path).stat().st_mtime >= self._reader.started
+        except (OSError, ValueError):
+            return False
+        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
+
     def _text(self, written: Any) -> Text:
         return _constant(str(written.text))
 
@@ -126,8 +141,11 @@ class Resolver:
         if isinstance(value, Text):
             return value
         default = private(written, 'default')
+        if name in self._reader.given:
+            return _constant(self._reader.given[name])
         if default is None:
-            message = f"the launch configuration '{name}' is used, but nothing sets it"
+            origin = self._reader.origin
+            message = f"{origin}: the launch configuration '{name}' is used, but nothing sets it"
             raise LaunchError(message)
         return self.text(default)
 
@@ -202,6 +220,14 @@ class Resolver:
         except Exception as error:
             message = f'the expression {source} cannot be evaluated: {error}'
             raise LaunchError(message) from error
+
+    def _as_bool(self, written: Any) -> Text:
+        """Return what nav2's `LaunchConfigAsBool` makes of a configuration."""
+        value = self.text(private(written, 'config'))
+        text = str(value.text.strip().lower() in _TRUE)
+        if value.is_constant:
+            return _constant(text)
+        return one(f'({value.code} | lower in {list(_TRUE)})', text, 'python-bool')
 
     def _not(self, written: Any) -> Text:
         value = self.text(private(written, 'value'))
@@ -278,30 +304,12 @@ def _constant(text: str) -> Text:
     return Text(tuple(part for part in parts if part))
 
 
-def _outcome(text: str) -> str:
-    """Return what a substitution gives: of a new file, what stands in it."""
-    path = unmarked(text)
-    if path.startswith(f'{tempfile.gettempdir()}/') and os.path.isfile(path):  # noqa: PTH113
-        data = read_file(path)
-        return path if data is None else unmarked(repr(data))
-    return path
-
-
 def read_file(path: str) -> Any:
     """Return the data of a YAML file; `None` if it has none."""
     try:
         return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, ValueError, yaml.YAMLError):
         return None
-
-
-def package_of(path: Path) -> tuple[str, str] | None:
-    """Return the installed package that a file is of, and its path in the share folder."""
-    for package, prefix in locate_packages(ament_prefixes(), PACKAGE_INDEX).items():
-        share = prefix / 'share' / package
-        if path.is_relative_to(share):
-            return package, str(path.relative_to(share))
-    return None
 
 
 def _truth(value: Text) -> bool:
@@ -321,24 +329,26 @@ def _bracketed(value: Text) -> str:
 
 truth_of = _truth
 
-_KINDS: dict[str, Callable[[Resolver, Any], Text]] = {
-    'TextSubstitution': Resolver._text,  # noqa: SLF001 - a table of its methods
-    'LaunchConfiguration': Resolver._configuration,  # noqa: SLF001
-    'EnvironmentVariable': Resolver._variable,  # noqa: SLF001
-    'FindPackageShare': Resolver._share,  # noqa: SLF001
-    'FindPackagePrefix': Resolver._prefix,  # noqa: SLF001
-    'ExecutableInPackage': Resolver._executable_in_package,  # noqa: SLF001
-    'PathJoinSubstitution': Resolver._path,  # noqa: SLF001
-    'ThisLaunchFile': Resolver._file,  # noqa: SLF001
-    'ThisLaunchFileDir': Resolver._file_folder,  # noqa: SLF001
-    'FindExecutable': Resolver._program,  # noqa: SLF001
-    'PythonExpression': Resolver._python,  # noqa: SLF001
-    'NotSubstitution': Resolver._not,  # noqa: SLF001
-    'AndSubstitution': Resolver._both,  # noqa: SLF001
-    'OrSubstitution': Resolver._either,  # noqa: SLF001
-    'AllSubstitution': Resolver._all,  # noqa: SLF001
-    'AnySubstitution': Resolver._any,  # noqa: SLF001
-    'EqualsSubstitution': Resolver._equal,  # noqa: SLF001
-    'NotEqualsSubstitution': Resolver._unequal,  # noqa: SLF001
-    'IfElseSubstitution': Resolver._one_of_two,  # noqa: SLF001
+# The method for each class of substitutions.
+_KINDS = {
+    'TextSubstitution': '_text',
+    'LaunchConfiguration': '_configuration',
+    'EnvironmentVariable': '_variable',
+    'FindPackageShare': '_share',
+    'FindPackagePrefix': '_prefix',
+    'ExecutableInPackage': '_executable_in_package',
+    'PathJoinSubstitution': '_path',
+    'ThisLaunchFile': '_file',
+    'ThisLaunchFileDir': '_file_folder',
+    'FindExecutable': '_program',
+    'PythonExpression': '_python',
+    'LaunchConfigAsBool': '_as_bool',
+    'NotSubstitution': '_not',
+    'AndSubstitution': '_both',
+    'OrSubstitution': '_either',
+    'AllSubstitution': '_all',
+    'AnySubstitution': '_any',
+    'EqualsSubstitution': '_equal',
+    'NotEqualsSubstitution': '_unequal',
+    'IfElseSubstitution': '_one_of_two',
 }

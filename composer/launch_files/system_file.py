@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
-from composer.launch_files.reader import argument_code
 from composer.launch_files.texts import Computed, Text
 from composer.yaml_text.writer import RCL, render_yaml
 
@@ -63,7 +61,9 @@ def _arguments(arguments: Any) -> list[str]:
     lines = ['', 'args:']
     for argument in arguments:
         if argument.fixed:
-            lines.append('  # A function of the launch file depends on it: import again to change.')
+            lines.append(
+                '  # A function of the launch file depends on it: import again to change.'
+            )
         data = render_yaml({argument.name: _declaration(argument)})
         lines += [f'  {line}' for line in data.splitlines()]
     return lines
@@ -136,7 +136,9 @@ def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
     if not isinstance(file, NewFile):
         return file
     data = file.data
-    if not any(isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()):
+    if not any(
+        isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()
+    ):
         data = {'/**': {'ros__parameters': data}}
     text = render_yaml(data, RCL)
     plain = _NAME.sub('_', label).strip('_') or 'node'
@@ -166,14 +168,3 @@ def _waits(imported: Imported, entry: Entry) -> Any:
             yield {'process': target.name}
         else:
             yield {'process': target.name, 'state': wait.state}
-
-
-def relative_text(path: Path) -> str:
-    """Return a path as it is shown: relative to the working folder if it is inside it."""
-    try:
-        return str(path.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(path)
-
-
-__all__ = ['SystemFile', 'argument_code', 'render_system', 'relative_text']

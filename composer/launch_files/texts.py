@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
 import yaml
 
@@ -28,9 +28,9 @@ class Computed(Expression):
         value: What it comes to with the arguments as they are given to the import.
     """
 
-    __slots__ = ('value',)
+    value: Any
 
-    def __new__(cls, text: str, value: Any) -> Computed:
+    def __new__(cls, text: str, value: Any) -> Self:
         """Return the text with its value."""
         self = super().__new__(cls, text)
         self.value = value
@@ -87,6 +87,11 @@ class Text:
         return f'({" ~ ".join(codes)})'
 
     @property
+    def _only_code(self) -> str:
+        (only,) = self.parts
+        return repr(only) if isinstance(only, str) else only.code
+
+    @property
     def kind(self) -> Kind:
         """The type of the value."""
         (only, *others) = self.parts or ('',)
@@ -104,9 +109,7 @@ class Text:
         if self.is_constant:
             return value
         if self.kind != 'text':
-            (only,) = self.parts
-            assert isinstance(only, Code)
-            return Computed(f'{{{{ {only.code} }}}}', value)
+            return Computed(f'{{{{ {self._only_code} }}}}', value)
         if len(self.parts) > 1 and isinstance(value, str):
             return self.written()
         return Computed(f'{{{{ {self.code} | from_yaml }}}}', value)
@@ -114,9 +117,7 @@ class Text:
     def condition(self) -> str:
         """Return an expression for whether it is true, as conditions of launch read it."""
         if len(self.parts) == 1 and self.kind in ('bool', 'python-bool'):
-            (only,) = self.parts
-            assert isinstance(only, Code)
-            return only.code
+            return self._only_code
         return f'{self.code} | bool'
 
 
@@ -183,8 +184,6 @@ def read_yaml(text: str) -> Any:
 
 def split_words(text: Text) -> list[Text]:
     """Return the words of a command line, as a shell splits it."""
-
-
     codes: list[Code] = []
     plain = ''
     for part in text.parts:
