@@ -26,6 +26,9 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
+LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+WhileInactive: TypeAlias = Literal['drop', 'keep']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
@@ -112,6 +115,8 @@ class SubscriptionSpec:
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
         read_only: Whether it shares its messages with others, as its behaviour only reads them.
+        while_inactive: What becomes of messages while the node has a lifecycle and is not active;
+            `None` for what fits the durability.
         external: Whether its publishers are in no file.
     """
 
@@ -123,6 +128,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     read_only: bool
+    while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
     warn_after_sec: float | None
@@ -156,6 +162,8 @@ class ServiceSpec:
 
     Attributes:
         group: The callback group's name; `None` for the node's default group.
+        while_inactive: What becomes of requests while the node has a lifecycle and is not active;
+            `None` is `drop`.
     """
 
     name: str
@@ -164,6 +172,7 @@ class ServiceSpec:
     qos: QosSpec
     behaviour: BehaviourSpec
     group: str | None
+    while_inactive: WhileInactive | None
     local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
@@ -243,11 +252,13 @@ class ConditionSpec:
     Attributes:
         kind: What sort of thing it is.
         name: Its name as written; a relative one lies in the namespace of who waits.
+        state: The state that the node must be in, which has a lifecycle; `None` for any.
         timeout_sec: After this the start fails.
     """
 
     kind: ConditionKind
     name: str
+    state: LifecycleState | None
     timeout_sec: float
     path: DataPath
 
@@ -315,6 +326,9 @@ class NodeSpec:
         state: What `node.state` starts as.
         wait_for: What must be there before it starts.
         parameter_files: In ROS's own format; later ones win.
+        lifecycle: The state to which a node with a lifecycle brings itself; `None` for one
+            without.
+        bond: Whether it keeps a bond while it is active.
     """
 
     _: KW_ONLY
@@ -327,6 +341,7 @@ class NodeSpec:
     rosout: bool = True
     type_description_service: bool = False
     logger_services: bool = False
+    bond: bool = False
     on_error: OnError
     warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
@@ -342,6 +357,12 @@ class NodeSpec:
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
+    lifecycle: LifecycleStart | None
+    on_configure: BehaviourSpec | None
+    on_activate: BehaviourSpec | None
+    on_deactivate: BehaviourSpec | None
+    on_cleanup: BehaviourSpec | None
+    on_error_state: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
     parameter_files: tuple[str, ...]
     path: DataPath

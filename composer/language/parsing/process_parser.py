@@ -120,7 +120,7 @@ def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpe
 def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
     kind = _kind_of(data)
     timeout_sec = float(data.get('timeout', DEFAULT_WAIT_SEC))
-    return ConditionSpec(kind, data[kind], timeout_sec, (*path, kind))
+    return ConditionSpec(kind, data[kind], data.get('state'), timeout_sec, (*path, kind))
 
 
 def _kind_of(condition: dict[str, Any]) -> ConditionKind:
