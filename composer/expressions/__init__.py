@@ -5,7 +5,9 @@ Importing jinja2 takes as long as a small check: only files that have expression
 
 from __future__ import annotations
 
-# The sections whose entries may be repeated.
+from typing import Any
+
+# The sections whose entries may be repeated; so may the entities of nodes.
 SECTIONS = ('nodes', 'include', 'processes')
 
 # The words that an expression does not read as names.
@@ -14,6 +16,34 @@ _RESERVED = frozenset(
 ) | {'True', 'False', 'None'}
 
 
+# The name under which an expression finds all arguments of its file, as in `args['a.b']`.
+ARGUMENTS = 'args'
+# The names that stand for something in every expression.
+BUILT_IN = frozenset((ARGUMENTS, 'env', 'find', 'here', 'range'))
+
+
 def is_variable_name(name: str) -> bool:
     """Return whether an expression can use a name."""
     return name.isidentifier() and name not in _RESERVED
+
+
+def is_argument_name(name: str) -> bool:
+    """Return whether an expression can use the name of an argument, which may have dots."""
+    return name != ARGUMENTS and (
+        is_variable_name(name) or ('.' in name and all(map(str.isidentifier, name.split('.'))))
+    )
+
+
+def written_in_expression(name: str) -> str:
+    """Return how an expression writes the name of an argument."""
+    return f"{ARGUMENTS}['{name}']" if '.' in name else name
+
+
+def is_conditional(entry: Any) -> bool:
+    """Return whether an entry is repeated, or may be left out."""
+    return isinstance(entry, dict) and ('foreach' in entry or 'when' in entry)
+
+
+def has_conditions(section: Any) -> bool:
+    """Return whether an entry of a section is repeated, or may be left out."""
+    return isinstance(section, dict) and any(map(is_conditional, section.values()))

@@ -1,7 +1,8 @@
 """`foreach` and `when`: repeats entries for each value of a variable, or leaves them out.
 
-Both stand in the entries of some sections. What an entry is repeated for is in scope in its key
-and in all below it; an entry that is left out is still held against the schema.
+Both stand in the entries of some sections, and in the entities of nodes. What an entry is repeated
+for is in scope in its key and in all below it; an entry that is left out is still held against the
+schema.
 """
 
 from __future__ import annotations
@@ -14,16 +15,19 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import TemplateRuntimeError
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.expressions import SECTIONS, is_variable_name
+from composer.entity_kinds import KIND_OF_SECTION
+from composer.expressions import SECTIONS, has_conditions, is_conditional, is_variable_name
 from composer.expressions.templates import TemplateEvaluator
 from composer.input_limits import MAX_ENTRIES, MAX_VALUES
 from composer.yaml_text.document import count_values
+from composer.yaml_text.positions import Branch
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
+    from composer.expressions.scope import Scope
     from composer.yaml_text.document import Document
-    from composer.yaml_text.positions import Branch, DataPath, Key
+    from composer.yaml_text.positions import DataPath, Key
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
@@ -34,9 +38,7 @@ _SAMPLE = 1
 def expand_document(
     document: Document,
     data: dict[str, Any],
-    values: Mapping[str, Any],
-    samples: Collection[str] = (),
-    origins: Mapping[str, str] | None = None,
+    scope: Scope,
 ) -> dict[str, Any] | None:
     """Return data with all expressions evaluated, and entries repeated or left out.
 
@@ -44,18 +46,16 @@ def expand_document(
 
     Args:
         document: The document that the data are from; what is learnt on the way goes there.
-        values: What is in scope, by name.
-        samples: The names whose values only stand for others of their type.
-        origins: Where the values come from, in words.
+        scope: What is in scope.
     """
-    evaluator = TemplateEvaluator(document, values, samples, origins)
+    evaluator = TemplateEvaluator(document, scope)
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
     plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
     filled = evaluator.evaluate_mapping(plain, ()) | ignored
-    limit = _limit_of(filled)
+    limit, size = _limit_of(filled), _Size()
     for section in SECTIONS:
         if isinstance(data.get(section), dict):
-            expansion = _Expansion(evaluator, section, limit)
+            expansion = _Expansion(evaluator, (section,), limit, size)
             try:
                 filled[section] = expansion.expand(data[section])
             except _TooManyError:
@@ -75,26 +75,49 @@ class _TooManyError(Exception):
     """There are more entries than a file may have, and that has been reported."""
 
 
-class _Expansion:
-    """Expands the entries of one section."""
+class _Size:
+    """How many keys and values the entries that are repeated have."""
 
-    def __init__(self, evaluator: TemplateEvaluator, section: str, limit: int) -> None:
+    def __init__(self) -> None:
+        self.values = 0
+
+
+class _Expansion:
+    """Expands the entries of one section.
+
+    Args:
+        at: The path of the section.
+        limit: The most entries that it may have.
+        size: What all sections of the document count in.
+        branches: The positions of its entries as they were written; `None` if these are where the
+            document has them now.
+    """
+
+    def __init__(
+        self,
+        evaluator: TemplateEvaluator,
+        at: DataPath,
+        limit: int,
+        size: _Size,
+        branches: Mapping[Key, Branch] | None = None,
+    ) -> None:
         self._evaluator = evaluator
         self._document = evaluator.document
-        self._section = section
+        self._at = at
+        self._section = str(at[-1])
         self._limit = limit
+        self._size = size
         self._entries: dict[str, Any] = {}
         self._count = 0
-        self._values = 0
-        self._branches: dict[Key, Branch] | None = None
+        self._branches = branches
 
     def expand(self, data: dict[str, Any]) -> dict[str, Any]:
         for written, entry in data.items():
-            if not _is_conditional(entry):
+            if not is_conditional(entry):
                 self._count += 1
                 self._add(self._evaluator, written, entry, is_left_out=False)
                 continue
-            path = (self._section, written)
+            path = (*self._at, written)
             body = {key: value for key, value in entry.items() if key not in (_FOREACH, _WHEN)}
             if entry.get(_FOREACH) == {}:
                 self._report((*path, _FOREACH), f'{_FOREACH} has no variables')
@@ -104,8 +127,8 @@ class _Expansion:
             foreach = entry.get(_FOREACH)
             variables = foreach if isinstance(foreach, dict) else None
             scopes = self._list_scopes(entry.get(_FOREACH, {}), (*path, _FOREACH))
-            self._values += len(scopes) * count_values(body)
-            if self._values > MAX_VALUES:
+            self._size.values += len(scopes) * count_values(body)
+            if self._size.values > MAX_VALUES:
                 self._report_limit((*path, _FOREACH), f'{MAX_VALUES:,} keys and values')
                 raise _TooManyError
             for evaluator in scopes:
@@ -126,9 +149,9 @@ class _Expansion:
         *,
         is_left_out: bool,
     ) -> None:
-        written_path = (self._section, written)
+        written_path = (*self._at, written)
         key = evaluator.evaluate_key(written_path)
-        path = (self._section, key)
+        path = (*self._at, key)
         if key in self._entries:
             if path in self._document.left_out:
                 self._document.left_out.discard(path)
@@ -139,14 +162,39 @@ class _Expansion:
                 return
         if key != written:
             self._graft(path, written)
-        self._entries[key] = evaluator.evaluate(body, path)
+        self._entries[key] = self._evaluate(evaluator, body, path, written)
         if is_left_out:
             self._document.left_out.add(path)
 
+    def _evaluate(
+        self, evaluator: TemplateEvaluator, body: Any, path: DataPath, written: str
+    ) -> Any:
+        """Return an entry with its expressions evaluated, and its entities repeated."""
+        repeated = _sections_with_conditions(body) if self._at == ('nodes',) else ()
+        if not repeated:
+            return evaluator.evaluate(body, path)
+        rest = {key: value for key, value in body.items() if key not in repeated}
+        filled = evaluator.evaluate_mapping(rest, path)
+        written_at = self._branch(written)
+        for section in repeated:
+            expansion = _Expansion(
+                evaluator,
+                (*path, section),
+                MAX_ENTRIES,
+                self._size,
+                written_at.inner(section),
+            )
+            filled[section] = expansion.expand(body[section])
+        # As written: entities are told in this order.
+        return {key: filled[key] for key in body if key in filled} | filled
+
     def _graft(self, path: DataPath, written: str) -> None:
+        self._evaluator.positions.graft(path, self._branch(written))
+
+    def _branch(self, written: str) -> Branch:
         if self._branches is None:
-            self._branches = self._evaluator.positions.branches((self._section,))
-        self._evaluator.positions.graft(path, self._branches[written])
+            self._branches = self._evaluator.positions.branches(self._at)
+        return self._branches.get(written) or Branch((), ())
 
     def _list_scopes(self, foreach: Any, path: DataPath) -> list[TemplateEvaluator]:
         """Return all scopes of an entry; raise if there are more than entries are allowed."""
@@ -202,7 +250,7 @@ class _Expansion:
         return holds
 
     def _report(self, path: DataPath, message: str) -> None:
-        rule = 'bad-when' if path[2] == _WHEN else 'bad-foreach'
+        rule = 'bad-when' if path[len(self._at) + 1] == _WHEN else 'bad-foreach'
         span = self._evaluator.positions.value(path)
         self._document.diagnostics.append(diagnostic_at(span, rule, message))
 
@@ -210,7 +258,7 @@ class _Expansion:
         self, key: str, path: DataPath, variables: Collection[str] | None
     ) -> None:
         if variables is None:
-            self._evaluator.report_duplicate(key, path, (self._section, key))
+            self._evaluator.report_duplicate(key, path, (*self._at, key))
             return
         self._document.diagnostics.append(
             diagnostic_at(
@@ -223,6 +271,7 @@ class _Expansion:
 
     def _limit_place(self) -> tuple[Related, ...]:
         span = self._evaluator.positions.keys.get(('max_nodes',))
+        span = span if len(self._at) == 1 else None
         return (Related('the limit is set here', span),) if span else ()
 
     def _report_limit(self, path: DataPath, what: str) -> None:
@@ -232,7 +281,9 @@ class _Expansion:
                 'too-many-entries',
                 f'{self._section} has more than {what}',
                 related=self._limit_place(),
-                help="raise 'max_nodes' at the top of the file if that is intended",
+                help="raise 'max_nodes' at the top of the file if that is intended"
+                if len(self._at) == 1
+                else None,
             )
         )
 
@@ -245,5 +296,10 @@ def _help_for_duplicate(written: str, variables: Collection[str]) -> str:
     return f'use its variables in the name, as in "{written}{more}"'
 
 
-def _is_conditional(entry: Any) -> bool:
-    return isinstance(entry, dict) and (_FOREACH in entry or _WHEN in entry)
+def _sections_with_conditions(node: Any) -> tuple[str, ...]:
+    """Return the sections of a node with entities that are repeated, or may be left out."""
+    return tuple(
+        key
+        for key, section in (node.items() if isinstance(node, dict) else ())
+        if key in KIND_OF_SECTION and has_conditions(section)
+    )

@@ -39,7 +39,7 @@ class LoadedSystem(Document):
         sampled_unused: As `sampled`, of what is left out.
         spec: The system without the parts that were wrong; `None` if nothing could be read.
         unused: As `spec`, of the nodes and processes whose `when`, or that of their include, does
-            not hold.
+            not hold; and of nodes with entities whose `when` does not hold, with all of these.
     """
 
     path: Path

@@ -10,6 +10,7 @@ from functools import cache
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
+from composer.entity_kinds import KIND_OF_SECTION
 from composer.input_limits import MAX_FINDINGS
 from composer.records import record
 from composer.schema import schema_path
@@ -39,6 +40,7 @@ _OUTER_SECTIONS = {
     'processes': 'process',
 }
 _DEPTH_OF_ENTRIES = 3
+_DEPTH_OF_ENTITIES = 5
 
 
 def check_structure(document: Document) -> None:
@@ -77,7 +79,8 @@ def check_structure(document: Document) -> None:
 def correct_outer_keys(document: Document) -> None:
     """Correct misspelt keys that are read before the check against the schema.
 
-    These are the keys of the file, of the declarations of arguments, and `foreach` and `when`.
+    These are the keys of the file, of the declarations of arguments, `foreach` and `when`, and the
+    sections of nodes, in which these may stand, too.
     """
     data = document.data or {}
     if not all(map(_is_known, _outer_keys(data))):
@@ -91,7 +94,17 @@ def _outer_keys(data: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for section, definition in _OUTER_SECTIONS.items():
         entries = data.get(section)
         for entry in entries.values() if isinstance(entries, dict) else ():
-            yield from ((definition, key) for key in (entry if isinstance(entry, dict) else ()))
+            if isinstance(entry, dict):
+                yield from ((definition, key) for key in entry)
+                yield from _keys_of_entities(entry) if section == 'nodes' else ()
+
+
+def _keys_of_entities(node: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for section in node.keys() & KIND_OF_SECTION.keys():
+        definition = KIND_OF_SECTION[section].noun.replace(' ', '_')
+        entities = node[section]
+        for entity in entities.values() if isinstance(entities, dict) else ():
+            yield from ((definition, key) for key in (entity if isinstance(entity, dict) else ()))
 
 
 def _is_known(place: tuple[str, str]) -> bool:
@@ -111,8 +124,12 @@ def known_keys(definition: str) -> frozenset[str]:
 def _is_outer(path: DataPath, meant: str) -> bool:
     if len(path) == 1:
         return True
+    is_condition = meant in ('foreach', 'when')
+    if len(path) == _DEPTH_OF_ENTITIES:
+        return path[0] == 'nodes' and path[2] in KIND_OF_SECTION and is_condition
     is_entry = len(path) == _DEPTH_OF_ENTRIES and path[0] in _OUTER_SECTIONS
-    return is_entry and (path[0] == 'args' or meant in ('foreach', 'when'))
+    is_section = path[0] == 'nodes' and meant in KIND_OF_SECTION
+    return is_entry and (path[0] == 'args' or is_condition or is_section)
 
 
 def _correct_keys(

@@ -46,9 +46,9 @@ class ProjectModule:
 
 
 def all_nodes(context: CheckContext) -> list[NodeSpec]:
-    """Return the nodes of a system, with those that are left out this time."""
+    """Return the nodes of a system, with those and all of them that is left out this time."""
     unused = context.system.unused
-    return [*context.spec.nodes.values(), *(unused.nodes.values() if unused else ())]
+    return [*{**context.spec.nodes, **(unused.nodes if unused else {})}.values()]
 
 
 def find_project_modules(context: CheckContext) -> dict[str, ProjectModule]:

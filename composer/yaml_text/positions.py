@@ -19,6 +19,12 @@ class Branch:
     keys: tuple[tuple[DataPath, Span], ...]
     values: tuple[tuple[DataPath, Span], ...]
 
+    def inner(self, section: Key) -> dict[Key, Branch]:
+        """Return the positions of the entries of a mapping in this entry, by their keys."""
+        keys = _grouped(dict(self.keys), (section,), 1)
+        values = _grouped(dict(self.values), (section,), 1)
+        return _branches(keys, values)
+
 
 @dataclass(slots=True)
 class SourceMap:
@@ -76,10 +82,7 @@ class SourceMap:
         depth = len(path)
         keys = _grouped(self.keys, path, depth)
         values = _grouped(self.values, path, depth)
-        return {
-            key: Branch(tuple(keys.get(key, ())), tuple(values.get(key, ())))
-            for key in {**keys, **values}
-        }
+        return _branches(keys, values)
 
     def branch(self, path: DataPath) -> Branch:
         """Return the positions of the entry at `path`."""
@@ -111,6 +114,15 @@ class SourceMap:
         self._indexed = -1
         self.keys.update((path + rest, span) for rest, span in branch.keys)
         self.values.update((path + rest, span) for rest, span in branch.values)
+
+
+def _branches(
+    keys: dict[Key, list[tuple[DataPath, Span]]], values: dict[Key, list[tuple[DataPath, Span]]]
+) -> dict[Key, Branch]:
+    return {
+        key: Branch(tuple(keys.get(key, ())), tuple(values.get(key, ())))
+        for key in {**keys, **values}
+    }
 
 
 def _grouped(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.language.pipeline import load_system_text
+from composer.language.pipeline import load_system, load_system_text
 
 HEAD = 'version: 1\n'
 
@@ -223,3 +223,93 @@ nodes:
 def test_arguments_that_are_no_mapping_are_one_finding():
     system = load('args: [a, b]\nnodes: {n: {log_level: "{{ a }}", on_error: "{{ b }}"}}\n')
     assert [each.rule for each in system.diagnostics] == ['wrong-type']
+
+
+# A value of each kind of entity, repeated and left out.
+ENTITIES = {
+    'parameters': 'default: 1',
+    'publishers': 'type: std_msgs/msg/String',
+    'subscriptions': 'type: std_msgs/msg/String, behaviour: "m:f"',
+    'timers': 'rate: 1, behaviour: "m:f"',
+    'services': 'type: std_srvs/srv/Empty, behaviour: "m:f"',
+    'service_clients': 'type: std_srvs/srv/Empty',
+    'actions': 'type: example_interfaces/action/Fibonacci, behaviour: "m:f"',
+    'action_clients': 'type: example_interfaces/action/Fibonacci',
+}
+
+
+@pytest.mark.parametrize('section', ENTITIES)
+def test_entities_of_every_section_are_repeated_and_left_out_as_nodes_are(section):
+    system = load(
+        f"""
+args: {{count: 2}}
+nodes:
+  "n_{{{{ k }}}}":
+    foreach: {{k: [a, b]}}
+    {section}:
+      "x_{{{{ k }}}}_{{{{ i }}}}":
+        foreach: {{i: "{{{{ range(count) }}}}"}}
+        {ENTITIES[section].replace(', ', chr(10) + '        ')}
+      plain: {{ {ENTITIES[section]} }}
+      gone: {{ when: "{{{{ count > 2 }}}}", {ENTITIES[section]} }}
+"""
+    )
+    assert not system.diagnostics
+    assert {name: [*getattr(node, section)] for name, node in system.spec.nodes.items()} == {
+        'n_a': ['x_a_0', 'x_a_1', 'plain'],
+        'n_b': ['x_b_0', 'x_b_1', 'plain'],
+    }
+    # They are still read, and have their places in the file.
+    assert [*getattr(system.unused.nodes['n_a'], section)][-1] == 'gone'
+    span = system.positions.key(('nodes', 'n_b', section, 'x_b_1'))
+    assert (span.line, span.column) == (8, 7)
+
+
+def test_what_is_wrong_with_a_repeated_entity_is_reported_at_its_place():
+    system = load(
+        """
+nodes:
+  n:
+    publishers:
+      "p_{{ i }}": {foreach: {i: 3}, type: std_msgs/msg/String}
+      "q": {foreach: {i: [1, 2]}, type: std_msgs/msg/String}
+      "r": {when: 1, type: std_msgs/msg/String}
+      "s": {foreach: {}, type: std_msgs/msg/String}
+    timers:
+      t: {whn: "{{ false }}", rate: 1, behaviour: "m:f"}
+    subscription:
+      "x_{{ i }}": {foreach: {i: [1, 2]}, typ: std_msgs/msg/String, behaviour: "m:f"}
+"""
+    )
+    found = [(each.rule, each.span.line, each.span.column) for each in system.diagnostics]
+    assert sorted(found) == [
+        ('bad-foreach', 6, 34),
+        ('bad-foreach', 9, 22),
+        ('bad-when', 8, 19),
+        ('duplicate-key', 7, 7),
+        ('unknown-key', 11, 11),
+        ('unknown-key', 12, 5),
+        ('unknown-key', 13, 43),
+        ('unknown-key', 13, 43),
+    ]
+    assert [*system.spec.nodes['n'].subscriptions] == ['x_1', 'x_2']
+    assert not system.spec.nodes['n'].timers
+
+
+def test_what_is_left_out_of_a_node_of_an_include_is_left_out(tmp_path):
+    (tmp_path / 'part.yaml').write_text(
+        'version: 1\nargs: {debug: false}\nnodes:\n  n:\n    publishers:\n'
+        '      image: std_msgs/msg/String\n'
+        '      marked: {when: "{{ debug }}", type: std_msgs/msg/String}\n'
+    )
+    main = tmp_path / 'main.yaml'
+    main.write_text(
+        'version: 1\ninclude:\n  "{{ side }}": {foreach: {side: [left, right]}, '
+        'namespace: "{{ side }}", file: part.yaml, args: {debug: "{{ side == \'left\' }}"}}\n'
+    )
+    system = load_system(main)
+    assert not system.diagnostics
+    assert [[*node.publishers] for node in system.spec.nodes.values()] == [
+        ['image', 'marked'],
+        ['image'],
+    ]

@@ -46,11 +46,14 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         for name, node in context.spec.nodes.items()
     }
     yield from _check_names(context, uses)
-    lost = _lost_by_node(context)
+    lost, unused = _lost_by_node(context), context.system.unused
+    partial = unused.nodes if unused else {}
     whole = [
         (node, [found for _, found in uses[name]])
         for name, node in context.spec.nodes.items()
         if not any(_may_hide_a_use(path) for path in lost.get(name, []))
+        # What is left out of a node may use the rest of it.
+        and partial.get(name, node) is node
     ]
     yield from _check_unused(context, whole)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from composer.checks.connections.wait_conditions import waiters
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
-from composer.names import expand_name
+from composer.language.specs import LifecycleState, ProcessState
+from composer.names import expand_name, with_article
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,6 +19,10 @@ if TYPE_CHECKING:
 
 _RULE = 'no-lifecycle'
 _HELP = "write 'lifecycle: true' in the node"
+_STATES: dict[str, tuple[str, ...]] = {
+    'node': get_args(LifecycleState),
+    'process': get_args(ProcessState),
+}
 _WITHOUT_EFFECT = 'has no effect'
 
 
@@ -32,13 +38,26 @@ def check_awaited_states(context: CheckContext) -> Iterator[Diagnostic]:
     by_name = {node.full_name: node for node in context.spec.nodes.values()}
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
-            if condition.state is None or condition.kind != 'node':
+            if condition.state is None:
+                continue
+            states = _STATES.get(condition.kind, ())
+            at = (*condition.path[:-1], 'state')
+            if condition.state not in states:
+                what = with_article(condition.kind)
+                yield context.at_value(
+                    at,
+                    'bad-value',
+                    f"'{condition.state}' is no state of {what}",
+                    help=suggest(condition.state, states, 'it may be')
+                    or f'leave it out: {what} is there or not',
+                )
+            if condition.kind != 'node':
                 continue
             name = expand_name(condition.name, waiter.name, waiter.namespace or '/')
             node = by_name.get(name)
             if node and not node.lifecycle and not context.was_dropped((*node.path, 'lifecycle')):
                 yield context.at_value(
-                    (*condition.path[:-1], 'state'),
+                    at,
                     _RULE,
                     f"node '{node.name}' has no lifecycle, and is never {condition.state}",
                     help=f"{_HELP} '{node.name}', or leave the state out",

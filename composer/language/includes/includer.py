@@ -210,7 +210,7 @@ def _used_first(entries: Mapping[str, dict[str, Any]], system: LoadedSystem) -> 
 
 def _count_used(system: LoadedSystem, section: str, limit: int) -> int:
     """Return how many entries a section has; those that are left out count up to a limit."""
-    count = len(system.entries.get(section, ()))
-    if count <= limit:
-        return count
-    return count - sum(path[0] == section for path in system.left_out)
+    entries = system.entries.get(section, ())
+    if len(entries) <= limit:
+        return len(entries)
+    return sum((section, name) not in system.left_out for name in entries)

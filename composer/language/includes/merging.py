@@ -69,7 +69,7 @@ class IncludeMerger:
             elif not is_left_out:
                 self._report_duplicate(inclusion, name, full_node_name(full, simple))
         for name, process in part.entries.get('processes', {}).items():
-            entry = with_waits(process, keys)
+            entry = with_waits(renaming.in_process(process), keys)
             if not takes_ros_arguments(process):
                 entry = with_waits(entry, {}, inclusion.namespace)
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
@@ -135,6 +135,9 @@ class IncludeMerger:
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         whole.chains[new] = (*part.chains.get(old, ()), inclusion.entry.here)
         self._leave_out(new, is_left_out=old in part.left_out)
+        whole.left_out |= {
+            (*new, *path[2:]) for path in part.left_out if len(path) > len(old) and path[:2] == old
+        }
 
     def _leave_out(self, path: DataPath, *, is_left_out: bool) -> None:
         if is_left_out:

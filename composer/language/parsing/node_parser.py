@@ -32,6 +32,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         remap=tuple(data.get('remap', {}).items()),
         lifecycle=_parse_lifecycle(data.get('lifecycle', False)),
         wait_for=parse_conditions(data, path),
+        delay_sec=float(data.get('delay', 0.0)),
         parameter_files=tuple(data.get('parameter_files', ())),
         path=path,
         **{key: data[key] for key in _PLAIN_KEYS if key in data},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import marshal
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import ProcessSpec
     from composer.yaml_text.positions import DataPath
 
 
+# Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
+_DEPTH_OF_ENTITIES = 4
 # The last version in which equal data are written alike, whoever else holds them.
 _MARSHAL_VERSION = 2
 
@@ -47,9 +51,24 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
             }
             if section in ('nodes', 'processes'):
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
+        _leave_out_entities(system, used, unused)
         system.unused = parse_system(unused, name)
     system.data = used
     system.spec = parse_system(used, name, before)
+
+
+def _leave_out_entities(
+    system: LoadedSystem, used: dict[str, Any], unused: dict[str, Any]
+) -> None:
+    """Take entities that are left out of their nodes; with them, these nodes are unused."""
+    for path in system.left_out:
+        if len(path) != _DEPTH_OF_ENTITIES or path[1] not in used['nodes']:
+            continue
+        _, name, section, entity = path
+        unused['nodes'].setdefault(name, used['nodes'][name])
+        if entity in (rest := used['nodes'][name].get(section, {})):
+            without = {key: rest[key] for key in rest if key != entity}
+            used['nodes'][name] = {**used['nodes'][name], section: without}
 
 
 def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> SystemSpec:
@@ -73,9 +92,22 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         environment=MappingProxyType(
             {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
-        processes=parse_entries(
-            data, (), 'processes', _keeping(before, 'processes', parse_process)
+        processes=_with_demand(
+            parse_entries(data, (), 'processes', _keeping(before, 'processes', parse_process))
         ),
+    )
+
+
+def _with_demand(processes: Mapping[str, ProcessSpec]) -> Mapping[str, ProcessSpec]:
+    """Return processes that know whether the end of another one starts them."""
+    started = {each.start for process in processes.values() for each in process.on_exit}
+    return MappingProxyType(
+        {
+            name: each
+            if each.on_demand == (name in started)
+            else replace(each, on_demand=name in started)
+            for name, each in processes.items()
+        }
     )
 
 

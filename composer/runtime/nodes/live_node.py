@@ -207,7 +207,7 @@ class LiveNode:
     def serve_at_once(self) -> None:
         """Answer requests from now on, if the node has nothing to do before."""
         spec = self.spec
-        if spec.on_start or spec.wait_for or spec.lifecycle not in (None, 'unconfigured'):
+        if spec.on_start or spec.starts_late or spec.lifecycle not in (None, 'unconfigured'):
             return
         self.gate.serves = True
         if self.lifecycle:
