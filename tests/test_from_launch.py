@@ -1,5 +1,6 @@
 """The page for people who come from launch files: each of its systems checks, and runs."""
 
+import os
 import re
 import stat
 import sys
@@ -85,7 +86,15 @@ def folder(tmp_path, monkeypatch):
         program.parent.mkdir(parents=True)
         program.write_text(PROGRAM)
         program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    launch_file = prefix / 'share' / 'arm' / 'launch' / 'arm.launch.py'
+    launch_file.parent.mkdir(parents=True)
+    launch_file.write_text("DeclareLaunchArgument('side')\n")
+    (index / 'arm').touch()
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    (tmp_path / 'bin').mkdir()
+    (tmp_path / 'bin' / 'ros2').write_text(PROGRAM)
+    (tmp_path / 'bin' / 'ros2').chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path / 'bin'), prepend=os.pathsep)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

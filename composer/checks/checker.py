@@ -25,6 +25,7 @@ from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.environment import check_environment
 from composer.checks.ignore_comments import IgnoreComments
+from composer.checks.launch_files import check_launch_files
 from composer.checks.left_out import check_left_out
 from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
@@ -76,6 +77,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
     check_parameter_files,
     check_executables,
+    check_launch_files,
     check_left_out,
     check_waits,
     check_environment,

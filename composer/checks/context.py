@@ -6,14 +6,17 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.ament import find_meant_package
 from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
-from composer.language.bindings import Binding, node_bindings
+from composer.language.bindings import Binding, exit_bindings, node_bindings
+from composer.language.specs import DeclaredEndSpec
 from composer.records import record
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import Unpack
 
     from composer.diagnostics import Diagnostic, Remarks, Span
@@ -73,6 +76,13 @@ class CheckContext:
             self._bindings[node.path] = [*node_bindings(node)]
         return self._bindings[node.path]
 
+    def all_bindings(self) -> Iterator[Binding]:
+        """Yield the behaviours of all nodes and processes."""
+        for node in self.spec.nodes.values():
+            yield from self.bindings(node)
+        for process in self.spec.processes.values():
+            yield from exit_bindings(process)
+
     @cached_property
     def _bindings(self) -> dict[DataPath, list[Binding]]:
         return {}
@@ -85,7 +95,7 @@ class CheckContext:
         """Return whether an entry is missing because of an error that was reported already."""
         return path in self.system.dropped
 
-    def has_real_type(self, entity: EndSpec) -> bool:
+    def has_real_type(self, entity: EndSpec | DeclaredEndSpec) -> bool:
         """Return whether the type of an entity is known to be the one that is meant.
 
         It is none that stands in for a missing one, hangs on a sample, or does not exist.
@@ -95,7 +105,19 @@ class CheckContext:
             return False
         if sampled and self.system.positions.value(self.inner(path, 'type')) in sampled:
             return False
-        return not self.catalogue.available or self.catalogue.has(entity.type)
+        return not self.catalogue.available or self.knows_type(entity)
+
+    def knows_type(self, entity: EndSpec | DeclaredEndSpec) -> bool:
+        """Return whether there is the type of an entity.
+
+        An external process may have types of packages that are not installed here.
+        """
+        if self.catalogue.has(entity.type):
+            return True
+        package, known = entity.type.partition('/')[0], self.catalogue.packages()
+        if package in known or not isinstance(entity, DeclaredEndSpec):
+            return False
+        return find_meant_package(package, known, most_edits=1) is None
 
     def at_value(
         self,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from composer.confidential import conceal
 from composer.diagnostics import Related
-from composer.language.specs import NodeSpec
+from composer.language.specs import DeclaredNodeSpec, NodeSpec
 from composer.names import (
     MAX_TOPIC_NAME,
     expand_name,
@@ -55,6 +55,24 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
             if problem:
                 yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {problem}")
         yield from check_rules(context, node)
+    for process in context.spec.processes.values():
+        for declared in process.nodes:
+            yield from _check_declared(context, declared)
+
+
+def _check_declared(context: CheckContext, node: DeclaredNodeSpec) -> Iterator[Diagnostic]:
+    """Check the names in what an external process is said to have."""
+    is_apart = node.path[-1] != node.process
+    if is_apart and (problem := find_node_name_problem(node.name)):
+        message = f"'{node.name}' cannot name a node: {problem}"
+        yield context.at_key(node.path, _RULE, message)
+        return
+    for kind, end in node.ends():
+        yield from _check_ros_name(context, node, end.path, str(kind.channel), end.channel)
+    for parameter in node.parameters.values() if is_apart else ():
+        problem = find_parameter_name_problem(parameter.name)
+        if problem:
+            yield context.at_key(parameter.path, _RULE, f"'{parameter.name}': {problem}")
 
 
 def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
@@ -140,7 +158,11 @@ def _check_ros_names(context: CheckContext, node: NodeSpec) -> Iterator[Diagnost
 
 
 def _check_ros_name(
-    context: CheckContext, node: NodeSpec, entity: DataPath, kind: str, name: str
+    context: CheckContext,
+    node: NodeSpec | DeclaredNodeSpec,
+    entity: DataPath,
+    kind: str,
+    name: str,
 ) -> Iterator[Diagnostic]:
     problem = find_topic_name_problem(name, kind) or _find_full_name_problem(node, name, kind)
     if not problem:
@@ -154,7 +176,9 @@ def _check_ros_name(
         yield context.at_key(entity, _RULE, message, help=help_text)
 
 
-def _find_full_name_problem(node: NodeSpec, topic: str, kind: str = 'topic') -> str | None:
+def _find_full_name_problem(
+    node: NodeSpec | DeclaredNodeSpec, topic: str, kind: str = 'topic'
+) -> str | None:
     """Return the error of a name in its namespace, such as its length."""
     if find_node_name_problem(node.name) or find_namespace_problem(node.namespace):
         return None

@@ -38,6 +38,11 @@ _STEP_TOLERANCE = 1e-6
 
 def check_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check each declaration against itself."""
+    for process in context.spec.processes.values():
+        for declared in process.nodes:
+            for name, parameter in declared.parameters.items():
+                if name not in OF_EVERY_NODE:
+                    yield from _check_parameter(context, parameter)
     for node in context.spec.nodes.values():
         for parameter in node.parameters.values():
             yield from _check_parameter(context, parameter)

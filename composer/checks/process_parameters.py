@@ -1,5 +1,6 @@
 """Parameters of processes: values that rcl refuses or reads as something else.
 
+Where the parameters of its nodes are declared: values that these refuse or ignore.
 Source: `parse_value` and `parse_key` in rcl (`rcl_yaml_param_parser/src/parse.c`).
 """
 
@@ -7,21 +8,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from composer.checks.connections.typos import find_typo
+from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.names import find_parameter_name_problem, with_article
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_problem,
     infer_parameter_type,
 )
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import ParameterSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
+# Parameters with which ROS changes the QoS of a publisher or subscription.
+_OVERRIDES = 'qos_overrides.'
 _NO_NULL = 'there is no value, and ROS has no null'
 
 
@@ -29,7 +36,64 @@ def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that ROS takes the names and values."""
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
-        yield from _check_mapping(context, process.parameters, path, '', {})
+        seen: dict[str, DataPath] = {}
+        yield from _check_mapping(context, process.parameters, path, '', seen)
+        if process.nodes:
+            yield from _compare_with_declared(context, process, seen)
+
+
+def _compare_with_declared(
+    context: CheckContext, process: ProcessSpec, given: Mapping[str, DataPath]
+) -> Iterator[Diagnostic]:
+    declared: dict[str, list[ParameterSpec]] = {}
+    for node in process.nodes:
+        for name, parameter in node.parameters.items():
+            declared.setdefault(name, []).append(parameter)
+    apart = [node for node in process.nodes if node.path != process.path]
+    knows_all = bool(apart) and all(node.declares_all_parameters for node in apart)
+    for name, path in given.items():
+        if name in OF_EVERY_NODE or name.startswith(_OVERRIDES):
+            continue
+        if name in declared:
+            yield from _find_refusals(context, process, path, declared[name])
+        elif knows_all or find_typo(name, declared):
+            yield context.at_key(
+                path,
+                'undeclared-parameter',
+                f"process '{process.name}' declares no parameter '{name}', and ROS ignores it",
+                help=suggest(name, declared, 'declared are', 'it declares none'),
+            )
+
+
+def _find_refusals(
+    context: CheckContext, process: ProcessSpec, path: DataPath, declared: list[ParameterSpec]
+) -> Iterator[Diagnostic]:
+    value: Any = process.parameters
+    for key in path[len(process.path) + 1 :]:
+        value = value[key]
+    for parameter in declared:
+        if any(path[: len(parameter.path)] == each.path for each in declared):
+            return  # The value of the declaration itself.
+        inferred = infer_parameter_type(value)
+        if parameter.type is None or inferred is None:
+            continue
+        help_text = find_nearest_choice(parameter, value)
+        if inferred != parameter.type:
+            got, wanted = with_article(inferred), with_article(parameter.type)
+            problem: str | None = f'expected {wanted}, and ROS takes this for {got}'
+            is_whole = (parameter.type, inferred) == ('double', 'integer')
+            help_text = f'write {float(value)}' if is_whole else None
+        else:
+            problem = find_refusal(parameter, value)
+        if problem:
+            yield context.at_value(
+                path,
+                'refused-parameter',
+                f"parameter '{parameter.name}' of process '{process.name}': {problem}",
+                help=help_text,
+                related=[context.related(parameter.path, 'declared here')],
+            )
+            return
 
 
 def _check_mapping(

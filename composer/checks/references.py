@@ -92,7 +92,7 @@ def check_qos(context: CheckContext) -> Iterator[Diagnostic]:
             message = f"'{name}' is a profile of ROS and cannot be declared again"
             yield context.at_key(profile.path, 'bad-name', message)
     declared: dict[DataPath, QosSpec] = {profile.path: profile for profile in profiles.values()}
-    for node in context.spec.nodes.values():
+    for node in context.spec.end_owners():
         for _, entity in node.ends():
             qos: QosSpec | None = getattr(entity, 'qos', None)
             if qos is not None:
@@ -119,14 +119,14 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
     catalogue = context.catalogue
     if not catalogue.available:
         return
-    for node in context.spec.nodes.values():
+    for node in context.spec.end_owners():
         for _, entity in node.ends():
             package = entity.type.partition('/')[0]
             unreadable = package in context.interfaces.unreadable or any(
                 context.was_dropped(path) for path in (('interfaces',), ('interfaces', package))
             )
             stands_in = context.was_dropped((*entity.path, 'type'))
-            if unreadable or stands_in or catalogue.has(entity.type):
+            if unreadable or stands_in or context.knows_type(entity):
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 # Keys that have no meaning any more once a system is resolved.
-_RESOLVED_KEYS = ('args', 'check', 'max_nodes')
+_RESOLVED_KEYS = ('args', 'vars', 'check', 'max_nodes')
 _SIM_TIME = 'use_sim_time'
 
 

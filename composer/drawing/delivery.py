@@ -34,6 +34,8 @@ _KEPT_LOCALLY = {
 }
 _TURNED_OFF = 'local_delivery: false'
 OUTSIDE: Final = 'external: true'
+# One end is in an external process.
+PROCESS: Final = 'external process'
 
 
 @record
@@ -92,6 +94,7 @@ def _of_topic(
         reasons = [
             '' if getattr(publisher.entity, 'local_delivery', True) else _TURNED_OFF,
             *(_why_sent(policies[each.path]) for each in (publisher, *matched)),
+            PROCESS if any(each.is_declared for each in (publisher, *matched)) else '',
             OUTSIDE if getattr(publisher.entity, 'external', False) else '',
         ]
         found = _delivery(reasons) if matched or reasons[-1] else Delivery()
@@ -121,6 +124,8 @@ def _of_calls(
 
 
 def _why_call_is_sent(end: Endpoint, profiles: Mapping[str, QosSpec]) -> str:
+    if end.is_declared:
+        return PROCESS
     if not getattr(end.entity, 'local_delivery', True):
         return _TURNED_OFF
     return _why_sent(_policies_of(end, profiles)) if end.qos else ''

@@ -56,7 +56,7 @@ class FindingPlaces:
 
     def _place(self, index: int, finding: Diagnostic) -> None:
         paths = self._paths.at(finding.span) if finding.span else []
-        ends = [path[:_ENTITY] for path in paths if self._is_end(path)]
+        ends = [_end_of(path) for path in paths if self._is_end(path)]
         ends = self._named_by(finding, ends)
         for end in ends:
             if finding.rule in _OF_CHANNELS:
@@ -76,13 +76,14 @@ class FindingPlaces:
         channels = {id(self._channel_of_end[end]) for end in ends}
         for related in finding.related:
             for path in self._paths.at(related.span):
-                partner = path[:_ENTITY]
+                partner = _end_of(path)
                 if id(self._channel_of_end.get(partner)) in channels:
                     self._edges[partner].append(index)
 
     def _is_end(self, path: DataPath) -> bool:
-        inner = path[_ENTITY : _ENTITY + 1]
-        return path[:_ENTITY] in self._channel_of_end and not _OF_BEHAVIOURS.intersection(inner)
+        end = _end_of(path)
+        inner = path[len(end) : len(end) + 1]
+        return end in self._channel_of_end and not _OF_BEHAVIOURS.intersection(inner)
 
     def _named_by(self, finding: Diagnostic, ends: list[DataPath]) -> list[DataPath]:
         """Return the ends whose channel the finding names, of several written in one place."""
@@ -110,6 +111,12 @@ class _PathFinder:
         for span, path in self._lines.get((place.source, place.line), ()):
             if span.column <= place.column < span.column + max(span.length, 1):
                 yield path
+
+
+def _end_of(path: DataPath) -> DataPath:
+    """Return the part of a path that an end would have; a process may have several nodes."""
+    is_inside = path[:1] == ('processes',) and path[_NODE : _NODE + 1] == ('nodes',)
+    return path[: _ENTITY + 2 if is_inside else _ENTITY]
 
 
 def _unique(indices: list[int]) -> tuple[int, ...]:

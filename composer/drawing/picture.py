@@ -208,7 +208,7 @@ def _edges(
     for channel in topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
-            node = ids[end.node.path]
+            node = ids[end.node.path[:2]]
             yield Edge(
                 f'{end.kind.noun}:{node.partition(":")[2]}:{end.entity.name}',
                 _role(end),
@@ -245,6 +245,10 @@ def _waits(
             target = _target(waiter, condition)
             if target in known:
                 yield Wait(ids[waiter.path], target, condition.path)
+    for process in context.spec.processes.values():
+        for action in process.on_exit:
+            if f'process:{action.start}' in known:
+                yield Wait(f'process:{action.start}', ids[process.path], action.path)
 
 
 def _target(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:

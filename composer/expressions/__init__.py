@@ -16,9 +16,27 @@ _RESERVED = frozenset(
 ) | {'True', 'False', 'None'}
 
 
+# The name under which an expression finds all arguments of its file, as in `args['a.b']`.
+ARGUMENTS = 'args'
+# The names that stand for something in every expression.
+BUILT_IN = frozenset((ARGUMENTS, 'env', 'find', 'here', 'range'))
+
+
 def is_variable_name(name: str) -> bool:
     """Return whether an expression can use a name."""
     return name.isidentifier() and name not in _RESERVED
+
+
+def is_argument_name(name: str) -> bool:
+    """Return whether an expression can use the name of an argument, which may have dots."""
+    return name != ARGUMENTS and (
+        is_variable_name(name) or ('.' in name and all(map(str.isidentifier, name.split('.'))))
+    )
+
+
+def written_in_expression(name: str) -> str:
+    """Return how an expression writes the name of an argument."""
+    return f"{ARGUMENTS}['{name}']" if '.' in name else name
 
 
 def is_conditional(entry: Any) -> bool:

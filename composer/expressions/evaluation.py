@@ -10,9 +10,9 @@ from __future__ import annotations
 import operator
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import StrictUndefined, TemplateAssertionError, nodes
+from jinja2 import StrictUndefined, TemplateAssertionError, UndefinedError, nodes
 
-from composer.expressions import limits
+from composer.expressions import ARGUMENTS, limits
 from composer.expressions.sandbox import too_deep
 from composer.spelling import suggest
 
@@ -20,6 +20,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from composer.expressions.sandbox import Sandbox
+
+
+class UnknownArgumentError(UndefinedError):
+    """An expression asks for an argument that the file does not declare.
+
+    Attributes:
+        name: The argument.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no argument '{name}'")
+        self.name = name
 
 
 def evaluate_expression(sandbox: Sandbox, code: str, values: Mapping[str, Any]) -> Any:
@@ -101,6 +113,18 @@ class Evaluator:
             limits.limit_percent_format(left, right)
         return _BINARY[type(node)](left, right)
 
+    def item(self, node: nodes.Getitem) -> Any:
+        """Return an item of a value.
+
+        Raises:
+            UnknownArgumentError: There is no such item in `args`.
+        """
+        owner, key = self.value(node.node), self.value(node.arg)
+        is_argument = isinstance(node.node, nodes.Name) and node.node.name == ARGUMENTS
+        if is_argument and isinstance(key, str) and key not in owner:
+            raise UnknownArgumentError(key)
+        return self.sandbox.getitem(owner, key)
+
     def slice(self, node: nodes.Slice) -> slice:
         """Return a part of a sequence as Python names it."""
         ends = (node.start, node.stop, node.step)
@@ -180,9 +204,7 @@ _NODES: dict[type, Callable[[Evaluator, Any], Any]] = {
     nodes.Concat: Evaluator.concatenation,
     nodes.Compare: Evaluator.comparison,
     nodes.Getattr: lambda this, node: this.sandbox.attribute(this.value(node.node), node.attr),
-    nodes.Getitem: lambda this, node: this.sandbox.getitem(
-        this.value(node.node), this.value(node.arg)
-    ),
+    nodes.Getitem: Evaluator.item,
     nodes.Slice: Evaluator.slice,
     nodes.Call: Evaluator.call,
     nodes.Filter: Evaluator.filter_or_test,

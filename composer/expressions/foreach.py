@@ -25,6 +25,7 @@ from composer.yaml_text.positions import Branch
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
+    from composer.expressions.scope import Scope
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key
 
@@ -37,9 +38,7 @@ _SAMPLE = 1
 def expand_document(
     document: Document,
     data: dict[str, Any],
-    values: Mapping[str, Any],
-    samples: Collection[str] = (),
-    origins: Mapping[str, str] | None = None,
+    scope: Scope,
 ) -> dict[str, Any] | None:
     """Return data with all expressions evaluated, and entries repeated or left out.
 
@@ -47,11 +46,9 @@ def expand_document(
 
     Args:
         document: The document that the data are from; what is learnt on the way goes there.
-        values: What is in scope, by name.
-        samples: The names whose values only stand for others of their type.
-        origins: Where the values come from, in words.
+        scope: What is in scope.
     """
-    evaluator = TemplateEvaluator(document, values, samples, origins)
+    evaluator = TemplateEvaluator(document, scope)
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
     plain = {key: value for key, value in data.items() if key not in (*SECTIONS, *ignored)}
     filled = evaluator.evaluate_mapping(plain, ()) | ignored

@@ -13,7 +13,7 @@ from jinja2.parser import Parser
 from jinja2.runtime import new_context
 from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 
-from composer.expressions import limits
+from composer.expressions import ARGUMENTS, limits
 from composer.expressions.functions import FUNCTIONS
 from composer.records import record
 
@@ -110,7 +110,7 @@ class Sandbox(SandboxedEnvironment):
         return expression
 
     def names_in(self, code: str) -> frozenset[str]:
-        """Return the names that an expression uses.
+        """Return the names that an expression uses; for `args['a.b']` that is `a.b`.
 
         Raises:
             TemplateError: It cannot be read.
@@ -118,11 +118,9 @@ class Sandbox(SandboxedEnvironment):
         if code not in self._names:
             expression = self.parse_expression(code)
             try:
-                found = {each.name for each in expression.find_all(nodes.Name)}
+                self._names[code] = _names_of([expression, *expression.find_all(nodes.Node)])
             except RecursionError:
                 raise too_deep() from None
-            found |= {expression.name} if isinstance(expression, nodes.Name) else set()
-            self._names[code] = frozenset(found)
         return self._names[code]
 
     def attribute(self, owner: Any, name: str) -> Any:
@@ -197,6 +195,22 @@ class Sandbox(SandboxedEnvironment):
             return self.budget.collect(value)
         self.budget.spend(value)
         return value
+
+
+def _names_of(parts: Sequence[nodes.Node]) -> frozenset[str]:
+    names = [part.name for part in parts if isinstance(part, nodes.Name)]
+    arguments = [name for part in parts if (name := _argument_of(part)) is not None]
+    if names.count(ARGUMENTS) == len(arguments):
+        names = [name for name in names if name != ARGUMENTS]
+    return frozenset((*names, *arguments))
+
+
+def _argument_of(part: nodes.Node) -> str | None:
+    """Return the argument that `args['name']` stands for."""
+    if not isinstance(part, nodes.Getitem) or not isinstance(part.node, nodes.Name):
+        return None
+    key = part.arg.value if isinstance(part.arg, nodes.Const) else None
+    return key if part.node.name == ARGUMENTS and isinstance(key, str) else None
 
 
 def too_deep() -> TemplateRuntimeError:

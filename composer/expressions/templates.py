@@ -24,7 +24,8 @@ from jinja2.exceptions import SecurityError
 
 from composer.confidential import hide, origin_of
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
-from composer.expressions.evaluation import evaluate_expression
+from composer.expressions import ARGUMENTS, written_in_expression
+from composer.expressions.evaluation import UnknownArgumentError, evaluate_expression
 from composer.expressions.functions import PackageError
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions, locate_name
@@ -34,9 +35,8 @@ from composer.spelling import find_nearest, suggest
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
     from composer.diagnostics import Span
+    from composer.expressions.scope import Scope
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath
 
@@ -54,25 +54,20 @@ class TemplateEvaluator:
 
     Args:
         document: Findings, and what else is learnt about the values, go there.
-        values: What is in scope, by name.
-        samples: The names whose values only stand for others of their type.
-        origins: Where the values come from, in words.
+        scope: What is in scope.
         sandbox: What is shared with the other evaluators of the document.
     """
 
     def __init__(
         self,
         document: Document,
-        values: Mapping[str, Any],
-        samples: Collection[str] = (),
-        origins: Mapping[str, str] | None = None,
+        scope: Scope,
         sandbox: Sandbox | None = None,
     ) -> None:
         self.document = document
         self.positions = document.positions
-        self._origins = origins or {}
-        self._values = values
-        self._samples = frozenset(samples)
+        self.scope = scope
+        self._values = scope.values
         self._sandbox = sandbox or Sandbox()
 
     def spend_on_values(self, count: int) -> None:
@@ -83,11 +78,25 @@ class TemplateEvaluator:
         """
         self._sandbox.budget.spend_on_values(count)
 
+    def in_scope(self, scope: Scope) -> TemplateEvaluator:
+        """Return an evaluator with another scope, for the same document."""
+        return TemplateEvaluator(self.document, scope, self._sandbox)
+
     def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> TemplateEvaluator:
         """Return an evaluator with one more name in scope, for the same document."""
-        samples = self._samples | {name} if is_sample else self._samples - {name}
-        values, origins = {**self._values, name: value}, {**self._origins, name: origin}
-        return TemplateEvaluator(self.document, values, samples, origins, self._sandbox)
+        return self.in_scope(self.scope.within(name, value, origin, is_sample=is_sample))
+
+    def names_in(self, data: Any) -> frozenset[str]:
+        """Return the names that the expressions in data use, as far as they can be read."""
+        if isinstance(data, dict):
+            data = [*data, *data.values()]
+        if isinstance(data, list):
+            return frozenset().union(*map(self.names_in, data))
+        if not (isinstance(data, str) and OPEN in data):
+            return frozenset()
+        with suppress(TemplateError):
+            return self._names_in(data, list(find_expressions(data, self._sandbox)))
+        return frozenset()
 
     def evaluate(self, data: Any, path: DataPath) -> Any:
         """Return data with the values of all expressions in place."""
@@ -119,9 +128,13 @@ class TemplateEvaluator:
             return written
         return _as_text(self._evaluate(written, path, is_key=True))
 
+    def has_failed(self, path: DataPath) -> bool:
+        """Return whether the value at a path, or one in it, could not be evaluated."""
+        return any(each[: len(path)] == path for each in self.document.dropped)
+
     def is_sampled(self, path: DataPath) -> bool:
-        """Return whether the value at a path depends on samples."""
-        return path in self.document.sampled_paths
+        """Return whether the value at a path, or one in it, depends on samples."""
+        return any(each[: len(path)] == path for each in self.document.sampled_paths)
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
         if self._sandbox.explained > MAX_FINDINGS:
@@ -135,7 +148,7 @@ class TemplateEvaluator:
             expressions = list(find_expressions(text, self._sandbox))
             names = self._names_in(text, expressions)
             self.document.notes[path] = self._note(names)
-            sampled = not self._samples.isdisjoint(names)
+            sampled = self.scope.has_samples(names)
             if sampled:
                 self.document.sampled.append(span)
                 self.document.sampled_paths |= set() if is_key else {path}
@@ -173,10 +186,12 @@ class TemplateEvaluator:
         return ''.join([*parts, text[start:]])
 
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
-        scope = self._values
+        scope, code = self._values, code_of(text, expression)
+        if ARGUMENTS in code:
+            scope = {ARGUMENTS: self.scope.argument_values(), **scope}
         if 'here' in self._names_in(text, [expression]):
             scope = {'here': os.path.realpath(span.source.folder), **scope}
-        value = _as_data(evaluate_expression(self._sandbox, code_of(text, expression), scope))
+        value = _as_data(evaluate_expression(self._sandbox, code, scope))
         origin = self._hidden_origin(text, [expression])
         if origin is not None:
             hide(value, origin)
@@ -203,24 +218,19 @@ class TemplateEvaluator:
         return frozenset(names)
 
     def _note(self, names: frozenset[str]) -> str:
-        used = sorted(names & self._origins.keys())
-        return ', '.join(f'{name} = {self._values[name]} ({self._origins[name]})' for name in used)
+        origins = self.scope.origins
+        used = sorted(names & origins.keys())
+        return ', '.join(f'{name} = {self._values[name]} ({origins[name]})' for name in used)
 
     def _explain(self, error: Exception, span: Span, origin: str | None) -> Diagnostic:
         if isinstance(error, UndefinedError) and (
             found := _UNDEFINED_NAME.fullmatch(str(error.message))
         ):
-            name = found.group(1)
-            is_searched = self._sandbox.explained <= _MOST_SEARCHED
-            scope = {*self._values, 'here', *self._sandbox.globals} if is_searched else set()
-            declared = self._values or find_nearest(name, scope)
-            listed = 'in scope are' if declared else None
-            return diagnostic_at(
-                locate_name(name, span),
-                'undefined-name',
-                f"'{name}' is not defined",
-                help=suggest(name, scope, listed, "declare it as an argument, under 'args'"),
-            )
+            return self._explain_undefined(found.group(1), span)
+        if isinstance(error, UnknownArgumentError):
+            help_text = suggest(error.name, self.scope.arguments, 'the file declares')
+            place = span.narrowed_to(error.name)
+            return diagnostic_at(place, 'undefined-name', str(error.message), help=help_text)
         is_package = isinstance(error, PackageError)
         rule = 'uninstalled-package' if is_package else 'bad-expression'
         if origin is None:
@@ -229,6 +239,20 @@ class TemplateEvaluator:
         # Its text may quote any part of the value.
         message = f'the expression raised {type(error).__name__} with a value from {origin}'
         return diagnostic_at(span, rule, message)
+
+    def _explain_undefined(self, name: str, span: Span) -> Diagnostic:
+        is_searched = self._sandbox.explained <= _MOST_SEARCHED
+        scope = self.scope.names if is_searched else set()
+        declared = self._values or find_nearest(name, scope)
+        listed = 'in scope are' if declared else None
+        dotted = next((each for each in self._values if each.startswith(f'{name}.')), None)
+        advice = (
+            f'write {written_in_expression(dotted)}'
+            if dotted
+            else suggest(name, scope, listed, "declare it as an argument, under 'args'")
+        )
+        message = f"'{name}' is not defined"
+        return diagnostic_at(locate_name(name, span), 'undefined-name', message, help=advice)
 
     def report_duplicate(self, key: str, path: DataPath, other: DataPath) -> None:
         """Report that two keys of one mapping evaluate to the same."""

@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
-from composer.expressions import is_variable_name
+from composer.expressions import ARGUMENTS, is_argument_name
 from composer.records import record
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -33,8 +33,8 @@ class ArgumentSpec:
     """An argument of a file.
 
     Attributes:
-        type: `bool`, `integer`, `double` or `string`.
-        default: `None` if a value is required.
+        type: `bool`, `integer`, `double` or `string`; empty if only a computed default tells it.
+        default: `None` if a value is required; a text with expressions if it is computed.
         choices: The values that are allowed; none if all are.
     """
 
@@ -50,11 +50,16 @@ class ArgumentSpec:
         return self.default is None and not self.choices
 
     @property
+    def is_computed(self) -> bool:
+        """Whether the default is computed from other values."""
+        return isinstance(self.default, str) and '{{' in self.default
+
+    @property
     def sample(self) -> Any:
         """A value to check the file with when none is given."""
-        if self.default is not None:
+        if self.default is not None and not self.is_computed:
             return self.default
-        return self.choices[0] if self.choices else _SAMPLES[self.type]
+        return self.choices[0] if self.choices else _SAMPLES[self.type or 'string']
 
     def __str__(self) -> str:
         """Return name, type, default and choices in one line."""
@@ -68,6 +73,8 @@ class ArgumentSpec:
 @record
 class ArgumentValues:
     """The values of a file's arguments.
+
+    Those with a computed default are missing unless they are given.
 
     Attributes:
         samples: The names of those whose value is a sample of its type.
@@ -85,7 +92,11 @@ GiveValues: TypeAlias = Callable[[Mapping[str, ArgumentSpec]], ArgumentValues]
 def sample_values(declared: Mapping[str, ArgumentSpec]) -> ArgumentValues:
     """Return values to check a file with: defaults, and samples where there are none."""
     return ArgumentValues(
-        {name: argument.sample for name, argument in declared.items()},
+        {
+            name: argument.sample
+            for name, argument in declared.items()
+            if not argument.is_computed or _is_unknown(argument)
+        },
         {name for name, argument in declared.items() if _is_unknown(argument)},
     )
 
@@ -127,8 +138,9 @@ def _read_argument(name: str, data: Any) -> ArgumentSpec:
     default = entry.get('default')
     type_name = entry.get('type')
     if type_name not in ARGUMENT_TYPES:
-        type_name = infer_parameter_type(default)
-    if type_name not in ARGUMENT_TYPES:
+        is_computed = isinstance(default, str) and '{{' in default
+        type_name = '' if is_computed else infer_parameter_type(default)
+    if type_name not in (*ARGUMENT_TYPES, ''):
         type_name = 'string'
     choices = entry.get('choices')
     return ArgumentSpec(
@@ -147,9 +159,12 @@ def find_declaration_errors(
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if not is_variable_name(argument.name):
+    if argument.name == ARGUMENTS:
+        yield (), f"'{ARGUMENTS}' stands for all arguments in expressions", 'choose another name'
+    elif not is_argument_name(argument.name):
         yield (), f"'{argument.name}' cannot be used as a name in expressions", None
-    default, choices = argument.default, argument.choices
+    choices = argument.choices
+    default = None if argument.is_computed else argument.default
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
@@ -164,8 +179,8 @@ def _find_default_problem(value: Any, type_name: str) -> str | None:
     if isinstance(value, list | dict):
         return None  # the schema says so
     if isinstance(value, str) and '{{' in value:
-        return 'a declaration cannot hold an expression'
-    return find_type_problem(value, type_name)
+        return 'a choice cannot be an expression'
+    return find_type_problem(value, type_name) if type_name else None
 
 
 def parse_arguments(
@@ -191,7 +206,7 @@ def parse_arguments(
             problems.append(f"'{name}' is given twice: {given[name]!r} and {text!r}")
         else:
             given[name] = text
-    values = {name: argument.default for name, argument in declared.items()}
+    values = {name: each.default for name, each in declared.items() if not each.is_computed}
     for name, argument in declared.items():
         if name in given:
             values[name] = _parse_value(argument, given[name], problems)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import diagnostic_at
+from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import KIND_OF_SECTION
-from composer.expressions import SECTIONS, has_conditions
+from composer.expressions import BUILT_IN, SECTIONS, has_conditions, is_variable_name
 from composer.language.arguments import (
     find_declaration_errors,
     parse_declarations,
@@ -34,8 +34,13 @@ def give_arguments(system: LoadedSystem, give_values: GiveValues) -> None:
     correct_outer_keys(system)
     system.arguments = parse_declarations(system.entries)
     findings = list(_check_declarations(system.arguments, system.positions))
-    system.diagnostics += findings
+    system.diagnostics += [*findings, *_check_variables(system)]
     is_usable = not findings and is_sound({'args': written})
+    if not all(argument.type for argument in system.arguments.values()):
+        from composer.language.computed_values import infer_argument_types
+
+        samples = sample_values(system.arguments)
+        system.arguments = infer_argument_types(system, system.arguments, samples)
     system.given = (give_values if is_usable else sample_values)(system.arguments)
 
 
@@ -46,23 +51,19 @@ def evaluate_expressions(system: LoadedSystem) -> None:
         return
     # jinja2 takes a tenth of a check's time to import, and most files have no expressions.
     from composer.expressions.foreach import expand_document
+    from composer.language.computed_values import compute_values
 
-    declarations = {key: data[key] for key in ('args', 'check') if key in data}
+    declarations = {key: data[key] for key in ('args', 'vars', 'check') if key in data}
     rest = {key: value for key, value in data.items() if key not in declarations}
-    given, before = system.given, len(system.diagnostics)
-    origins = {name: _origin(name, system) for name in given.values}
-    expanded = expand_document(system, rest, given.values, given.samples, origins)
+    before = len(system.diagnostics)
+    scope = compute_values(system, system.arguments, system.given)
+    expanded = expand_document(system, rest, scope)
     # Of a file with too many entries nothing is left.
     system.data = None if expanded is None else expanded | declarations
-    if not isinstance(data.get('args', {}), dict):
+    if not all(isinstance(data.get(key, {}), dict) for key in ('args', 'vars')):
         # Nothing is known of the arguments, not even their names.
         found = system.diagnostics[before:]
         system.diagnostics[before:] = [each for each in found if each.rule != 'undefined-name']
-
-
-def _origin(name: str, system: LoadedSystem) -> str:
-    place = system.positions.value(('args', name, 'default'))
-    return system.given.origins.get(name) or f'default, {place.place}'
 
 
 def _has_expressions(positions: SourceMap) -> bool:
@@ -79,6 +80,25 @@ def _has_conditions(data: Mapping[str, Any]) -> bool:
         if isinstance(node, dict)
         for key, section in node.items()
     )
+
+
+def _check_variables(system: LoadedSystem) -> Iterable[Diagnostic]:
+    variables = system.entries.get('vars')
+    for name in variables if isinstance(variables, dict) else ():
+        related: tuple[Related, ...] = ()
+        if not is_variable_name(name):
+            message = f"'{name}' cannot be used as a name in expressions"
+        elif name in system.arguments:
+            message = f"'{name}' is an argument already"
+            span = system.positions.key(('args', name))
+            related = (Related('declared here', span),)
+        elif name in BUILT_IN:
+            message = f"'{name}' means something else in expressions"
+        else:
+            continue
+        span = system.positions.key(('vars', name))
+        advice = 'choose another name'
+        yield diagnostic_at(span, 'bad-variable', message, help=advice, related=related)
 
 
 def _check_declarations(

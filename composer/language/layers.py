@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.yaml_text.positions import DataPath, SourceMap
 
+# What only expressions use.
+_VALUES: dict[DataPath, str] = {('args',): 'argument', ('vars',): 'variable'}
 # What is in these is the user's own.
 _FREE = ('message', 'state', 'with')
 
@@ -84,8 +86,8 @@ class _Merging:
                     continue
                 if key not in merged and _only_changes_a_node(at, value):
                     self._report(at, f"there is no node '{key}' to change", below)
-                if key not in merged and path == ('args',) and not self._is_used(key):
-                    self._report(at, f"there is no argument '{key}' to change", below)
+                if key not in merged and path in _VALUES and not self._is_used(key):
+                    self._report(at, f"there is no {_VALUES[path]} '{key}' to change", below)
                 if key not in merged and (near := self._find_typo(at, below)):
                     self._report(at, f"there is no '{key}' to change", [near])
                 merged[key] = self._without_removals(value, at)

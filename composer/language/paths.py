@@ -79,6 +79,15 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
     changed: dict[str, Any] = {}
     if 'cwd' in entry:
         changed['cwd'] = _resolved(entry['cwd'], (*path, 'cwd'), positions)
+    if 'launch' in entry:
+        changed['launch'] = _resolved_launch_file(entry['launch'], (*path, 'launch'), positions)
+    if 'nodl' in entry:
+        changed['nodl'] = _resolved(entry['nodl'], (*path, 'nodl'), positions)
+    if path[0] == 'processes' and isinstance(entry.get('nodes'), dict):
+        changed['nodes'] = {
+            name: node and _with_paths(node, (*path, 'nodes', name), positions)
+            for name, node in entry['nodes'].items()
+        }
     if 'parameter_files' in entry:
         at = (*path, 'parameter_files')
         changed['parameter_files'] = [
@@ -92,3 +101,10 @@ def _resolved(text: str, path: DataPath, positions: SourceMap) -> str:
     if is_in_package(text):
         return text
     return str(positions.value(path).source.folder / text)
+
+
+def _resolved_launch_file(text: str, path: DataPath, positions: SourceMap) -> str:
+    """Return a launch file as `_resolved`; what is not beside the file is in a package."""
+    beside = positions.value(path).source.folder / text
+    is_path = '/' not in text or text.startswith(('./', '../', '/', _PACKAGE)) or beside.exists()
+    return _resolved(text if is_path else f'{_PACKAGE}{text}', path, positions)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY  # noqa: TC003 - `dataclass` looks for it
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS
+from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS, KIND_OF_SECTION
 from composer.names import join_names
 from composer.records import record
 
@@ -26,11 +26,14 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_WAIT_SEC = 30.0
 DEFAULT_RESTART_DELAY_SEC = 1.0
+# `ros2 launch` gives its processes 5 s after SIGINT, and 5 s after SIGTERM, until it kills them.
+DEFAULT_LAUNCH_STOP_SEC = 15.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
 DEFAULT_WARN_AFTER_SEC = 5.0
 REENTRANT = 'reentrant'
@@ -258,12 +261,83 @@ class ConditionSpec:
         kind: What sort of thing it is.
         name: Its name as written; a relative one lies in the namespace of who waits.
         timeout_sec: After this the start fails.
+        state: What a process must have come to; `None` if it may run or have succeeded.
     """
 
     kind: ConditionKind
     name: str
     timeout_sec: float
+    state: ProcessState | None
     path: DataPath
+
+
+@record
+class ExitActionSpec:
+    """What happens when a process has ended for good: the system stops if neither is given.
+
+    Attributes:
+        behaviour: A function to call, or `None`.
+        start: The name of a process to start, or `None`.
+    """
+
+    behaviour: BehaviourSpec | None
+    start: str | None
+    path: DataPath
+
+
+@record
+class DeclaredEndSpec:
+    """A publisher, client, ... that a node of an external process is said to have.
+
+    Attributes:
+        channel: The name of its topic, service or action, as written.
+        qos: `None` if it is an action's, which has none.
+        external: Whether the other end may be in no file.
+    """
+
+    name: str
+    type: str
+    channel: str
+    qos: QosSpec | None
+    external: bool
+    path: DataPath
+
+
+@record
+class DeclaredNodeSpec:
+    """A node of an external process, as far as the file declares it.
+
+    Attributes:
+        name: Its name; that of the process if nothing tells it.
+        is_named: Whether the file tells the name of the node.
+        namespace: In full, as in `/robot`.
+        remap: The rules of the process.
+        sections: Its ends by section and name; `None` if they are not declared.
+        parameters: Those that are declared.
+        declares_all_parameters: Whether it has no other parameters.
+        process: The key of its process.
+    """
+
+    name: str
+    is_named: bool
+    namespace: str
+    remap: tuple[tuple[str, str], ...]
+    sections: Mapping[str, Mapping[str, DeclaredEndSpec]] | None
+    parameters: Mapping[str, ParameterSpec]
+    declares_all_parameters: bool
+    process: str
+    path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/camera`."""
+        return join_names(self.namespace, self.name)
+
+    def ends(self) -> Iterator[tuple[EntityKind, DeclaredEndSpec]]:
+        """Yield all ends that are declared, each with its kind."""
+        for section, entries in (self.sections or {}).items():
+            for end in entries.values():
+                yield KIND_OF_SECTION[section], end
 
 
 @record
@@ -272,15 +346,20 @@ class ProcessSpec:
 
     Attributes:
         command: The program and its arguments; empty if it is an executable of a package.
-        arguments: Those of the executable.
+        launch: The launch file that it runs, if it does: absolute, or `package://name/path`.
+        arguments: Those of the executable; `name:=value` for a launch file.
         node_name: The name of the node in it; `None` for the one that the program gives itself.
         namespace: The namespace of the nodes in it; `None` if the program has none.
+        nodes: The nodes in it that the file names or declares.
+        declares_all_ends: Whether these have all the ends that it has.
         cwd: The folder it runs in; `None` for that of Composer.
-        required: Whether the system ends when it ends.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
         stop_signal: The signal that asks it to end.
+        on_exit: What happens when it has ended and is not started again.
         stop_timeout_sec: After this it is killed; `None` for the system's own.
+        delay_sec: Time between the moment when its conditions hold and its start.
+        on_demand: Whether it only starts when the `on_exit` of another one starts it.
     """
 
     name: str
@@ -288,6 +367,7 @@ class ProcessSpec:
     command: tuple[str, ...]
     package: str | None
     executable: str | None
+    launch: str | None
     arguments: tuple[str, ...]
     node_name: str | None
     namespace: str | None
@@ -297,14 +377,23 @@ class ProcessSpec:
     log_level: LogLevel | None
     env: Mapping[str, str]
     cwd: str | None
-    required: bool
     restart: RestartRule
     restart_delay_sec: float
     most_restarts: int | None
+    on_exit: tuple[ExitActionSpec, ...]
     stop_signal: str
     stop_timeout_sec: float | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
+    on_demand: bool
+    nodes: tuple[DeclaredNodeSpec, ...]
+    declares_all_ends: bool
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def is_ros(self) -> bool:
@@ -328,6 +417,7 @@ class NodeSpec:
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
         wait_for: What must be there before it starts.
+        delay_sec: Time between the moment when its conditions hold and its start.
         parameter_files: In ROS's own format; later ones win.
     """
 
@@ -357,8 +447,14 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
     parameter_files: tuple[str, ...]
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def key(self) -> str:
@@ -422,6 +518,12 @@ class SystemSpec:
     diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]
     processes: Mapping[str, ProcessSpec]
+
+    def end_owners(self) -> Iterator[NodeSpec | DeclaredNodeSpec]:
+        """Yield the nodes, and those that external processes are said to have."""
+        yield from self.nodes.values()
+        for process in self.processes.values():
+            yield from process.nodes
 
     @property
     def without_parameter_services(self) -> frozenset[str]:

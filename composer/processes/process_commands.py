@@ -117,18 +117,23 @@ def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str
         message = f"process '{spec.name}': '{spec.package}' has no executable '{spec.executable}'"
         raise StartError(message, help=suggest(spec.executable, names, 'it has'))
     folder = Path(find_folder(spec) or '.')
-    problem = find_program_problem(spec.command[0], folder, environment)
+    command = spec.command
+    if spec.launch is not None:
+        path = _find_file(spec, spec.launch, 'launch file')
+        # Without a terminal, whose Ctrl-C would go to all, it tells its processes to end.
+        command = ('ros2', 'launch', '--noninteractive', str(path), *spec.arguments)
+    problem = find_program_problem(command[0], folder, environment)
     if problem:
         message, advice = problem
         message = f"process '{spec.name}': {message}"
         raise StartError(message, help=advice)
-    return list(spec.command)
+    return list(command)
 
 
-def _find_file(spec: ProcessSpec, text: str) -> Path:
+def _find_file(spec: ProcessSpec, text: str, noun: str = 'parameter file') -> Path:
     path = _resolve(spec, text)
     if not path.is_file():
-        message = f"process '{spec.name}': there is no parameter file '{path}'"
+        message = f"process '{spec.name}': there is no {noun} '{path}'"
         raise StartError(message)
     # The process may have another working directory.
     return path.absolute()

@@ -60,10 +60,12 @@ class _ProcessGroup:
         self.is_killed = False
         self.kill_at = _NEVER
 
-    def signal(self, number: int) -> bool:
-        """Signal the group; return whether any process is left in it."""
+    def signal(self, number: int, *, alone: bool = False) -> bool:
+        """Signal the group, or its leader alone; return whether any process is left in it."""
         try:
-            os.killpg(self.pid, number)
+            # Until it is waited for, its ID is that of no other process.
+            kill = os.kill if alone and not self.has_ended else os.killpg
+            kill(self.pid, number)
         except ProcessLookupError:
             return False
         except PermissionError:
@@ -156,7 +158,7 @@ class Reaper:
             self._answer('gone', request['number'])
             return
         group.kill_at = time.monotonic() + request['timeout']
-        group.signal(request['signal'])
+        group.signal(request['signal'], alone=request['alone'])
         # A stopped process handles the signal when it continues.
         group.signal(signal.SIGCONT)
         self._check_groups()

@@ -79,9 +79,15 @@ class ReaperConnection:
         request = {'do': 'start', 'command': command, 'env': {**env, self.mark: '1'}, 'cwd': cwd}
         self._send(request | {'number': number}, [output])
 
-    def stop(self, number: int, signal_number: int, timeout_sec: float) -> None:
-        """Ask for a process to be signalled, and killed if it does not end in time."""
-        request = {'do': 'stop', 'signal': signal_number, 'timeout': timeout_sec}
+    def stop(
+        self, number: int, signal_number: int, timeout_sec: float, *, alone: bool = False
+    ) -> None:
+        """Ask for a process to be signalled, and killed if it does not end in time.
+
+        Args:
+            alone: Whether it tells its own processes to end, which are not signalled.
+        """
+        request = {'do': 'stop', 'signal': signal_number, 'timeout': timeout_sec, 'alone': alone}
         self._send(request | {'number': number})
 
     def close(self) -> None:

@@ -47,6 +47,7 @@ class ProcessSupervisor:
 
     Attributes:
         by_name: The processes.
+        on_exit: Called with a process and its exit code when it has ended for good.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
     """
@@ -67,6 +68,7 @@ class ProcessSupervisor:
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
         self.is_alone = False
+        self.on_exit: Callable[[ExternalProcess, int], None] = lambda _process, _code: None
         self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
@@ -76,11 +78,14 @@ class ProcessSupervisor:
         self._tools: _Tools | None = None
 
     def start(self, process: ExternalProcess) -> None:
-        """Start a process; after `stop` nothing happens.
+        """Start a process; after `stop`, or when it was removed, nothing happens.
 
         Raises:
             StartError: Its program does not exist, or cannot be run.
         """
+        if process.is_leaving:
+            return
+        process.is_done = False
         try:
             run = self._launch(process)
         except OSError as error:
@@ -100,9 +105,8 @@ class ProcessSupervisor:
         run, tools = process.run, self._tools
         if run is None or tools is None or run.gone.is_set():
             return
-        timeout_sec = self._timeout_of(process.spec)
-        tools.reaper.stop(run.number, signal.Signals[process.spec.stop_signal], timeout_sec)
-        run.gone.wait(timeout_sec + _KILLED_SEC)
+        self._ask_to_end(run, tools)
+        run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
 
     def tell_ends(self) -> None:
         """Log from now on how processes have ended: the system has started, or never will."""
@@ -123,15 +127,14 @@ class ProcessSupervisor:
             return True
         begun = monotonic()
         for run in runs:
-            spec = run.process.spec
-            number = signal.Signals[spec.stop_signal]
-            tools.reaper.stop(run.number, number, self._timeout_of(spec))
+            self._ask_to_end(run, tools)
         for run in runs:
             timeout_sec = self._timeout_of(run.process.spec) + _KILLED_SEC
             run.gone.wait(max(0.0, begun + timeout_sec - monotonic()))
         tools.close()
         for watcher in self._watchers:
-            watcher.join()
+            # A behaviour in an `on_exit` may hang.
+            watcher.join(max(_KILLED_SEC, begun + self.timeout_sec - monotonic()))
         return not any(run.was_killed for run in runs)
 
     def kill_all(self) -> None:
@@ -158,6 +161,13 @@ class ProcessSupervisor:
             tools.reaper.start(run.number, command, environment, folder, output_end)
             os.close(output_end)
             return run
+
+    def _ask_to_end(self, run: ProcessRun, tools: _Tools) -> None:
+        spec = run.process.spec
+        number = signal.Signals[spec.stop_signal]
+        # `ros2 launch` ends what it has started, each in its own time.
+        is_launch = spec.launch is not None
+        tools.reaper.stop(run.number, number, self._timeout_of(spec), alone=is_launch)
 
     def _timeout_of(self, spec: ProcessSpec) -> float:
         return self.timeout_sec if spec.stop_timeout_sec is None else spec.stop_timeout_sec
@@ -213,15 +223,7 @@ class ProcessSupervisor:
             self._log(end, is_error=code not in expected and not run.was_killed)
             return
         if not process.is_restarted(code):
-            process.is_done = True
-            matters = code != 0 or process.spec.required
-            self._has_started.wait(_LONGEST_START_SEC if matters else None)
-            self._log(end + process.describe_limit(code), is_error=code != 0)
-            if process.spec.required:
-                self._logger.error(f"process '{name}' is required: the system ends")
-                self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
-            else:
-                self._end_if_last()
+            self.end_for_good(process, code, end + process.describe_limit(code))
             return
         delay_sec = process.backoff.next_delay_sec()
         self._has_started.wait(_LONGEST_START_SEC)
@@ -231,23 +233,45 @@ class ProcessSupervisor:
 
     def _restart(self, process: ExternalProcess) -> None:
         process.restarts += 1
+        run, tools = process.run, self._tools
+        if process.spec.launch is not None and run is not None and tools is not None:
+            # If `ros2 launch` was killed, what it had started is still there.
+            self._ask_to_end(run, tools)
+            run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
         try:
             self.start(process)
         except StartError as error:
-            self._logger.error(str(error))
-            process.is_done = True
-            if process.spec.required:
-                self._end_system(ExitCode.FAILED)
-            else:
-                self._end_if_last()
+            self.end_for_good(process, ExitCode.FAILED, str(error))
+
+    def end_for_good(self, process: ExternalProcess, code: int, end: str) -> None:
+        """Log how a process has ended, and do what is due then.
+
+        Args:
+            code: The exit code, or a signal's number, negative.
+            end: How it has ended, in words.
+        """
+        process.is_acting = True
+        process.is_done = True
+        if not process.spec.on_exit:
+            self._has_started.wait(_LONGEST_START_SEC if code != 0 else None)
+        self._log(end, is_error=code != 0)
+        self.on_exit(process, code)
+        process.is_acting = False
+        self._end_if_last()
+
+    def end_system(self, process: ExternalProcess, code: int) -> None:
+        """End the system, because a process has ended."""
+        self._has_started.wait(_LONGEST_START_SEC)
+        self._log(f"process '{process.spec.name}' has ended: the system ends", is_error=code != 0)
+        self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
 
     def _end_if_last(self) -> None:
         """End a system without nodes whose processes have all ended."""
         self._has_started.wait()
         processes = self.by_name.values()
-        if self.is_alone and all(each.is_done for each in processes):
+        if self.is_alone and all(each.is_over for each in processes):
             self._logger.info('all processes have ended: the system ends')
-            have_succeeded = all(each.run is not None and each.run.code == 0 for each in processes)
+            have_succeeded = all(each.has_succeeded for each in processes if each.is_done)
             self._end_system(ExitCode.DONE if have_succeeded else ExitCode.FAILED)
 
     def _log(self, text: str, *, is_error: bool) -> None:
@@ -280,7 +304,7 @@ class _Tools:
 
 
 def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
-    program = spec.command[0] if spec.command else spec.executable
+    program = spec.command[0] if spec.command else spec.executable or 'ros2'
     if answer['doing'] == 'reaper':
         reason = 'the process reaper was killed'
     elif answer['doing'] == 'folder':

@@ -77,7 +77,7 @@ def check_servers(context: CheckContext) -> Iterator[Diagnostic]:
                 server.path,
                 'second-server',
                 f"{channel.kind} '{channel.name}' has a server already, "
-                f"in node '{first.node.name}', and which of them answers is undefined",
+                f'in {first.owner}, and which of them answers is undefined',
                 help=f'serve it once, or give this one another name with {channel.kind}:',
                 related=[context.related(first.path, f'{first} serves it too')],
             )

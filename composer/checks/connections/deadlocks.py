@@ -14,7 +14,7 @@ from composer.checks.connections.cycles import find_knots, find_way
 from composer.checks.connections.wait_conditions import StartOrder
 from composer.diagnostics import Related
 from composer.entity_kinds import KIND_OF_NOUN
-from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec
+from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec, NodeSpec
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.inference.reading import NodeUse, Waited
     from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
 
 # Of a chain of calls, how many are named.
@@ -83,7 +82,7 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
         for kind in ('service', 'action')
         for channel in context.topology.of_kind(kind)
         for end in channel.users
-        if len(channel.providers) == 1
+        if len(channel.providers) == 1 and isinstance(channel.providers[0].node, NodeSpec)
     }
     if not servers:
         return
@@ -144,6 +143,8 @@ def _wait_of(
 
 def _need(server: Endpoint, waited: Waited) -> Group | None:
     """Return the group that an answer needs."""
+    if not isinstance(server.node, NodeSpec):
+        return None
     if isinstance(server.entity, ActionSpec):
         if waited == 'answer':
             return server.node.full_name, _ACCEPTING
@@ -180,6 +181,8 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
     for wait in in_hooks:
         hook, server = wait.binding.owner, wait.server.node
         is_own = server is wait.node
+        if not isinstance(server, NodeSpec):
+            continue
         if hook == 'on_start' and starts and (is_own or starts.is_later(server, wait.node)):
             part = 'on_start' if server.on_start else 'start'
             when = f"after the {part} of node '{server.name}'"
@@ -188,8 +191,9 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
         else:
             continue
         help_text = 'put that node before this one'
-        if wait.node.wait_for or server.wait_for:
-            help_text = f"'{server.name}' has 'wait_for', and starts after '{wait.node.name}'"
+        if wait.node.starts_late or server.starts_late:
+            key = 'delay' if server.delay_sec and not server.wait_for else 'wait_for'
+            help_text = f"'{server.name}' has '{key}', and starts after '{wait.node.name}'"
         yield context.at_value(
             wait.path,
             'service-deadlock',

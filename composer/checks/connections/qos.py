@@ -195,6 +195,9 @@ def _explain(
     # Where only one of them says its QoS, that one departs from what ROS does by itself.
     speaks = [(*end.path, 'qos') in context.system.positions.values for end in (provider, user)]
     here, there = (provider, user) if speaks == [True, False] else (user, provider)
+    if provider.is_declared != user.is_declared:
+        # What a program does is a fact; a node can follow it.
+        here, there = (user, provider) if provider.is_declared else (provider, user)
     listed = '; '.join(map(str, conflicts))
     return context.at_value(
         _place(context, here, conflicts[0].policy),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.ament import remaps_actions
 from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
-from composer.language.specs import NodeSpec
+from composer.language.specs import DeclaredEndSpec, NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
 from composer.records import record
 
@@ -19,7 +19,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.language.loaded_system import LoadedSystem
-    from composer.language.specs import EndSpec, ProcessSpec, QosSpec, SystemSpec
+    from composer.language.specs import (
+        DeclaredNodeSpec,
+        EndSpec,
+        ProcessSpec,
+        QosSpec,
+        SystemSpec,
+    )
     from composer.yaml_text.positions import DataPath, SourceMap
 
 # An end that may exist: its channel, whether it provides, and its type, `None` for any.
@@ -67,11 +73,16 @@ _SERVICES_OF_ROS = {
 
 @record
 class Endpoint:
-    """One end of a channel."""
+    """One end of a channel: that of a node, or one that an external process declares."""
 
-    node: NodeSpec
-    entity: EndSpec
+    node: NodeSpec | DeclaredNodeSpec
+    entity: EndSpec | DeclaredEndSpec
     kind: EntityKind
+
+    @property
+    def is_declared(self) -> bool:
+        """Whether it is an end of an external process."""
+        return isinstance(self.entity, DeclaredEndSpec)
 
     @property
     def path(self) -> DataPath:
@@ -86,11 +97,25 @@ class Endpoint:
     @property
     def written(self) -> str:
         """The name of the channel as the file has it."""
-        return str(getattr(self.entity, str(self.kind.channel)))
+        return written_name(self.entity, self.kind)
+
+    @property
+    def owner(self) -> str:
+        """Return `node 'lidar'`, or `process 'lidar'`."""
+        if isinstance(self.node, NodeSpec):
+            return f"node '{self.node.name}'"
+        is_own = self.node.path[-1] == self.node.process
+        return f"process '{self.node.process}'" if is_own else f"node '{self.node.name}'"
 
     def __str__(self) -> str:
         """Return `publisher 'scan' of node 'lidar'`."""
-        return f"{self.kind.noun} '{self.entity.name}' of node '{self.node.name}'"
+        return f"{self.kind.noun} '{self.entity.name}' of {self.owner}"
+
+
+def written_name(entity: EndSpec | DeclaredEndSpec, kind: EntityKind) -> str:
+    """Return the name of the topic, service or action of an end, as the file has it."""
+    key = 'channel' if isinstance(entity, DeclaredEndSpec) else str(kind.channel)
+    return str(getattr(entity, key))
 
 
 @record
@@ -160,7 +185,9 @@ class Topology:
 
 
 def build_topology(
-    system: LoadedSystem, spec: SystemSpec, has_real_type: Callable[[EndSpec], bool]
+    system: LoadedSystem,
+    spec: SystemSpec,
+    has_real_type: Callable[[EndSpec | DeclaredEndSpec], bool],
 ) -> Topology:
     """Return the topology of a system.
 
@@ -170,9 +197,9 @@ def build_topology(
     uncertain = _UncertainNames(system, spec)
     channels: dict[tuple[ChannelKind, str], Channel] = {}
     possible: set[PossibleEnd] = set(uncertain.missing)
-    for node, kind, channel_kind, entity in _ends(spec.nodes.values()):
-        name = getattr(entity, channel_kind)
-        if uncertain.has(node, entity.path, channel_kind):
+    for node, kind, channel_kind, entity in _ends(spec.end_owners()):
+        name = written_name(entity, kind)
+        if uncertain.has(node, entity.path, channel_kind, name):
             possible.add((channel_kind, kind.provides, None))
             continue
         # Without a type, too, it would be a reason to say nothing of any other.
@@ -183,10 +210,10 @@ def build_topology(
         ends = channel.providers if kind.provides else channel.users
         ends.append(Endpoint(node, entity, kind))
     services = dict(each for node in spec.nodes.values() for each in _services_of_ros(node))
-    unused = system.unused.nodes.values() if system.unused else ()
+    unused = system.unused.end_owners() if system.unused else ()
     used = {node.path: node for node in spec.nodes.values()}
     left_out = (
-        (channel_kind, full_name(node, channel_kind, getattr(entity, channel_kind)))
+        (channel_kind, full_name(node, channel_kind, written_name(entity, kind)))
         for node, kind, channel_kind, entity in _ends(unused)
         if node.path not in used or entity.name not in getattr(used[node.path], kind.section)
     )
@@ -194,8 +221,10 @@ def build_topology(
 
 
 def _ends(
-    nodes: Iterable[NodeSpec],
-) -> Iterator[tuple[NodeSpec, EntityKind, ChannelKind, EndSpec]]:
+    nodes: Iterable[NodeSpec | DeclaredNodeSpec],
+) -> Iterator[
+    tuple[NodeSpec | DeclaredNodeSpec, EntityKind, ChannelKind, EndSpec | DeclaredEndSpec]
+]:
     for node in nodes:
         for kind, entity in node.ends():
             if kind.channel:
@@ -207,12 +236,12 @@ def _is_bad_rule(rule: tuple[str, str]) -> bool:
     return _is_no_name(source.rpartition('://')[2], target)
 
 
-def is_misnamed(positions: SourceMap, node: NodeSpec, name: str) -> bool:
+def is_misnamed(positions: SourceMap, node: NodeSpec | DeclaredNodeSpec, name: str) -> bool:
     """Return whether ROS refuses a name, or the namespace that this node alone has."""
     if _is_no_name(name):
         return True
     spans = positions.values
-    own = spans.get((*node.path, 'namespace'))
+    own = spans.get((*node.path[:_DEPTH_OF_SECTIONS], 'namespace'))
     is_own = own is not None and own != spans.get(('defaults', 'namespace'))
     return is_own and find_namespace_problem(node.namespace) is not None
 
@@ -221,7 +250,9 @@ def _is_no_name(*names: str) -> bool:
     return any(find_topic_name_problem(name) for name in names)
 
 
-def full_name(node: NodeSpec | ProcessSpec, kind: ChannelKind, name: str) -> str:
+def full_name(
+    node: NodeSpec | DeclaredNodeSpec | ProcessSpec, kind: ChannelKind, name: str
+) -> str:
     """Return the full name of a topic, service or action of a node or process."""
     namespace = node.namespace or '/'
     full = expand_name(name, node.name, namespace)
@@ -258,33 +289,38 @@ class _UncertainNames:
             end
             for path in system.dropped
             if path[:1] == ('include',)
-            or (path[:1] == ('nodes',) and len(path) <= _DEPTH_OF_ENTITIES)
+            or (path[:1] in _OWNERS and len(path) <= _DEPTH_OF_ENTITIES + _depth_of(path))
             for end in _ends_lost_with(path)
         }
         self._nodes = {
-            path[1]
+            path[:_DEPTH_OF_SECTIONS]
             for path in self._paths
-            if path[:1] == ('nodes',) and len(path) > 1 and _moves_node(path)
+            if path[:1] in _OWNERS and len(path) > 1 and _moves_node(path)
         }
         self._misruled = {
-            node.path[-1] for node in spec.nodes.values() if any(map(_is_bad_rule, node.remap))
+            node.path for node in spec.end_owners() if any(map(_is_bad_rule, node.remap))
         }
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
-    def has(self, node: NodeSpec, entity: DataPath, kind: str) -> bool:
+    def has(
+        self, node: NodeSpec | DeclaredNodeSpec, entity: DataPath, kind: str, name: str
+    ) -> bool:
         """Return whether the name of an entity is not known for certain."""
-        if kind in _SCHEMES and node.path[-1] in self._misruled:
+        if kind in _SCHEMES and node.path in self._misruled:
+            return True
+        if not (isinstance(node, NodeSpec) or node.is_named) and name.startswith('~'):
             return True
         if not self._paths:
             return False
         return (
             self._all
-            or node.path[-1] in self._nodes
+            or node.path[:_DEPTH_OF_SECTIONS] in self._nodes
             or entity in self._paths
             or (*entity, kind) in self._paths
         )
 
 
+_OWNERS = (('nodes',), ('processes',))
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4
@@ -295,10 +331,18 @@ _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
 }
 
 
+def _depth_of(path: DataPath) -> int:
+    """Return how much deeper the sections are for a node of a process."""
+    return 2 if path[0] == 'processes' and path[2:3] == ('nodes',) else 0
+
+
 def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
     """Return the ends that may be missing because the data at a path are."""
-    section = str(path[_DEPTH_OF_SECTIONS]) if len(path) > _DEPTH_OF_SECTIONS else ''
-    if section in _WITHOUT_CHANNELS and path[0] == 'nodes':
+    depth = _DEPTH_OF_SECTIONS + _depth_of(path)
+    section = str(path[depth]) if len(path) > depth else ''
+    if section in _WITHOUT_CHANNELS and path[0] != 'include':
+        return set()
+    if path[0] == 'processes' and section and section not in (*KIND_OF_SECTION, 'nodes', 'nodl'):
         return set()
     # An unknown key may be any section, misspelt.
     known = KIND_OF_SECTION.get(section)

@@ -129,6 +129,13 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
         for process in spec.processes.values()
         if process.node_name
     }
+    present['node'] |= {
+        node.full_name
+        for spec in specs
+        for process in spec.processes.values()
+        for node in process.nodes
+        if node.is_named
+    }
     return present
 
 

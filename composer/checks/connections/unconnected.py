@@ -25,8 +25,7 @@ _MOST_COMPARED = 5_000
 
 def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that every end has another end, or is marked as external."""
-    # Nobody knows what programs publish, hear and serve; a typo may still be one.
-    is_known = not context.spec.processes
+    is_known = _knows_all_ends(context)
     partners = _Partners(context.topology)
     for channel in context.topology.channels.values():
         if not _is_alone(context, channel):
@@ -34,9 +33,18 @@ def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
         for end in channel.ends:
             if end.kind.unmatched and not getattr(end.entity, 'external', True):
                 near = partners.nearest(channel, end)
-                if not (is_known or (near and find_typo(channel.name, [near]))):
+                # A program may well publish what nobody here needs.
+                is_missed = is_known and not (end.is_declared and end.kind.provides)
+                if not (is_missed or (near and find_typo(channel.name, [near]))):
                     continue
                 yield _explain(context, channel, end, near, *end.kind.unmatched)
+
+
+def _knows_all_ends(context: CheckContext) -> bool:
+    """Return whether no program publishes, hears or serves anything that is not declared."""
+    processes = context.spec.processes.values()
+    lost = any(path[:1] == ('processes',) for path in context.system.dropped)
+    return not lost and all(process.declares_all_ends for process in processes)
 
 
 def _is_alone(context: CheckContext, channel: Channel) -> bool:

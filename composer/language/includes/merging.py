@@ -69,7 +69,7 @@ class IncludeMerger:
             elif not is_left_out:
                 self._report_duplicate(inclusion, name, full_node_name(full, simple))
         for name, process in part.entries.get('processes', {}).items():
-            entry = with_waits(process, keys)
+            entry = with_waits(renaming.in_process(process), keys)
             if not takes_ros_arguments(process):
                 entry = with_waits(entry, {}, inclusion.namespace)
             self._add_entry(inclusion, ('processes', name), keys[name], entry)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
+from composer.language.parsing.declared_ends import entries_with_ends
 from composer.language.qos import BUILTIN_PROFILES
 from composer.spelling import suggest
 from composer.yaml_text.document import copy_data
@@ -24,6 +25,16 @@ class ProfileRenaming:
 
     def __init__(self, names: dict[str, str]) -> None:
         self._names = names
+
+    def in_process(self, process: dict[str, Any]) -> dict[str, Any]:
+        """Return a process whose ends, and those of its nodes, use the new names."""
+        changed = self.in_node(process)
+        nodes = changed.get('nodes')
+        if not (self._names and isinstance(nodes, dict)):
+            return changed
+        return changed | {
+            'nodes': {name: node and self.in_node(node) for name, node in nodes.items()}
+        }
 
     def in_node(self, node: dict[str, Any]) -> dict[str, Any]:
         """Return a node whose entities use the new names."""
@@ -112,15 +123,24 @@ def _uses(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str, DataPath]
     for name, profile in data.get('qos', {}).items():
         if isinstance(profile, dict) and 'profile' in profile:
             yield profile, 'profile', ('qos', name, 'profile')
-    for node_name, node in data.get('nodes', {}).items():
+    for at, node in _with_entities(data):
         for section in _WITH_QOS:
             for name, entry in node.get(section, {}).items():
                 qos = entry.get('qos') if isinstance(entry, dict) else None
-                path = ('nodes', node_name, section, name, 'qos')
+                path = (*at, section, name, 'qos')
                 if isinstance(qos, str):
                     yield entry, 'qos', path
                 elif isinstance(qos, dict) and 'profile' in qos:
                     yield qos, 'profile', (*path, 'profile')
+
+
+def _with_entities(data: dict[str, Any]) -> Iterator[tuple[DataPath, dict[str, Any]]]:
+    """Yield the nodes, those of processes too, with their paths."""
+    for name, node in data.get('nodes', {}).items():
+        yield ('nodes', name), node
+    for name, process in data.get('processes', {}).items():
+        for at, entry in entries_with_ends(process):
+            yield ('processes', name, *at), entry
 
 
 def _base(profile: Any) -> str | None:

@@ -61,7 +61,8 @@ def _allows_local_delivery(data: Data, node: Data) -> bool:
     return bool(data.get('local_delivery', node.get('local_delivery', True)))
 
 
-def _parse_parameter(_: Data, name: str, data: Any, path: DataPath) -> ParameterSpec:
+def parse_parameter(_: Data, name: str, data: Any, path: DataPath) -> ParameterSpec:
+    """Return a parameter that is declared, or written as its value."""
     declaration = data if isinstance(data, dict) else {'default': data}
     value = declaration.get('default')
     type_name = declaration.get('type') or infer_parameter_type(value)
@@ -190,7 +191,7 @@ def _full(data: str | Data) -> Data:
 
 
 _PARSERS: dict[str, Callable[[Data, str, Any, DataPath], Any]] = {
-    'parameters': _parse_parameter,
+    'parameters': parse_parameter,
     'publishers': _parse_publisher,
     'subscriptions': _parse_subscription,
     'timers': _parse_timer,
