@@ -188,6 +188,9 @@ NODE_BEHAVIOURS: tuple[BehaviourKey, ...] = (
     BehaviourKey('on_parameters', ('node', 'changes')),
 )
 
+# What a process calls when it has ended.
+EXIT_BEHAVIOUR = BehaviourKey('on_exit', ('process', 'exit_code'))
+
 KIND_OF_SECTION: dict[str, EntityKind] = {kind.section: kind for kind in ENTITY_KINDS}
 KIND_OF_NOUN: dict[str, EntityKind] = {kind.noun: kind for kind in ENTITY_KINDS}
 # Those that meet others on a topic, service or action.

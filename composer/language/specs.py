@@ -26,6 +26,7 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
@@ -246,11 +247,27 @@ class ConditionSpec:
         kind: What sort of thing it is.
         name: Its name as written; a relative one lies in the namespace of who waits.
         timeout_sec: After this the start fails.
+        state: What a process must have come to; `None` if it may run or have succeeded.
     """
 
     kind: ConditionKind
     name: str
     timeout_sec: float
+    state: ProcessState | None
+    path: DataPath
+
+
+@record
+class ExitActionSpec:
+    """What happens when a process has ended for good: the system stops if neither is given.
+
+    Attributes:
+        behaviour: A function to call, or `None`.
+        start: The name of a process to start, or `None`.
+    """
+
+    behaviour: BehaviourSpec | None
+    start: str | None
     path: DataPath
 
 
@@ -322,11 +339,13 @@ class ProcessSpec:
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
         cwd: The folder it runs in; `None` for that of Composer.
-        required: Whether the system ends when it ends.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
         stop_signal: The signal that asks it to end.
+        on_exit: What happens when it has ended and is not started again.
         stop_timeout_sec: After this it is killed; `None` for the system's own.
+        delay_sec: Time between the moment when its conditions hold and its start.
+        on_demand: Whether it only starts when the `on_exit` of another one starts it.
     """
 
     name: str
@@ -344,16 +363,23 @@ class ProcessSpec:
     log_level: LogLevel | None
     env: Mapping[str, str]
     cwd: str | None
-    required: bool
     restart: RestartRule
     restart_delay_sec: float
     most_restarts: int | None
+    on_exit: tuple[ExitActionSpec, ...]
     stop_signal: str
     stop_timeout_sec: float | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
+    on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def is_ros(self) -> bool:
@@ -377,6 +403,7 @@ class NodeSpec:
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
         wait_for: What must be there before it starts.
+        delay_sec: Time between the moment when its conditions hold and its start.
         parameter_files: In ROS's own format; later ones win.
     """
 
@@ -406,8 +433,14 @@ class NodeSpec:
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
     parameter_files: tuple[str, ...]
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def key(self) -> str:

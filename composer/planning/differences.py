@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.language.bindings import node_bindings
+from composer.language.bindings import exit_bindings, node_bindings
 from composer.language.specs import ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
@@ -99,7 +99,8 @@ _PROCESSES = _Rules(
             *('parameters', 'parameter_files', 'remap', 'log_level', 'env', 'cwd'),
         ),
         'a process takes this when it starts',
-    ),
+    )
+    | {'on_demand': 'it starts at another time'},
 )
 _SYSTEM = _Rules(
     'system',
@@ -115,7 +116,7 @@ _OF_THE_SYSTEM = (
     'shutdown_timeout_sec',
     'diagnostics_period_sec',
 )
-_AT_ITS_START = ('on_start', 'wait_for')
+_AT_ITS_START = ('on_start', 'wait_for', 'delay')
 # Parameters of every node, and the keys of a node that set them where parameter files do not.
 _GIVEN_BY_ROS = {
     'use_sim_time': 'use_sim_time',
@@ -145,14 +146,28 @@ class _Comparison:
         old, new = self._old.spec, self._new.spec
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
+            further = [*self._changed_code(*process)]
             # One whose data are the same was not read again.
-            if process[0] is process[1]:
+            if process[0] is process[1] and not further:
                 continue
-            yield from self._compare(_PROCESSES, ('', 'processes', name), *process)
+            yield from self._compare(_PROCESSES, ('', 'processes', name), *process, further)
         before = {node.full_name: node for node in old.nodes.values()}
         after = {node.full_name: node for node in new.nodes.values()}
         for full_name in dict.fromkeys([*before, *after]):
             yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
+
+    def _changed_code(self, old: ProcessSpec | None, new: ProcessSpec | None) -> Iterator[Change]:
+        """Yield the behaviours of a process whose source differs."""
+        if old is None or new is None:
+            return
+        before = {each.behaviour.name for each in exit_bindings(old)}
+        for name in dict.fromkeys(each.behaviour.name for each in exit_bindings(new)):
+            if name in before and name.partition(':')[0] in self._stale:
+                before_span, after_span = (
+                    Reading(snapshot, spec, spec.path).find_span('on_exit')
+                    for snapshot, spec in ((self._old, old), (self._new, new))
+                )
+                yield Change('on_exit', name, name, before_span, after_span, is_code=True)
 
     def compare_system(self) -> Iterator[Operation]:
         old, new = self._reading(self._old), self._reading(self._new)

@@ -63,20 +63,31 @@ class Starter:
         """
         stop = self._system.stop
         for process in processes:
-            if not (process.spec.wait_for or stop.is_set):
+            spec = process.spec
+            if not (spec.on_demand or spec.starts_late or stop.is_set):
                 self._processes.start(process)
-        prompt = [node for node in nodes if not node.spec.wait_for]
+        prompt = [node for node in nodes if not node.spec.starts_late]
         for node in prompt:
             self.run_on_start(node)
-        waiters = list_waiters(nodes, processes, self._start_late, self._processes.start)
+        own = [each for each in processes if not each.spec.on_demand]
+        waiters = list_waiters(nodes, own, self._start_late, self._processes.start)
         if not waiters or stop.is_set:
             return prompt
         self.open(prompt)
-        starter = WaitingStarter(
-            self._system.context, self._nodes, self._processes.by_name, self._system.positions
-        )
-        starter.start_all(waiters, stop)
+        self._waiting_starter().start_all(waiters, stop, self._system.is_outdated)
         return []
+
+    def start_on_demand(self, process: ExternalProcess) -> None:
+        """Start a process now that another one has ended, once its conditions hold.
+
+        Raises:
+            StartError: It could not start.
+        """
+        waiters = list_waiters([], [process], self._start_late, self._processes.start)
+        if waiters:
+            self._waiting_starter().start_all(waiters, self._system.stop)
+        else:
+            self._processes.start(process)
 
     def start_more(
         self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
@@ -88,7 +99,7 @@ class Starter:
         """
         for node in nodes:
             self._system.executor.add_node(node.ros)
-            node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
+            node.gate.serves = node.spec.on_start is None and not node.spec.starts_late
         self.open(self.start(nodes, processes))
         for node in nodes:
             node.ros.start_parameter_services()
@@ -130,6 +141,11 @@ class Starter:
                     # `on_start` may have destroyed it.
                     timer.reset()
         self._system.executor.wake()
+
+    def _waiting_starter(self) -> WaitingStarter:
+        return WaitingStarter(
+            self._system.context, self._nodes, self._processes.by_name, self._system.positions
+        )
 
     def _start_late(self, node: LiveNode) -> None:
         self.run_on_start(node)

@@ -30,22 +30,21 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
     told: set[str] = set()
     # Calls without arguments that fit; many nodes may have the same.
     fitting: set[tuple[str, BehaviourKey]] = set()
-    for node in context.spec.nodes.values():
-        for binding in context.bindings(node):
-            call = (binding.behaviour.name, binding.key)
-            is_known = call in fitting and not binding.behaviour.arguments
-            if is_known or context.was_dropped(binding.behaviour.path):
-                continue
-            module = context.modules.find(binding.behaviour.module)
-            if isinstance(module, MissingModule) or not (module.syntax_error or module.unread):
-                found = [*_check_source(context, binding, module)]
-                yield from found
-                if not (found or binding.behaviour.arguments or context.system.dropped):
-                    fitting.add(call)
-            elif binding.behaviour.module not in told:
-                told.add(binding.behaviour.module)
-                explain = _explain_broken_module if module.syntax_error else _explain_unread_module
-                yield explain(context, binding, module)
+    for binding in context.all_bindings():
+        call = (binding.behaviour.name, binding.key)
+        is_known = call in fitting and not binding.behaviour.arguments
+        if is_known or context.was_dropped(binding.behaviour.path):
+            continue
+        module = context.modules.find(binding.behaviour.module)
+        if isinstance(module, MissingModule) or not (module.syntax_error or module.unread):
+            found = [*_check_source(context, binding, module)]
+            yield from found
+            if not (found or binding.behaviour.arguments or context.system.dropped):
+                fitting.add(call)
+        elif binding.behaviour.module not in told:
+            told.add(binding.behaviour.module)
+            explain = _explain_broken_module if module.syntax_error else _explain_unread_module
+            yield explain(context, binding, module)
 
 
 def is_called_wrongly(context: CheckContext, binding: Binding) -> bool:

@@ -191,8 +191,9 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
         else:
             continue
         help_text = 'put that node before this one'
-        if wait.node.wait_for or server.wait_for:
-            help_text = f"'{server.name}' has 'wait_for', and starts after '{wait.node.name}'"
+        if wait.node.starts_late or server.starts_late:
+            key = 'delay' if server.delay_sec and not server.wait_for else 'wait_for'
+            help_text = f"'{server.name}' has '{key}', and starts after '{wait.node.name}'"
         yield context.at_value(
             wait.path,
             'service-deadlock',

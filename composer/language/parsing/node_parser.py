@@ -33,6 +33,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         on_stop=_parse_hook(data, path, 'on_stop'),
         on_parameters=_parse_hook(data, path, 'on_parameters'),
         wait_for=parse_conditions(data, path),
+        delay_sec=float(data.get('delay', 0.0)),
         parameter_files=tuple(data.get('parameter_files', ())),
         path=path,
         **{key: data[key] for key in _PLAIN_KEYS if key in data},

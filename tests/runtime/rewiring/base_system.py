@@ -102,6 +102,10 @@ def begin(node, text=''):
     node.logger.debug(f'begun {text}')
 
 
+def ended(process, exit_code, text=''):
+    process.logger.debug(f'ended {text}')
+
+
 def fail_to_begin(node):
     raise OSError('no such device')
 
@@ -306,7 +310,7 @@ SYSTEM = {
         },
     },
     'processes': {
-        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000']},
+        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000'], 'on_exit': ['parts:ended']},
         'packaged': {'package': 'sleeping', 'executable': 'sleeper', 'name': 'dreamer'},
     },
 }

@@ -12,7 +12,7 @@ from composer.entity_kinds import ENTITY_KINDS
 from composer.runtime.nodes.behaviour_node import Node
 
 # What a process need not know while it runs.
-_NOT_OF_PROCESSES = ('path', 'wait_for', 'description')
+_NOT_OF_PROCESSES = ('path', 'wait_for', 'delay_sec', 'description')
 
 
 def describe(system):

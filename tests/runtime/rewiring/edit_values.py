@@ -27,6 +27,8 @@ _CONDITION = [
     {'process': 'sleeper'},
 ]
 _WAIT_FOR = [*_CONDITION, _CONDITION, {'topic': '/nowhere', 'timeout': 0.1}, [], None]
+_ON_EXIT = ['shutdown', 'parts:ended', {'start': 'packaged'}, [{'behaviour': 'parts:ended'}]]
+_DELAY = [0.05, 0.1, -1, None]
 _FILES = [['parameters.yaml'], ['parameters.yaml', 'others.yaml'], ['absent.yaml'], None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
 # Whatever its arguments are.
@@ -89,7 +91,9 @@ VALUES = {
     'condition.action': ['/count', None],
     'condition.node': ['listener', 'nobody', None],
     'condition.process': ['sleeper', 'nobody', None],
+    'condition.state': ['running', 'gone', None],
     'condition.timeout': [0.3, 5.0, 0, None],
+    'node.delay': _DELAY,
     'node.parameter_files': _FILES,
     'node.foreach': _FOREACH,
     'node.when': _WHEN,
@@ -216,7 +220,10 @@ VALUES = {
     'process.log_level': ['debug', 'loud', None],
     'process.env': [{'A': 'b'}, {'A': 1, 'B': True}, {'A=': 'b'}, None],
     'process.cwd': ['pack', 'absent', None],
-    'process.required': [True, 'very', None],
+    'process.on_exit': [*_ON_EXIT, [{'start': 'no'}], 3, None],
+    'exit_action.start': ['packaged', 'sleeper', 'nobody', None],
+    'exit_action.behaviour': ['parts:ended', 'parts:ende', None],
+    'exit_action.with': [{'text': 'b'}, {'txt': 'b'}, None],
     'process.restart': [{'when': 'always'}, 'always', {}, None],
     'process_restart.when': ['always', 'never', 'sometimes', None],
     'process_restart.delay': [0.5, -1, None],
@@ -225,6 +232,7 @@ VALUES = {
     'process_stop.signal': ['SIGTERM', 'SIGKILL', 'SIGNAL', None],
     'process_stop.timeout': [1.5, -1, None],
     'process.wait_for': _WAIT_FOR,
+    'process.delay': _DELAY,
 }
 # Keys that no edit gives a value, and why.
 LEFT_OUT: dict[str, str] = {}
