@@ -44,12 +44,26 @@ REENTRANT = 'reentrant'
 
 @record
 class BehaviourSpec:
-    """A Python function by name, with constant keyword arguments."""
+    """A Python function by name, with constant keyword arguments.
+
+    Attributes:
+        function: Its name, or `Class.method`.
+    """
 
     module: str
     function: str
     arguments: Mapping[str, Any]
     path: DataPath
+
+    @property
+    def class_name(self) -> str:
+        """The class, if it is a method; otherwise empty."""
+        return self.function.rpartition('.')[0]
+
+    @property
+    def method_name(self) -> str:
+        """The name of the method or function alone."""
+        return self.function.rpartition('.')[2]
 
     @property
     def name(self) -> str:

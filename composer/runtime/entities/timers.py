@@ -142,7 +142,7 @@ class _Ticker:
             return False
         # `1` and `1.0` are equal, and not the same.
         is_same = repr(dict(behaviour.arguments)) == repr(dict(own.arguments))
-        return is_same and self._bound is self._node.functions[behaviour.name]
+        return is_same and self._bound == self._node.functions[behaviour.name]
 
     def close(self, timeout_sec: float, *, for_good: bool = True) -> None:
         """See `Suspended`: what the generator has in `finally:` runs."""

@@ -15,11 +15,14 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.errors import SystemStoppingError
+from composer.errors import StartError, SystemStoppingError
+from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
+from composer.runtime.behaviours.callables import Method, make_instance
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
+from composer.runtime.behaviours.tracebacks import summarize
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.health.missed import count_missed
@@ -103,6 +106,7 @@ class LiveNode:
     lifecycle: NodeLifecycle | None = None
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _views: dict[Owner, Node] = field(default_factory=dict)
+    _instances: dict[type, Any] = field(default_factory=dict)
     _is_destroyed: bool = False
 
     @property
@@ -135,7 +139,27 @@ class LiveNode:
         node = self.behaviour_node
         if owner is not None:
             node = self._views.setdefault(owner, node.with_own_state())
-        return partial(self.functions[behaviour.name], node, **behaviour.arguments)
+        function = self.functions[behaviour.name]
+        if isinstance(function, Method):
+            function = function.of(self._instance(function.owner))
+        return partial(function, node, **behaviour.arguments)
+
+    def make_instances(self) -> None:
+        """Make an instance of each class whose methods are behaviours of the node."""
+        for binding in node_bindings(self.spec):
+            method = self.functions[binding.behaviour.name]
+            if isinstance(method, Method):
+                self._instance(method.owner)
+
+    def _instance(self, owner: type) -> Any:
+        """Return the node's instance of a class; it is made with the first that needs it."""
+        if owner not in self._instances:
+            try:
+                self._instances[owner] = make_instance(owner, self.behaviour_node)
+            except Exception as error:
+                message = f'{owner.__qualname__}.__init__ raised {summarize(error)}'
+                raise StartError(message) from error
+        return self._instances[owner]
 
     def call(
         self,

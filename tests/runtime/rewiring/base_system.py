@@ -53,6 +53,19 @@ class Ticking:
 ticking = Ticking()
 
 
+class Kept:
+    def __init__(self, node):
+        self.node = node
+
+    def tick(self, node, text='k'):
+        note(self.node if node is None else node, 'tick', text=text)
+        return text
+
+    async def tick_later(self, node):
+        note(node, 'tick_later')
+        return 'k'
+
+
 def hear(node, message, prefix=''):
     note(node, 'hear', prefix=prefix)
     return f'{prefix}{message.data}'
