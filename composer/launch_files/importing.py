@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from typing import TYPE_CHECKING
 
+from composer.launch_files.description_reader import DescriptionReader
 from composer.launch_files.loading import Loader
-from composer.launch_files.reader import DescriptionReader, Imported
+from composer.launch_files.place import Place
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
+
+    from composer.launch_files.results import Imported
 
 
 def import_file(path: Path, given: Mapping[str, str]) -> Imported:
@@ -21,6 +26,8 @@ def import_file(path: Path, given: Mapping[str, str]) -> Imported:
     Raises:
         ComposerError: `launch` is not installed, or the file cannot be read.
     """
-    reader = DescriptionReader(Loader(), dict(given))
-    reader.read([reader.loader.open(path.absolute())])
-    return reader.result
+    place = Place(Loader(), dict(given))
+    # Standard output is for the system, whatever launch files print.
+    with contextlib.redirect_stdout(sys.stderr):
+        DescriptionReader(place).read([place.loader.open(path.absolute())])
+    return place.result

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
 from composer.errors import ComposerError
-from composer.launch_files.substitutions import LaunchError
+from composer.launch_files.results import LaunchError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

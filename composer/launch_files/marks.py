@@ -15,7 +15,7 @@ from composer.launch_files.texts import Text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from composer.launch_files.scope import Scope
+    from composer.launch_files.surroundings import Scope
 
 _Result = TypeVar('_Result')
 # Each is a run of the code.

@@ -7,38 +7,41 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError
 from composer.launch_files.marks import run_marked
 from composer.launch_files.parameters import NewFile
-from composer.launch_files.substitutions import LaunchError, private
+from composer.launch_files.results import LaunchError
+from composer.launch_files.substitutions import Resolver, private
 from composer.launch_files.texts import Computed, unmarked
 
 if TYPE_CHECKING:
-    from composer.launch_files.reader import DescriptionReader
+    from collections.abc import Callable, Iterable
+
+    from composer.launch_files.place import Place
 
 
 class OpaqueRuns:
     """Runs the functions of one launch description.
 
     Args:
-        reader: Walks the description.
+        place: Where it is read.
+        read: Reads entities at a place.
     """
 
-    def __init__(self, reader: DescriptionReader) -> None:
-        self._reader = reader
+    def __init__(self, place: Place, read: Callable[[Place, Iterable[Any]], None]) -> None:
+        self._place = place
+        self._read = read
 
     def run(self, entity: Any) -> None:
         """Add what a function returns."""
-        reader = self._reader
-        best, fixed = run_marked(
-            reader.scope, lambda marks: self._attempt(entity, marks), _outcome
-        )
-        reader.adopt(best)
+        place = self._place
+        best, fixed = run_marked(place.scope, lambda marks: self._attempt(entity, marks), _outcome)
+        place.adopt(best)
         if fixed:
-            reader.fix(fixed)
+            place.fix(fixed)
             shown = ', '.join(fixed)
-            reader.remark(f'OpaqueFunction was resolved: what it returns depends on {shown}')
+            place.remark(f'OpaqueFunction was resolved: what it returns depends on {shown}')
 
-    def _attempt(self, entity: Any, marks: frozenset[str]) -> tuple[DescriptionReader, list[str]]:
+    def _attempt(self, entity: Any, marks: frozenset[str]) -> tuple[Place, list[str]]:
         """Return a reader that has read what the function returns, and which names it has read."""
-        fork = self._reader.forked()
+        fork = self._place.forked()
         context = fork.loader.context
         fork.scope.fill(context, marks)
         before = dict(context.launch_configurations)
@@ -56,22 +59,22 @@ class OpaqueRuns:
                 message = f'{fork.origin}: {function.__name__}: {type(error).__name__}: {error}'
                 raise LaunchError(message) from error
         self._take_changes(fork, before)
-        fork.read(returned or ())
+        self._read(fork, returned or ())
         return fork, read
 
     @staticmethod
-    def _take_changes(fork: DescriptionReader, before: dict[str, Any]) -> None:
+    def _take_changes(fork: Place, before: dict[str, Any]) -> None:
         """Take over the configurations that the function has set itself."""
         for name, value in fork.loader.context.launch_configurations.items():
             if isinstance(value, str) and before.get(name) != value:
-                fork.scope.configurations[name] = fork.resolver.text(value)
+                fork.scope.configurations[name] = Resolver(fork).text(value)
 
 
-def _outcome(reader: DescriptionReader) -> list[Any]:
+def _outcome(place: Place) -> list[Any]:
     """Return what was read, with the values of marks and expressions in place."""
     return [
         (entry.section, unmarked(entry.name), _plain(entry.data), entry.holds)
-        for entry in reader.result.entries
+        for entry in place.result.entries
     ]
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.launch_files.substitutions import class_names, private, read_file
+from composer.launch_files.substitutions import Resolver, class_names, private, read_file
 from composer.launch_files.texts import Computed, Text, constant, read_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
 
-    from composer.launch_files.substitutions import Resolver
+    from composer.launch_files.place import Place
 
 
 @dataclass
@@ -36,21 +36,12 @@ class NewFile:
 
 
 class ParameterReader:
-    """Reads the parameters of nodes at one place of a launch file.
+    """Reads the parameters of nodes at one place of a launch file."""
 
-    Args:
-        parse: Reads the substitutions in a text, as `$(var side)`.
-    """
-
-    def __init__(
-        self,
-        resolver: Resolver,
-        remark: Callable[[str], None],
-        parse: Callable[[str], Any],
-    ) -> None:
-        self._resolver = resolver
-        self._remark = remark
-        self._parse = parse
+    def __init__(self, place: Place) -> None:
+        self._resolver = Resolver(place)
+        self._remark = place.remark
+        self._parse = place.loader.parse
 
     def read(self, given: Iterable[Any], common: Iterable[Any]) -> Parameters:
         """Return the parameters of a node.

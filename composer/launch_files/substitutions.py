@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from composer.ament import find_share
-from composer.errors import ComposerError
 from composer.launch_files.marks import run_marked
 from composer.launch_files.python_expressions import UnlikeError, translate
+from composer.launch_files.results import LaunchError
 from composer.launch_files.texts import (
     EMPTY,
     Code,
@@ -33,17 +33,13 @@ from composer.launch_files.texts import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from composer.launch_files.reader import DescriptionReader
+    from composer.launch_files.place import Place
 
 _SHARE = re.compile(r'^(?:file://)?(/[^\s:]*?)/share/([A-Za-z]\w*)(?=/|$)')
 # What `LaunchConfigAsBool` takes for true.
 _TRUE = ('true', '1', 'yes', 'on')
 # Where the files of packages would be that are not installed.
 _ABSENT = '/share/of/package'
-
-
-class LaunchError(ComposerError):
-    """A launch file cannot be read."""
 
 
 def private(owner: Any, name: str) -> Any:
@@ -64,14 +60,14 @@ class Resolver:
     """Resolves substitutions at one place of a launch file.
 
     Args:
-        reader: Walks the launch file.
+        place: Where it is, and who is told what cannot be kept.
     """
 
-    def __init__(self, reader: DescriptionReader) -> None:
-        self._reader = reader
-        self._scope = reader.scope
-        self._context = reader.loader.context
-        self._remark = reader.remark
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._scope = place.scope
+        self._context = place.loader.context
+        self._remark = place.remark
 
     def text(self, written: Any) -> Text:
         """Return the text of a substitution, of a text, or of a sequence of both."""
@@ -104,19 +100,19 @@ class Resolver:
             self._scope, lambda marks: self._perform(written, marks), self._outcome
         )
         if fixed:
-            self._reader.fix(fixed)
+            self._place.fix(fixed)
             shown = ', '.join(fixed)
             self._remark(f'{type(written).__name__} was resolved: it depends on {shown}')
         return _constant(text)
 
     def _perform(self, written: Any, marks: frozenset[str]) -> tuple[str, list[str]]:
         self._scope.fill(self._context, marks)
-        with self._reader.loader.reading() as read:
+        with self._place.loader.reading() as read:
             try:
                 return str(self._context.perform_substitution(written)), read
             except Exception as error:
                 kind = type(written).__name__
-                message = f'{self._reader.origin}: {kind} cannot be resolved: {error}'
+                message = f'{self._place.origin}: {kind} cannot be resolved: {error}'
                 raise LaunchError(message) from error
 
     def _outcome(self, text: str) -> str:
@@ -127,7 +123,7 @@ class Resolver:
     def is_new_file(self, path: str) -> bool:
         """Return whether a helper of the launch file has written a file just now."""
         try:
-            is_new = Path(path).stat().st_mtime >= self._reader.started
+            is_new = Path(path).stat().st_mtime >= self._place.started
         except (OSError, ValueError):
             return False
         return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
@@ -141,10 +137,10 @@ class Resolver:
         if isinstance(value, Text):
             return value
         default = private(written, 'default')
-        if name in self._reader.given:
-            return _constant(self._reader.given[name])
+        if name in self._place.given:
+            return _constant(self._place.given[name])
         if default is None:
-            origin = self._reader.origin
+            origin = self._place.origin
             message = f"{origin}: the launch configuration '{name}' is used, but nothing sets it"
             raise LaunchError(message)
         return self.text(default)

@@ -11,7 +11,7 @@ from composer.launch_files.texts import Computed, Text
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
-    from composer.launch_files.reader import Argument, Entry, Imported
+    from composer.launch_files.results import Argument, Entry, Imported
 
 _SECTIONS = ('processes', 'containers')
 _NAME = re.compile(r'[^A-Za-z0-9_.-]+')

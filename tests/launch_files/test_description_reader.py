@@ -4,8 +4,9 @@ import pytest
 import yaml
 
 from composer.language.pipeline import load_system
-from composer.launch_files.reader import DescriptionReader
-from composer.launch_files.substitutions import LaunchError
+from composer.launch_files.description_reader import DescriptionReader
+from composer.launch_files.place import Place
+from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
 from tests.launch_files import stand_ins as launch
 
@@ -22,9 +23,9 @@ def python(*parts):
 
 
 def read(*entities, **given):
-    reader = DescriptionReader(launch.Loader(), given)
-    reader.read([launch.LaunchDescription([*ARGUMENTS, *entities])])
-    return render_system(reader.result, 'x.launch.py', 'x')
+    place = Place(launch.Loader(), given)
+    DescriptionReader(place).read([launch.LaunchDescription([*ARGUMENTS, *entities])])
+    return render_system(place.result, 'x.launch.py', 'x')
 
 
 def node(**keys):

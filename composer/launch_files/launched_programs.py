@@ -6,12 +6,18 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from composer.launch_files.conditions import read_condition
 from composer.launch_files.parameters import ParameterReader
-from composer.launch_files.substitutions import class_names, private, truth_of
+from composer.launch_files.place import join_namespaces
+from composer.launch_files.substitutions import Resolver, class_names, private, truth_of
+from composer.launch_files.surroundings import Wait
 from composer.launch_files.texts import Computed, Text, joined
 
 if TYPE_CHECKING:
-    from composer.launch_files.reader import DescriptionReader, Entry
+    from collections.abc import Callable, Iterable
+
+    from composer.launch_files.place import Place
+    from composer.launch_files.results import Entry
 
 _ROS_ARGS = '--ros-args'
 _LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
@@ -24,11 +30,13 @@ class ProgramReader:
     """Reads the programs of one launch description.
 
     Args:
-        reader: Walks the description.
+        place: Where it is read.
+        read: Reads actions.
     """
 
-    def __init__(self, reader: DescriptionReader) -> None:
-        self._reader = reader
+    def __init__(self, place: Place, read: Callable[[Iterable[Any]], None]) -> None:
+        self._place = place
+        self._read = read
 
     def read(self, action: Any) -> None:
         """Add a process."""
@@ -42,7 +50,7 @@ class ProgramReader:
         """Let the system end when a program ends."""
         entry = self._entry_of(target)
         if entry is None:
-            self._reader.remark('what ends the system is not among its processes')
+            self._place.remark('what ends the system is not among its processes')
         else:
             entry.data['on_exit'] = 'shutdown'
 
@@ -50,7 +58,7 @@ class ProgramReader:
         """Read an event that is emitted at once: a transition of a lifecycle node."""
         event = private(entity, 'event')
         if 'ChangeState' not in class_names(event):
-            self._reader.remark(f'EmitEvent({type(event).__name__}) cannot be kept')
+            self._place.remark(f'EmitEvent({type(event).__name__}) cannot be kept')
             return
         self._change_state(event)
 
@@ -63,29 +71,29 @@ class ProgramReader:
             if event is not None and 'ChangeState' in class_names(event):
                 self._change_state(event)
             elif 'LogInfo' not in class_names(action):
-                self._reader.remark('OnStateTransition cannot be kept')
+                self._place.remark('OnStateTransition cannot be kept')
 
     def _change_state(self, event: Any) -> None:
         state = _TRANSITIONS.get(getattr(event, 'transition_id', -1))
         lifecycle = [
             entry
-            for entry in self._reader.result.entries
+            for entry in self._place.result.entries
             if entry.action is not None and 'LifecycleNode' in class_names(entry.action)
         ]
         matching = [entry for entry in lifecycle if _matches(event, entry.action)] or lifecycle
         if state is None or not matching:
-            self._reader.remark('ChangeState cannot be kept')
+            self._place.remark('ChangeState cannot be kept')
             return
         for entry in matching:
             if entry.data.get('lifecycle') != 'active':
                 entry.data['lifecycle'] = state
 
     def _entry_of(self, target: Any) -> Entry | None:
-        entries = self._reader.result.entries
+        entries = self._place.result.entries
         return next((entry for entry in entries if entry.action is target), None)
 
     def _read_node(self, action: Any, kinds: list[str]) -> None:
-        resolver = self._reader.resolver
+        resolver = Resolver(self._place)
         package, executable = private(action, 'package'), private(action, 'node_executable')
         program = resolver.text(executable)
         data: dict[str, Any] = {}
@@ -126,7 +134,7 @@ class ProgramReader:
 
     def _is_started(self, action: Any) -> bool:
         written = private(action, 'autostart')
-        return bool(written) and truth_of(self._reader.resolver.is_true(written))
+        return bool(written) and truth_of(Resolver(self._place).is_true(written))
 
     def read_components(self, action: Any) -> None:
         """Add components to a container: one of the system, or one that runs already."""
@@ -137,9 +145,9 @@ class ProgramReader:
 
     def _named(self, target: Any) -> Entry:
         """Return the container of a name; one that runs already if the system has none."""
-        resolver = self._reader.resolver
+        resolver = Resolver(self._place)
         name = resolver.text(target)
-        for entry in self._reader.result.entries:
+        for entry in self._place.result.entries:
             own, namespace = entry.data.get('name'), entry.data.get('namespace', '')
             values = [
                 each.value if isinstance(each, Computed) else each for each in (own, namespace)
@@ -151,9 +159,9 @@ class ProgramReader:
         return self._add('containers', name.text.strip('/').replace('/', '_'), data, None)
 
     def _add_component(self, entry: Entry | None, component: Any) -> None:
-        reader, resolver = self._reader, self._reader.resolver
+        place, resolver = self._place, Resolver(self._place)
         condition = component.condition() if callable(component.condition) else None
-        held = reader.read_condition(condition) if condition is not None else None
+        held = read_condition(place, condition) if condition is not None else None
         if entry is None or (held is not None and not held.code and not held.holds):
             return
         name = resolver.text(private(component, 'node_name'))
@@ -169,13 +177,13 @@ class ProgramReader:
         self._add_remaps(data, private(component, 'remappings') or ())
         extra: dict[str, Any] = {}
         for each in private(component, 'extra_arguments') or ():
-            extra |= ParameterReader(resolver, reader.remark, reader.loader.parse).values(each)
+            extra |= ParameterReader(place).values(each)
         if 'use_intra_process_comms' in extra:
             data['intra_process'] = extra.pop('use_intra_process_comms')
         if extra:
-            reader.remark(f'extra arguments of a component cannot be kept: {", ".join(extra)}')
-        with reader.scope.under(held):
-            when = reader.scope.when
+            place.remark(f'extra arguments of a component cannot be kept: {", ".join(extra)}')
+        with place.scope.under(held):
+            when = place.scope.when
         if when and when != entry.when:
             data['when'] = Computed(f'{{{{ {when} }}}}', True)
         components: dict[str, Any] = entry.data.setdefault('components', {})
@@ -188,7 +196,7 @@ class ProgramReader:
         components[free] = data
 
     def _read_process(self, action: Any) -> None:
-        resolver = self._reader.resolver
+        resolver = Resolver(self._place)
         words = [resolver.text(each) for each in private(action, 'cmd') or action.cmd]
         program = words[0] if words else Text(())
         data: dict[str, Any]
@@ -202,34 +210,31 @@ class ProgramReader:
         self._add('processes', first or 'process', data, action)
 
     def _add(self, section: str, name: str, data: dict[str, Any], action: Any) -> Entry:
-        reader = self._reader
-        entry = reader.add(section, name, data, action)
+        place = self._place
+        entry = place.add(section, name, data, action)
         on_exit = private(action, 'on_exit') if action is not None else None
         if on_exit is not None:
             self._read_on_exit(entry, on_exit)
         return entry
 
     def _read_on_exit(self, entry: Entry, on_exit: Any) -> None:
-        from composer.launch_files.reader import ends_system
-        from composer.launch_files.scope import Wait
 
-        reader = self._reader
+        place = self._place
         actions = on_exit if isinstance(on_exit, list | tuple) else [on_exit]
         if any(not hasattr(each, 'execute') for each in actions):
-            reader.remark('on_exit runs code of its own, which cannot be kept')
+            place.remark('on_exit runs code of its own, which cannot be kept')
             return
         if any(map(ends_system, actions)):
             entry.data['on_exit'] = 'shutdown'
-        with reader.scope.after(Wait(entry.action, 'ended')):
-            reader.read([each for each in actions if not ends_system(each)])
+        with place.scope.after(Wait(entry.action, 'ended')):
+            self._read([each for each in actions if not ends_system(each)])
 
     def _add_namespace(self, data: dict[str, Any], written: Any) -> None:
-        from composer.launch_files.reader import join_namespaces
 
-        outer = self._reader.scope.configurations.get('ros_namespace')
+        outer = self._place.scope.configurations.get('ros_namespace')
         if written is None and not isinstance(outer, Text):
             return
-        own = self._reader.resolver.text(written)
+        own = Resolver(self._place).text(written)
         full = join_namespaces(outer, own)
         if full.parts and not (full.is_constant and full.text == ''):
             data['namespace'] = full.written()
@@ -237,9 +242,9 @@ class ProgramReader:
             data['namespace'] = '/'
 
     def _add_parameters(self, data: dict[str, Any], written: Any) -> None:
-        reader = self._reader
-        parameters = ParameterReader(reader.resolver, reader.remark, reader.loader.parse)
-        common = reader.scope.configurations.get('global_params', ())
+        place = self._place
+        parameters = ParameterReader(place)
+        common = place.scope.configurations.get('global_params', ())
         read = parameters.read(written, common)
         if read.values:
             data['parameters'] = read.values
@@ -247,12 +252,12 @@ class ProgramReader:
             data['parameter_files'] = read.files
 
     def _add_remaps(self, data: dict[str, Any], written: Any) -> None:
-        resolver = self._reader.resolver
+        resolver = Resolver(self._place)
         rules: dict[str, str] = {}
-        for rule in self._reader.scope.configurations.get('ros_remaps', ()):
+        for rule in self._place.scope.configurations.get('ros_remaps', ()):
             *condition, source, target = rule
             if condition:
-                self._reader.remark(f'SetRemap depends on {condition[0]}, and is left out')
+                self._place.remark(f'SetRemap depends on {condition[0]}, and is left out')
                 continue
             rules.setdefault(source.written(), target.written())
         for source, target in written:
@@ -262,14 +267,14 @@ class ProgramReader:
 
     def _add_keys(self, data: dict[str, Any], action: Any) -> None:
         """Add what all processes have."""
-        reader, resolver = self._reader, self._reader.resolver
+        place, resolver = self._place, Resolver(self._place)
         description = private(action, 'process_description')
         env = {
             resolver.text(key).text: resolver.text(value).written()
             for key, value in private(description, 'additional_env') or ()
         }
         if private(description, 'env') is not None:
-            reader.remark('env: the process also has the environment of the system')
+            place.remark('env: the process also has the environment of the system')
             env |= {
                 resolver.text(key).text: resolver.text(value).written()
                 for key, value in private(description, 'env')
@@ -281,7 +286,7 @@ class ProgramReader:
             data['cwd'] = cwd.written() if cwd.text.startswith('/') else _beside(cwd)
         prefix = resolver.text(private(description, 'prefix'))
         if prefix.text.strip():
-            reader.remark(f"the prefix '{prefix.text}' cannot be kept")
+            place.remark(f"the prefix '{prefix.text}' cannot be kept")
         self._add_restart(data, action)
         timeouts = [
             resolver.text(private(action, f'{each}_timeout')) for each in ('sigterm', 'sigkill')
@@ -290,7 +295,7 @@ class ProgramReader:
             self._add_timeout(data, timeouts)
 
     def _add_restart(self, data: dict[str, Any], action: Any) -> None:
-        resolver = self._reader.resolver
+        resolver = Resolver(self._place)
         respawn = resolver.is_true(private(action, 'respawn'))
         if respawn.is_constant and not (respawn.text and truth_of(respawn)):
             return
@@ -345,3 +350,10 @@ def _matches(event: Any, action: Any) -> bool:
         return bool(matcher(action))
     except Exception:  # noqa: BLE001 - a function of the launch file
         return False
+
+
+def ends_system(action: Any) -> bool:
+    """Return whether an action stops all that was launched."""
+    kinds = class_names(action)
+    event = private(action, 'event')
+    return 'Shutdown' in kinds or (event is not None and 'Shutdown' in class_names(event))
