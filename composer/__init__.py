@@ -2,6 +2,7 @@
 
 Attributes:
     Node: The node that a behaviour is called with.
+    Process: The process that a behaviour of an `on_exit` is called with.
     load: Loads a file as far as it can be read.
     check: Returns the errors and warnings of a file.
     up: Runs the system that a file declares; returns the exit code.
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         ServiceNotAvailableError,
         SystemStoppingError,
     )
+    from composer.runtime.external.exit_actions import Process
     from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
@@ -39,6 +41,7 @@ __all__ = [
     'GoalTimeoutError',
     'Node',
     'ParametersRefusedError',
+    'Process',
     'ServiceFailedError',
     'ServiceNotAvailableError',
     'SystemStoppingError',
@@ -49,6 +52,7 @@ __all__ = [
 
 _MODULES = {
     'Node': 'composer.runtime.nodes.behaviour_node',
+    'Process': 'composer.runtime.external.exit_actions',
     **dict.fromkeys(('check', 'load', 'up'), 'composer.api'),
 }
 

@@ -181,12 +181,20 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         stand_in={'type': 'unknown/action/Unknown'},
     ),
 )
+# Those of the transitions of a node with a lifecycle.
+TRANSITION_BEHAVIOURS = (
+    *('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_error_state'),
+)
 # The behaviours of a node itself.
 NODE_BEHAVIOURS: tuple[BehaviourKey, ...] = (
     BehaviourKey('on_start', ('node',)),
     BehaviourKey('on_stop', ('node',)),
     BehaviourKey('on_parameters', ('node', 'changes')),
+    *(BehaviourKey(key, ('node',)) for key in TRANSITION_BEHAVIOURS),
 )
+
+# What a process calls when it has ended.
+EXIT_BEHAVIOUR = BehaviourKey('on_exit', ('process', 'exit_code'))
 
 KIND_OF_SECTION: dict[str, EntityKind] = {kind.section: kind for kind in ENTITY_KINDS}
 KIND_OF_NOUN: dict[str, EntityKind] = {kind.noun: kind for kind in ENTITY_KINDS}

@@ -17,6 +17,7 @@ from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.channels import check_channel_types, check_servers
 from composer.checks.connections.deadlocks import check_deadlocks
+from composer.checks.connections.lifecycles import check_awaited_states, check_lifecycles
 from composer.checks.connections.loops import check_loops
 from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.typos import check_typos
@@ -68,6 +69,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_lifecycles,
     check_missing_modules,
     check_compared_arguments,
     check_transforms,
@@ -86,6 +88,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_start_values,
     check_left_out,
     check_waits,
+    check_awaited_states,
     check_environment,
     check_channel_types,
     check_servers,

@@ -11,11 +11,12 @@ from composer.checks.connections.topology import Topology, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
-from composer.language.bindings import Binding, node_bindings
+from composer.language.bindings import Binding, exit_bindings, node_bindings
 from composer.language.specs import DeclaredEndSpec
 from composer.records import record
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import Unpack
 
     from composer.diagnostics import Diagnostic, Remarks, Span
@@ -74,6 +75,13 @@ class CheckContext:
         if node.path not in self._bindings:
             self._bindings[node.path] = [*node_bindings(node)]
         return self._bindings[node.path]
+
+    def all_bindings(self) -> Iterator[Binding]:
+        """Yield the behaviours of all nodes and processes."""
+        for node in self.spec.nodes.values():
+            yield from self.bindings(node)
+        for process in self.spec.processes.values():
+            yield from exit_bindings(process)
 
     @cached_property
     def _bindings(self) -> dict[DataPath, list[Binding]]:

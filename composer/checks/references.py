@@ -80,7 +80,7 @@ def _passes_on(
     if behaviour is None:
         return not context.was_dropped((*subscription.path, 'behaviour'))
     module = context.modules.find(behaviour.module)
-    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
+    source = module.find_function(behaviour.function) if isinstance(module, ModuleSource) else None
     if source is None or source.definition is None or not passes_message_on(source.definition):
         return False
     # A message can be the only field of another one.

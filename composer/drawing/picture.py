@@ -245,6 +245,10 @@ def _waits(
             target = _target(waiter, condition)
             if target in known:
                 yield Wait(ids[waiter.path], target, condition.path)
+    for process in context.spec.processes.values():
+        for action in process.on_exit:
+            if f'process:{action.start}' in known:
+                yield Wait(f'process:{action.start}', ids[process.path], action.path)
 
 
 def _target(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:

@@ -1,17 +1,23 @@
-"""The behaviours of a node, and what each of them is called with."""
+"""The behaviours of nodes and processes, and what each of them is called with."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.entity_kinds import NODE_BEHAVIOURS
+from composer.entity_kinds import EXIT_BEHAVIOUR, NODE_BEHAVIOURS
 from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.entity_kinds import BehaviourKey, EntityKind
-    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec
+    from composer.language.specs import (
+        BehaviourSpec,
+        EntitySpec,
+        NodeSpec,
+        ProcessSpec,
+        SystemSpec,
+    )
 
 
 @record
@@ -21,8 +27,8 @@ class Binding:
     Attributes:
         owner: The place in words, as in `timer 'tick'`.
         key: The key that names it there, with what it is called with.
-        kind: The kind of its entity; `None` for a behaviour of the node itself.
-        entity: Its entity; `None` for a behaviour of the node itself.
+        kind: The kind of its entity; `None` for a behaviour of a node itself or of a process.
+        entity: Its entity; `None` in the same cases.
     """
 
     behaviour: BehaviourSpec
@@ -65,3 +71,18 @@ def node_bindings(node: NodeSpec) -> Iterator[Binding]:
         behaviour = getattr(node, key.key)
         if behaviour:
             yield Binding(behaviour, key.key, key)
+
+
+def exit_bindings(process: ProcessSpec) -> Iterator[Binding]:
+    """Yield the behaviours of a process."""
+    for action in process.on_exit:
+        if action.behaviour:
+            yield Binding(action.behaviour, EXIT_BEHAVIOUR.key, EXIT_BEHAVIOUR)
+
+
+def system_bindings(system: SystemSpec) -> Iterator[Binding]:
+    """Yield all behaviours of a system."""
+    for node in system.nodes.values():
+        yield from node_bindings(node)
+    for process in system.processes.values():
+        yield from exit_bindings(process)

@@ -90,6 +90,13 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
         changed['cwd'] = _resolved(entry['cwd'], (*path, 'cwd'), positions)
     if 'launch' in entry:
         changed['launch'] = _resolved_launch_file(entry['launch'], (*path, 'launch'), positions)
+    if 'nodl' in entry:
+        changed['nodl'] = _resolved(entry['nodl'], (*path, 'nodl'), positions)
+    if path[0] == 'processes' and isinstance(entry.get('nodes'), dict):
+        changed['nodes'] = {
+            name: node and _with_paths(node, (*path, 'nodes', name), positions)
+            for name, node in entry['nodes'].items()
+        }
     if 'parameter_files' in entry:
         at = (*path, 'parameter_files')
         changed['parameter_files'] = [

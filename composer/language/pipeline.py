@@ -20,6 +20,7 @@ from composer.language.evaluate import evaluate_expressions, give_arguments
 from composer.language.includes.includer import Includer
 from composer.language.layers import merge_documents
 from composer.language.loaded_system import LoadedSystem
+from composer.language.nodl.named_documents import read_nodl_documents
 from composer.language.parsing.system_parser import parse_specs
 from composer.language.paths import resolve_paths
 from composer.language.set_option import apply_set_values
@@ -152,4 +153,5 @@ def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
         return
     check_structure(system)
     resolve_paths(system)
+    read_nodl_documents(system)
     apply_defaults(system)

@@ -26,6 +26,10 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
+LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+WhileInactive: TypeAlias = Literal['drop', 'keep']
+ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
@@ -40,12 +44,26 @@ REENTRANT = 'reentrant'
 
 @record
 class BehaviourSpec:
-    """A Python function by name, with constant keyword arguments."""
+    """A Python function by name, with constant keyword arguments.
+
+    Attributes:
+        function: Its name, or `Class.method`.
+    """
 
     module: str
     function: str
     arguments: Mapping[str, Any]
     path: DataPath
+
+    @property
+    def class_name(self) -> str:
+        """The class, if it is a method; otherwise empty."""
+        return self.function.rpartition('.')[0]
+
+    @property
+    def method_name(self) -> str:
+        """The name of the method or function alone."""
+        return self.function.rpartition('.')[2]
 
     @property
     def name(self) -> str:
@@ -114,6 +132,8 @@ class SubscriptionSpec:
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
         read_only: Whether it shares its messages with others, as its behaviour only reads them.
+        while_inactive: What becomes of messages while the node has a lifecycle and is not active;
+            `None` for what fits the durability.
         external: Whether its publishers are in no file.
     """
 
@@ -125,6 +145,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     read_only: bool
+    while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
     warn_after_sec: float | None
@@ -158,6 +179,8 @@ class ServiceSpec:
 
     Attributes:
         group: The callback group's name; `None` for the node's default group.
+        while_inactive: What becomes of requests while the node has a lifecycle and is not active;
+            `None` is `drop`.
     """
 
     name: str
@@ -166,6 +189,7 @@ class ServiceSpec:
     qos: QosSpec
     behaviour: BehaviourSpec
     group: str | None
+    while_inactive: WhileInactive | None
     local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
@@ -246,11 +270,28 @@ class ConditionSpec:
         kind: What sort of thing it is.
         name: Its name as written; a relative one lies in the namespace of who waits.
         timeout_sec: After this the start fails.
+        state: What a process must have come to; `None` if it may run or have succeeded. Or the
+            state that a node must be in, which has a lifecycle; `None` for any.
     """
 
     kind: ConditionKind
     name: str
     timeout_sec: float
+    state: ProcessState | LifecycleState | None
+    path: DataPath
+
+
+@record
+class ExitActionSpec:
+    """What happens when a process has ended for good: the system stops if neither is given.
+
+    Attributes:
+        behaviour: A function to call, or `None`.
+        start: The name of a process to start, or `None`.
+    """
+
+    behaviour: BehaviourSpec | None
+    start: str | None
     path: DataPath
 
 
@@ -322,11 +363,13 @@ class ProcessSpec:
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
         cwd: The folder it runs in; `None` for that of Composer.
-        required: Whether the system ends when it ends.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
         stop_signal: The signal that asks it to end.
+        on_exit: What happens when it has ended and is not started again.
         stop_timeout_sec: After this it is killed; `None` for the system's own.
+        delay_sec: Time between the moment when its conditions hold and its start.
+        on_demand: Whether it only starts when the `on_exit` of another one starts it.
     """
 
     name: str
@@ -344,16 +387,23 @@ class ProcessSpec:
     log_level: LogLevel | None
     env: Mapping[str, str]
     cwd: str | None
-    required: bool
     restart: RestartRule
     restart_delay_sec: float
     most_restarts: int | None
+    on_exit: tuple[ExitActionSpec, ...]
     stop_signal: str
     stop_timeout_sec: float | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
+    on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def is_ros(self) -> bool:
@@ -377,7 +427,11 @@ class NodeSpec:
         remap: Rules, from and to; the first that matches wins.
         state: What `node.state` starts as.
         wait_for: What must be there before it starts.
+        delay_sec: Time between the moment when its conditions hold and its start.
         parameter_files: In ROS's own format; later ones win.
+        lifecycle: The state to which a node with a lifecycle brings itself; `None` for one
+            without.
+        bond: Whether it keeps a bond while it is active.
     """
 
     _: KW_ONLY
@@ -390,6 +444,7 @@ class NodeSpec:
     rosout: bool = True
     type_description_service: bool = False
     logger_services: bool = False
+    bond: bool = False
     on_error: OnError
     warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
@@ -405,9 +460,21 @@ class NodeSpec:
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
+    lifecycle: LifecycleStart | None
+    on_configure: BehaviourSpec | None
+    on_activate: BehaviourSpec | None
+    on_deactivate: BehaviourSpec | None
+    on_cleanup: BehaviourSpec | None
+    on_error_state: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
+    delay_sec: float
     parameter_files: tuple[str, ...]
     path: DataPath
+
+    @property
+    def starts_late(self) -> bool:
+        """Whether it waits for something, or for some time, before it starts."""
+        return bool(self.wait_for or self.delay_sec)
 
     @property
     def key(self) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import resolve_qos
-from composer.language.specs import BehaviourSpec, ConditionSpec, QosSpec
+from composer.language.specs import BehaviourSpec, ConditionSpec, ExitActionSpec, QosSpec
 from composer.names import expand_name
 from composer.planning.plan import Change
 from composer.records import record
@@ -33,6 +33,7 @@ _KEYS = {
     'restart_delay_sec': ('restart.delay',),
     'most_restarts': ('restart.max',),
     'stop_signal': ('stop.signal',),
+    'delay_sec': ('delay',),
     'stop_timeout_sec': ('stop.timeout',),
 }
 # What no value of these fields stands for.
@@ -129,8 +130,18 @@ def _plain(value: Any, name: str = '') -> Any:
     if isinstance(value, tuple):
         return [_plain(each) for each in value]
     if isinstance(value, ConditionSpec):
-        return f'{value.kind} {value.name} within {value.timeout_sec:g} s'
+        state = f' {value.state}' if value.state else ''
+        return f'{value.kind} {value.name}{state} within {value.timeout_sec:g} s'
+    if isinstance(value, ExitActionSpec):
+        return _plain_action(value)
     return value
+
+
+def _plain_action(action: ExitActionSpec) -> Any:
+    if action.behaviour is None:
+        return 'shutdown' if action.start is None else {'start': action.start}
+    arguments = dict(action.behaviour.arguments)
+    return {'behaviour': action.behaviour.name} | ({'with': arguments} if arguments else {})
 
 
 def _differ(old: Any, new: Any) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.interfaces.search_paths import extend_processes
-from composer.language.bindings import node_bindings
+from composer.language.bindings import system_bindings
 from composer.language.paths import resolve_path
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
@@ -69,7 +69,7 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
     spec = extend_processes(context.spec, prefixes)
     sources = _Sources(context.modules)
     nodes = [*spec.nodes.values()]
-    modules = {each.behaviour.module for node in nodes for each in node_bindings(node)}
+    modules = {each.behaviour.module for each in system_bindings(spec)}
     definitions = {
         (package.package, name): text
         for package in context.interfaces.definitions or ()
@@ -97,7 +97,7 @@ def _find_generators(context: CheckContext) -> Iterator[str]:
             module = context.modules.find(behaviour.module)
             source = None
             if not isinstance(module, MissingModule):
-                source = module.functions.get(behaviour.function)
+                source = module.find_function(behaviour.function)
             if source is not None and source.kind is not None and source.kind.is_generator:
                 yield behaviour.name
 

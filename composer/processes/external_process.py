@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from composer.processes.backoff import Backoff
 
 if TYPE_CHECKING:
-    from composer.language.specs import ProcessSpec
+    from composer.language.specs import ProcessSpec, ProcessState
 
 
 @dataclass(slots=True)
@@ -42,6 +42,7 @@ class ExternalProcess:
         run: The last one; `None` before the first.
         restarts: How often it was started again.
         is_done: Whether it has ended for good.
+        is_acting: Whether its `on_exit` is under way.
         is_leaving: Whether the system has let go of it.
     """
 
@@ -50,6 +51,7 @@ class ExternalProcess:
         self.run: ProcessRun | None = None
         self.restarts = 0
         self.is_done = False
+        self.is_acting = False
         self.is_leaving = False
         # A process that keeps dying is started again ever more slowly, as nodes are.
         self.backoff = Backoff(least_sec=spec.restart_delay_sec)
@@ -60,9 +62,24 @@ class ExternalProcess:
         self.backoff.least_sec = spec.restart_delay_sec
 
     @property
-    def is_ready(self) -> bool:
-        """Whether it runs, or has ended with exit code 0."""
-        return self.run is not None and self.run.code in (None, 0)
+    def is_over(self) -> bool:
+        """Whether nothing is to come of it: it has ended for good, or is not asked for."""
+        is_unasked = self.spec.on_demand and self.run is None
+        return (self.is_done or is_unasked) and not self.is_acting
+
+    @property
+    def has_succeeded(self) -> bool:
+        """Whether its last run has ended with exit code 0."""
+        return self.run is not None and self.run.code == 0
+
+    def has_come_to(self, state: ProcessState | None) -> bool:
+        """Return whether it is in a state; without one, whether it runs or has succeeded."""
+        if state == 'ended':
+            return self.is_done
+        if state == 'succeeded':
+            return self.is_done and self.has_succeeded
+        is_running = self.run is not None and self.run.code is None
+        return is_running or (state is None and self.has_succeeded)
 
     @property
     def state(self) -> str:

@@ -47,6 +47,7 @@ class ProcessSupervisor:
 
     Attributes:
         by_name: The processes.
+        on_exit: Called with a process and its exit code when it has ended for good.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
     """
@@ -67,6 +68,7 @@ class ProcessSupervisor:
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
         self.is_alone = False
+        self.on_exit: Callable[[ExternalProcess, int], None] = lambda _process, _code: None
         self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
@@ -76,11 +78,14 @@ class ProcessSupervisor:
         self._tools: _Tools | None = None
 
     def start(self, process: ExternalProcess) -> None:
-        """Start a process; after `stop` nothing happens.
+        """Start a process; after `stop`, or when it was removed, nothing happens.
 
         Raises:
             StartError: Its program does not exist, or cannot be run.
         """
+        if process.is_leaving:
+            return
+        process.is_done = False
         try:
             run = self._launch(process)
         except OSError as error:
@@ -128,7 +133,8 @@ class ProcessSupervisor:
             run.gone.wait(max(0.0, begun + timeout_sec - monotonic()))
         tools.close()
         for watcher in self._watchers:
-            watcher.join()
+            # A behaviour in an `on_exit` may hang.
+            watcher.join(max(_KILLED_SEC, begun + self.timeout_sec - monotonic()))
         return not any(run.was_killed for run in runs)
 
     def kill_all(self) -> None:
@@ -217,15 +223,7 @@ class ProcessSupervisor:
             self._log(end, is_error=code not in expected and not run.was_killed)
             return
         if not process.is_restarted(code):
-            process.is_done = True
-            matters = code != 0 or process.spec.required
-            self._has_started.wait(_LONGEST_START_SEC if matters else None)
-            self._log(end + process.describe_limit(code), is_error=code != 0)
-            if process.spec.required:
-                self._logger.error(f"process '{name}' is required: the system ends")
-                self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
-            else:
-                self._end_if_last()
+            self.end_for_good(process, code, end + process.describe_limit(code))
             return
         delay_sec = process.backoff.next_delay_sec()
         self._has_started.wait(_LONGEST_START_SEC)
@@ -243,20 +241,37 @@ class ProcessSupervisor:
         try:
             self.start(process)
         except StartError as error:
-            self._logger.error(str(error))
-            process.is_done = True
-            if process.spec.required:
-                self._end_system(ExitCode.FAILED)
-            else:
-                self._end_if_last()
+            self.end_for_good(process, ExitCode.FAILED, str(error))
+
+    def end_for_good(self, process: ExternalProcess, code: int, end: str) -> None:
+        """Log how a process has ended, and do what is due then.
+
+        Args:
+            code: The exit code, or a signal's number, negative.
+            end: How it has ended, in words.
+        """
+        process.is_acting = True
+        process.is_done = True
+        if not process.spec.on_exit:
+            self._has_started.wait(_LONGEST_START_SEC if code != 0 else None)
+        self._log(end, is_error=code != 0)
+        self.on_exit(process, code)
+        process.is_acting = False
+        self._end_if_last()
+
+    def end_system(self, process: ExternalProcess, code: int) -> None:
+        """End the system, because a process has ended."""
+        self._has_started.wait(_LONGEST_START_SEC)
+        self._log(f"process '{process.spec.name}' has ended: the system ends", is_error=code != 0)
+        self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
 
     def _end_if_last(self) -> None:
         """End a system without nodes whose processes have all ended."""
         self._has_started.wait()
         processes = self.by_name.values()
-        if self.is_alone and all(each.is_done for each in processes):
+        if self.is_alone and all(each.is_over for each in processes):
             self._logger.info('all processes have ended: the system ends')
-            have_succeeded = all(each.run is not None and each.run.code == 0 for each in processes)
+            have_succeeded = all(each.has_succeeded for each in processes if each.is_done)
             self._end_system(ExitCode.DONE if have_succeeded else ExitCode.FAILED)
 
     def _log(self, text: str, *, is_error: bool) -> None:

@@ -14,6 +14,7 @@ from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
+from composer.runtime.external.exit_actions import ExitActions
 from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
@@ -112,7 +113,10 @@ class System:
         )
         self._processes.is_alone = not spec.nodes
         self._stop_request.kill_processes = self._processes.kill_all
+        self.state.find_lifecycles = self._find_lifecycles
         self._starter = Starter(self._nodes, self._processes, self._handle)
+        self._exits = ExitActions(self._processes, self._starter, self._handle)
+        self._processes.on_exit = self._exits.act
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = ControlNode(
@@ -159,7 +163,8 @@ class System:
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
-        External processes start before any `on_start`. What has a `wait_for` starts last, while
+        External processes start before any `on_start`. What has a `wait_for` or a `delay`
+        starts last, while
         the behaviours of all others run. If a node cannot start, the `on_stop` of those that
         have started is run.
 
@@ -176,7 +181,7 @@ class System:
             self._graph_watcher.start()
             self._parameter_services.start()
             for node in self._nodes.values():
-                node.gate.serves = node.spec.on_start is None and not node.spec.wait_for
+                node.serve_at_once()
             self._executor.wake()
             prompt = self._starter.start(self._nodes.values(), self._processes.by_name.values())
         except BaseException:
@@ -287,6 +292,10 @@ class System:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
 
+    def _find_lifecycles(self) -> dict[str, str]:
+        nodes = list(self._nodes.values())
+        return {node.full_name: node.lifecycle.state for node in nodes if node.lifecycle}
+
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again."""
         failure = self._restarter.restart(full_name)
@@ -322,6 +331,7 @@ class System:
         ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
         # Processes end after the nodes: an `on_stop` may need them.
         none_killed = self._processes.stop()
+        ended &= self._exits.report_hanging()
         if self._guardian.mark:
             none_killed &= end_marked(self._guardian.mark, timeout_sec, system_logger)
         if not (none_killed and ended):

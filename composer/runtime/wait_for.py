@@ -1,4 +1,4 @@
-"""`wait_for`: nodes and processes that start when what they need is there.
+"""`wait_for` and `delay`: nodes and processes that start when what they need is there.
 
 The graph is only queried while something waits, at most twenty times a second.
 """
@@ -8,15 +8,18 @@ from __future__ import annotations
 import threading
 from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from composer.ament import remaps_actions
 from composer.errors import StartError
+from composer.language.specs import LifecycleState
 from composer.names import expand_name, remap_name
 from composer.records import record
 from composer.runtime.behaviours.waits import WaitNotice
+from composer.runtime.lifecycle.remote_lifecycle import RemoteLifecycle
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
+from composer.runtime.nodes.system_handle import never
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node as RosNode
 
+    from composer.executor import ComposerExecutor
     from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.nodes.live_node import LiveNode
@@ -38,7 +42,13 @@ _REASONS = {
     'node': 'there is no such node',
 }
 # What is waited for, where that is not called as the key is.
-_AWAITED = {'topic': 'a publisher of', 'action': 'action server'}
+_AWAITED = {'topic': "a publisher of '{}'", 'action': "action server '{}'"}
+_AWAITED_STATES = {
+    'running': "process '{}' to run",
+    'ended': "the end of process '{}'",
+    'succeeded': "process '{}' to succeed",
+    **{each: f"node '{{}}' to be {each}" for each in get_args(LifecycleState)},
+}
 
 
 @record
@@ -47,22 +57,27 @@ class Waiter:
 
     Attributes:
         label: As in `node 'arm'`.
+        delay_sec: Time between the moment when they hold and its start.
         resolve: Returns the full name for a condition.
         log: Takes what it waits for.
         start: Starts it; returns when it has started.
+        is_wanted: Whether it is still to start.
     """
 
     label: str
     conditions: tuple[ConditionSpec, ...]
+    delay_sec: float
     resolve: Callable[[ConditionSpec], str]
     log: Callable[[str], Any]
     start: Callable[[], None]
+    is_wanted: Callable[[], bool]
 
 
 class WaitingStarter:
     """Starts each waiting node and process as soon as its conditions hold.
 
     Args:
+        executor: Spins the node that asks other nodes for their states.
         nodes: The nodes of the system; what is in those that have not started does not count.
         processes: The processes of the system, by their names.
     """
@@ -70,21 +85,34 @@ class WaitingStarter:
     def __init__(
         self,
         context: Context,
+        executor: ComposerExecutor,
         nodes: Mapping[str, LiveNode],
         processes: Mapping[str, ExternalProcess],
         positions: SourceMap,
     ) -> None:
         self._context = context
+        self._executor = executor
+        self._remotes: dict[str, RemoteLifecycle] = {}
         self._nodes = nodes
         self._processes = processes
         self._positions = positions
-        self._notices: dict[DataPath, WaitNotice] = {}
+        self._notices: dict[DataPath | int, WaitNotice] = {}
+        # When the conditions of a waiter held first.
+        self._held: dict[int, float] = {}
 
-    def start_all(self, waiters: Iterable[Waiter], stop: StopRequest) -> None:
+    def start_all(
+        self,
+        waiters: Iterable[Waiter],
+        stop: StopRequest,
+        is_outdated: Callable[[], bool] = never,
+    ) -> None:
         """Start all; a stop request ends the wait.
 
+        Args:
+            is_outdated: Returns whether there is a newer edit.
+
         Raises:
-            StartError: A condition did not hold in time.
+            StartError: A condition did not hold in time, or there is a newer edit.
         """
         pending = list(waiters)
         if not pending:
@@ -95,24 +123,37 @@ class WaitingStarter:
         try:
             with stop.waking(woken.set):
                 while pending and not stop.is_set:
+                    if is_outdated():
+                        message = f'{pending[0].label}: the files have changed while it waited'
+                        raise StartError(message)
                     started = self._start_ready(pending, node, begun, stop)
-                    pending = [each for each in pending if each not in started]
+                    pending = [
+                        each for each in pending if each not in started and each.is_wanted()
+                    ]
                     if not started:
                         woken.wait(_POLL_SEC)
         finally:
+            self._executor.remove_node(node)
+            self._remotes.clear()
             node.destroy_node()
 
     def _start_ready(
         self, pending: list[Waiter], node: RosNode, begun: float, stop: StopRequest
     ) -> list[Waiter]:
         """Start those whose conditions hold, and return them."""
-        waited_sec = monotonic() - begun
+        now = monotonic()
+        waited_sec = now - begun
         graph = RosGraph(node, self._hidden())
         ready = []
         for waiter in pending:
-            missing = [each for each in waiter.conditions if not self._holds(waiter, each, graph)]
+            conditions = () if id(waiter) in self._held else waiter.conditions
+            missing = [each for each in conditions if not self._holds(waiter, each, graph, node)]
             if not missing:
-                ready.append(waiter)
+                held = self._held.setdefault(id(waiter), now)
+                if now >= held + waiter.delay_sec:
+                    ready.append(waiter)
+                else:
+                    self._delay_notice(waiter).log_if_due(held)
             for condition in missing:
                 if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
                     raise self._error(waiter, condition, graph)
@@ -122,18 +163,41 @@ class WaitingStarter:
                 waiter.start()
         return ready
 
-    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph) -> bool:
+    def _holds(
+        self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph, node: RosNode
+    ) -> bool:
         if condition.kind == 'process':
-            return self._processes[condition.name].is_ready
-        return graph.has(condition.kind, waiter.resolve(condition))
+            state: Any = condition.state
+            return self._processes[condition.name].has_come_to(state)
+        name = waiter.resolve(condition)
+        if condition.state is None:
+            return graph.has(condition.kind, name)
+        return name not in graph.hidden and self._state_of(name, node) == condition.state
+
+    def _state_of(self, name: str, node: RosNode) -> str:
+        """Return the state of a node with a lifecycle; '' if it is not known."""
+        own = self._nodes.get(name)
+        if own is not None:
+            return own.lifecycle.state if own.lifecycle else ''
+        if name not in self._remotes:
+            self._remotes[name] = RemoteLifecycle(node, name)
+            self._executor.add_node(node)
+        return self._remotes[name].look()
 
     def _notice(self, waiter: Waiter, condition: ConditionSpec) -> WaitNotice:
         """Return what says that a condition is waited for."""
         if condition.path not in self._notices:
             name = condition.name if condition.kind == 'process' else waiter.resolve(condition)
-            what = _AWAITED.get(condition.kind, condition.kind)
-            self._notices[condition.path] = WaitNotice(waiter.log, f"{what} '{name}'")
+            what = _AWAITED.get(condition.kind, f"{condition.kind} '{{}}'")
+            what = _AWAITED_STATES.get(condition.state or '', what).format(name)
+            self._notices[condition.path] = WaitNotice(waiter.log, what)
         return self._notices[condition.path]
+
+    def _delay_notice(self, waiter: Waiter) -> WaitNotice:
+        if id(waiter) not in self._notices:
+            what = f'its delay of {waiter.delay_sec:g} s'
+            self._notices[id(waiter)] = WaitNotice(waiter.log, what)
+        return self._notices[id(waiter)]
 
     def _is_hopeless(self, condition: ConditionSpec) -> bool:
         """Return whether it waits for a process that has ended for good."""
@@ -151,13 +215,22 @@ class WaitingStarter:
         if condition.kind == 'process':
             process = self._processes[condition.name]
             waited = 'waits for the process' if process.is_done else waited
-            return StartError(f"{who} {waited} '{condition.name}': {process.state}")
+            what = {'ended': ' to end', 'succeeded': ' to succeed'}.get(condition.state or '', '')
+            message = f"{who} {waited} '{condition.name}'{what}: {process.state}"
+            is_lost = process.is_done and condition.state
+            advice = 'that can never be, so the start fails' if is_lost else None
+            return StartError(message, help=advice)
         name = waiter.resolve(condition)
         late = [
             node.spec.name
             for node in self._nodes.values()
             if node.full_name in graph.hidden and name in graph.names_of(node, condition.kind)
         ]
+        if condition.state and graph.has('node', name):
+            own, remote = self._nodes.get(name), self._remotes.get(name)
+            state = own.lifecycle.state if own and own.lifecycle else remote and remote.look()
+            is_it = f'it is {state}' if state else 'it tells no state, and may have no lifecycle'
+            return StartError(f"{who} {waited} '{name}' to be {condition.state}: {is_it}")
         message = f"{who} {waited} '{name}': {_REASONS[condition.kind]}"
         if late:
             nodes = ' and '.join(f"'{each}'" for each in late)
@@ -172,17 +245,19 @@ def list_waiters(
     start_node: Callable[[LiveNode], None],
     start_process: Callable[[ExternalProcess], None],
 ) -> list[Waiter]:
-    """Return those of the nodes and processes that have conditions."""
-    waiting_processes = [each for each in processes if each.spec.wait_for]
-    waiting_nodes = [each for each in nodes if each.spec.wait_for]
+    """Return those of the nodes and processes that have conditions or a delay."""
+    waiting_processes = [each for each in processes if each.spec.starts_late]
+    waiting_nodes = [each for each in nodes if each.spec.starts_late]
     return [
         *(
             Waiter(
                 f"process '{process.spec.name}'",
                 process.spec.wait_for,
+                process.spec.delay_sec,
                 partial(_resolve_of_process, process.spec),
                 partial(_log_of_process, process.spec),
                 partial(start_process, process),
+                partial(_is_wanted, process),
             )
             for process in waiting_processes
         ),
@@ -190,13 +265,19 @@ def list_waiters(
             Waiter(
                 f"node '{node.spec.name}'",
                 node.spec.wait_for,
+                node.spec.delay_sec,
                 partial(_resolve_of_node, node),
                 node.ros.get_logger().info,
                 partial(start_node, node),
+                lambda: True,
             )
             for node in waiting_nodes
         ),
     ]
+
+
+def _is_wanted(process: ExternalProcess) -> bool:
+    return not process.is_leaving
 
 
 def _resolve_of_node(node: LiveNode, condition: ConditionSpec) -> str:

@@ -51,6 +51,7 @@ _OTHER_WORDS = {
     'plugin': ('behaviour',),
     'queue': ('depth',),
     'remappings': ('remap',),
+    'required': ('on_exit',),
     'respawn': ('restart',),
     'respawn_delay': ('restart',),
     'unless': ('when',),

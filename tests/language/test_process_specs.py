@@ -162,3 +162,24 @@ def test_a_stop_takes_as_long_as_nodes_and_then_processes(load, processes, longe
     text = f'version: 1\nexecutor: {{shutdown_timeout: 3}}\nprocesses: {processes}\n'
 
     assert load(robot=text).spec.longest_stop_sec == longest
+
+
+def test_names_of_included_processes_hold_where_they_are_started_and_waited_for(load):
+    part = """
+        version: 1
+        processes:
+          homing: {command: [a], on_exit: [shutdown, {start: mission}]}
+          mission: {command: [b], wait_for: {process: homing, state: ended}}
+    """
+    robot = """
+        version: 1
+        include: {left: part.yaml}
+        processes: {homing: {command: [c]}, mission: {command: [d]}}
+    """
+    processes = load(
+        robot=robot.replace('part.yaml', '{file: part.yaml}'), part=part
+    ).spec.processes
+
+    assert [each.start for each in processes['left_homing'].on_exit] == [None, 'left_mission']
+    assert conditions(processes['left_mission']) == [('process', 'left_homing')]
+    assert [name for name, each in processes.items() if each.on_demand] == ['left_mission']

@@ -29,7 +29,7 @@ nodes:
     subscriptions:
       words: {type: std_msgs/msg/String, behaviour: parts:hear, with: {loud: true}}
 processes:
-  driver: {command: [sleep, '1'], required: true}
+  driver: {command: [sleep, '1'], on_exit: shutdown}
 """
 CODE = """\
 import helper
@@ -153,8 +153,8 @@ EDITS = [
         ],
     ),
     (
-        'required: true',
-        'required: true, namespace: /cab, parameters: {gear: 1}, parameter_files: [values.yaml]',
+        'on_exit: shutdown',
+        'on_exit: shutdown, namespace: /cab, parameters: {gear: 1}, parameter_files: [values.yaml]',
         None,
         [
             "± process 'driver': namespace = /cab (19), parameters.gear = 1 (19), "
@@ -163,10 +163,13 @@ EDITS = [
         ],
     ),
     (
-        'required: true',
-        'required: false',
+        'on_exit: shutdown',
+        'delay: 2',
         None,
-        ["~ process 'driver': required true → false (19 → 19)"],
+        [
+            '~ process \'driver\': on_exit ["shutdown"] → [] (19 → 19), delay 0.0 → 2.0 (19 → 19); '
+            'delay counts from its next start'
+        ],
     ),
     (
         "'begun'",

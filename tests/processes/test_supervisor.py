@@ -436,21 +436,21 @@ def test_exit_codes_and_signals_are_told(compose):
 
 
 @pytest.mark.parametrize(('end', 'code'), [('exit 0', 0), ('kill -9 $$', 1)])
-def test_the_end_of_a_required_process_ends_the_system(compose, end, code):
+def test_the_end_of_a_process_may_end_the_system(compose, end, code):
     processes = {
-        'mission': {'command': shell(end), 'required': True},
+        'mission': {'command': shell(end), 'on_exit': 'shutdown'},
         'other': {'command': ['sleep', '3600']},
     }
     child = compose(system(processes))
 
     assert child.wait() == code
-    child.wait_for_line("process 'mission' is required: the system ends")
+    child.wait_for_line("process 'mission' has ended: the system ends")
     child.wait_for_line("process 'other' was ended by SIGINT")
 
 
 def test_a_process_that_keeps_dying_is_started_again_ever_more_slowly(compose):
     restart = {'when': 'on_failure', 'delay': 0, 'max': 3}
-    processes = {'bad': {'command': shell('exit 1'), 'restart': restart, 'required': True}}
+    processes = {'bad': {'command': shell('exit 1'), 'restart': restart, 'on_exit': 'shutdown'}}
     child = compose(system(processes))
 
     assert child.wait() == 1
@@ -488,7 +488,7 @@ def test_restart_is_for_the_ends_that_it_names(compose):
         name: {
             'command': shell(f'echo run; {end}'),
             'restart': {'when': when, 'max': 1, 'delay': delay},
-            'required': runs == 2,
+            **({'on_exit': 'shutdown'} if runs == 2 else {}),
         }
         for name, (when, end, delay, runs) in cases.items()
     }
@@ -720,7 +720,7 @@ def test_many_systems_in_a_row_leave_nothing_behind(compose, stubborn, scratch):
     processes = stubborn.process('daemon') | {
         'mission': {
             'command': shell('echo done; sleep 0.2'),
-            'required': True,
+            'on_exit': 'shutdown',
             'parameters': {'a': 1},
         }
     }

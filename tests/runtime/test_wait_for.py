@@ -319,7 +319,7 @@ def test_the_end_of_a_required_process_ends_the_waiting(compose):
     text = """
         version: 1
         nodes: {late: {wait_for: {topic: never, timeout: 3600}}}
-        processes: {mission: {command: [sh, -c, 'sleep 0.2; exit 3'], required: true}}
+        processes: {mission: {command: [sh, -c, 'sleep 0.2; exit 3'], on_exit: shutdown}}
     """
 
     assert compose(text).wait() == 1

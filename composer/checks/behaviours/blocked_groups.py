@@ -132,7 +132,7 @@ def _is_blocked(waiter: _Read, filler: _Read) -> bool:
         if filling.kind is None:
             return False
         # What serves may do so from the start of its node on.
-        return other is node or (not node.wait_for and filling.kind.channel in (None, 'topic'))
+        return other is node or (not node.starts_late and filling.kind.channel in (None, 'topic'))
     group = group_in(node, binding)
     return group is not None and group == group_in(other, filling)
 

@@ -46,11 +46,10 @@ _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the imports of the modules of behaviours, and of what these import of the project."""
     walk = _Walk(context)
-    for node in context.spec.nodes.values():
-        for binding in context.bindings(node):
-            if not context.was_dropped(binding.behaviour.path):
-                walk.visit(binding.behaviour.module, binding)
-                walk.visit_function(binding)
+    for binding in context.all_bindings():
+        if not context.was_dropped(binding.behaviour.path):
+            walk.visit(binding.behaviour.module, binding)
+            walk.visit_function(binding)
     if not any(_CHANGES_THE_SEARCH.search('\n'.join(module.lines)) for module in walk.modules):
         yield from walk.findings
 
@@ -103,7 +102,7 @@ class _Walk:
         if isinstance(module, MissingModule) or key in self._visited:
             return
         self._visited.add(key)
-        source = module.functions.get(behaviour.function)
+        source = module.find_function(behaviour.function)
         definition = source.definition if source else None
         for statement in definition.body if definition else ():
             if not isinstance(statement, _PLAIN):

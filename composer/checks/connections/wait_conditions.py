@@ -1,4 +1,4 @@
-"""Check `wait_for`: every condition can come true, and nothing waits for itself."""
+"""Check `wait_for` and `on_exit`: conditions can come true, and nothing waits for itself."""
 
 from __future__ import annotations
 
@@ -33,21 +33,46 @@ if TYPE_CHECKING:
 
 def check_waits(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that conditions can come true, and that nothing waits for itself."""
-    processes = context.spec.processes
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
             yield from _check_name(context, waiter, condition)
-            lost = context.was_dropped(('processes',)) or context.was_dropped(
-                ('processes', condition.name)
-            )
-            if condition.kind == 'process' and condition.name not in processes and not lost:
-                yield context.at_value(
-                    condition.path,
-                    'unknown-process',
-                    f"there is no process '{condition.name}' in this system",
-                    help=suggest(condition.name, processes, 'there are'),
-                )
+            if condition.kind == 'process':
+                yield from _check_process(context, condition.name, condition.path)
+            yield from _check_end(context, condition)
+    for name, places in _find_starters(context.spec).items():
+        for place, _ in places:
+            yield from _check_process(context, name, place)
     yield from _find_cycles(context)
+
+
+def _check_process(context: CheckContext, name: str, path: DataPath) -> Iterator[Diagnostic]:
+    """Check that there is a process of the name that is written at a path."""
+    spec = context.spec
+    lost = context.was_dropped(('processes',)) or context.was_dropped(('processes', name))
+    if name in spec.processes or lost:
+        return
+    advice = suggest(name, spec.processes, 'there are')
+    if name in spec.nodes:
+        is_start = path[-1] == 'start'
+        use = 'it starts by itself' if is_start else f'write {{node: {name}}} to wait for it'
+        advice = f"'{name}' is a node: {use}"
+    message = f"there is no process '{name}' in this system"
+    yield context.at_value(path, 'unknown-process', message, help=advice)
+
+
+def _check_end(context: CheckContext, condition: ConditionSpec) -> Iterator[Diagnostic]:
+    """Check that a process ends whose end is waited for."""
+    process = context.spec.processes.get(condition.name) if condition.kind == 'process' else None
+    if process is None or condition.state not in ('ended', 'succeeded'):
+        return
+    if process.restart == 'always' and process.most_restarts is None:
+        yield context.at_value(
+            (*condition.path[:-1], 'state'),
+            'never-ends',
+            f"'{process.name}' never ends: it is restarted whenever it does",
+            help="limit its restarts with 'max', or restart it 'on_failure' alone",
+            related=[context.related((*process.path, 'restart'), 'it is restarted here')],
+        )
 
 
 def waiters(spec: SystemSpec) -> Iterable[NodeSpec | ProcessSpec]:
@@ -81,12 +106,16 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
     providers = _Providers(context)
     edges = {
         waiter.path: [
-            (condition, path)
+            (condition.path, path)
             for condition in waiter.wait_for
             for path in providers.of(waiter, condition)
         ]
         for waiter in waiters(context.spec)
     }
+    for name, places in _find_starters(context.spec).items():
+        # Of several, any one will do.
+        if len(places) == 1 and (process := context.spec.processes.get(name)):
+            edges[process.path].append(places[0])
     done: set[tuple[str | int, ...]] = set()
     for start, first in edges.items():
         trail: list[tuple[str | int, ...]] = []
@@ -95,8 +124,8 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
             path, others = pending[-1]
             if path not in trail:
                 trail.append(path)
-            condition, target = next(others, (None, None))
-            if condition is None or target is None:
+            place, target = next(others, (None, None))
+            if place is None or target is None:
                 done.add(path)
                 trail.remove(path)
                 pending.pop()
@@ -105,15 +134,30 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
                 names = [str(each[-1]) for each in cycle]
                 way = ' → '.join([*names, names[0]])
                 message = f'{way}: these wait for each other, and none of them ever starts'
+                advice = None
+                if len(cycle) == 1 and place[-1] == 'start':
+                    message = f"'{names[0]}' only starts when it has ended, so it never does"
+                    advice = 'to start it again whenever it ends: restart: {when: always}'
                 related = [
-                    context.related_value(each.path, f"'{waiter[-1]}' waits here")
+                    context.related_value(each, f"'{waiter[-1]}' waits here")
                     for waiter, awaited in pairwise(cycle)
                     for each, path in edges[waiter]
                     if path == awaited
                 ]
-                yield context.at_value(condition.path, 'wait-cycle', message, related=related)
+                yield context.at_value(place, 'wait-cycle', message, related=related, help=advice)
             elif target not in done:
                 pending.append((target, iter(edges.get(target, ()))))
+
+
+def _find_starters(spec: SystemSpec) -> dict[str, list[tuple[DataPath, DataPath]]]:
+    """Return which processes are started by the ends of others: where that is said, by whom."""
+    starters: dict[str, list[tuple[DataPath, DataPath]]] = {}
+    for process in spec.processes.values():
+        for action in process.on_exit:
+            if action.start is not None:
+                place = (*action.path, 'start')
+                starters.setdefault(action.start, []).append((place, process.path))
+    return starters
 
 
 class StartOrder:
@@ -126,8 +170,8 @@ class StartOrder:
 
     def is_later(self, node: NodeSpec, other: NodeSpec) -> bool:
         """Return whether a node is sure to serve nothing before the `on_start` of another ends."""
-        if not other.wait_for:
-            if node.wait_for:
+        if not other.starts_late:
+            if node.starts_late:
                 return True
             return node.on_start is not None and self._order[node.key] > self._order[other.key]
         return bool(node.wait_for) and self._waits_for(node, other)

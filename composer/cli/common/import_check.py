@@ -8,7 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_call
-from composer.language.bindings import Binding, node_bindings
+from composer.language.bindings import system_bindings
 from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import SystemSpec
+    from composer.language.bindings import Binding
     from composer.python_source.modules import FunctionKind
 
 _Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
@@ -34,7 +34,7 @@ def import_behaviours(
     findings: list[Diagnostic] = []
     # Many nodes may have the same.
     shapes: dict[str, _Shape] = {}
-    for binding in _bindings(context.spec):
+    for binding in system_bindings(context.spec):
         spec = binding.behaviour
         if spec.name not in shapes:
             try:
@@ -61,7 +61,7 @@ class ImportCheck:
         """Yield findings about the functions, except where their source already has findings."""
         with _own_modules(context):
             was_told = any(each.rule == 'missing-module' for each in found)
-            for binding in _bindings(context.spec):
+            for binding in system_bindings(context.spec):
                 if context.was_dropped(binding.behaviour.path):
                     continue
                 if not _has_finding(context, binding, found):
@@ -88,13 +88,10 @@ class ImportCheck:
         yield from check_behaviour_call(context, binding, *_shape_of(function))
 
 
-def _bindings(spec: SystemSpec) -> Iterator[Binding]:
-    for node in spec.nodes.values():
-        yield from node_bindings(node)
-
-
 def _shape_of(function: Callable[..., Any]) -> _Shape:
     """Return how a function runs, and how it is called."""
+    if isinstance(function, behaviours.Method):
+        function = function.stand_in()
     # What a wrapper returns may be something else than what it wraps.
     kind = None if hasattr(function, '__wrapped__') else behaviours.kind_of(function)
     return kind, behaviours.signature_of(function)
@@ -143,7 +140,9 @@ def _own_modules(context: CheckContext) -> Iterator[None]:
     from composer.python_source.module_finder import project_search_path
 
     before = set(sys.modules)
-    names = {binding.behaviour.module.partition('.')[0] for binding in _bindings(context.spec)}
+    names = {
+        binding.behaviour.module.partition('.')[0] for binding in system_bindings(context.spec)
+    }
     with behaviours.project_on_path(project_search_path(context.system.files)):
         yield
     for name in set(sys.modules) - before:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
+from composer.language.parsing.entry_parser import behaviour_at, parse_behaviour
 from composer.language.specs import (
     DEFAULT_LAUNCH_STOP_SEC,
     DEFAULT_RESTART_DELAY_SEC,
     DEFAULT_WAIT_SEC,
     ConditionSpec,
+    ExitActionSpec,
     ProcessSpec,
 )
 from composer.names import expand_namespace
@@ -55,15 +58,12 @@ def with_defaults(process: dict[str, Any], defaults: dict[str, Any]) -> dict[str
 def with_waits(
     entry: dict[str, Any], processes: Mapping[str, str], namespace: str = ''
 ) -> dict[str, Any]:
-    """Return a node or process with the names in its `wait_for` changed.
+    """Return a node or process with the names in its `wait_for` and `on_exit` changed.
 
     Args:
         processes: New names of processes.
         namespace: Where relative names of all else lie.
     """
-    written = entry.get('wait_for')
-    if not written:
-        return entry
 
     def renamed(condition: dict[str, Any]) -> dict[str, Any]:
         kind = _kind_of(condition)
@@ -73,9 +73,16 @@ def with_waits(
         is_relative = namespace and not name.startswith(('/', '~'))
         return condition | {kind: f'{namespace.rstrip("/")}/{name}'} if is_relative else condition
 
-    if isinstance(written, dict):
-        return entry | {'wait_for': renamed(written)}
-    return entry | {'wait_for': [renamed(each) for each in written]}
+    def restarted(action: Any) -> Any:
+        if not isinstance(action, dict) or 'start' not in action:
+            return action
+        return action | {'start': processes.get(action['start'], action['start'])}
+
+    for key, change in (('wait_for', renamed), ('on_exit', restarted)):
+        if written := entry.get(key):
+            is_list = isinstance(written, list)
+            entry = entry | {key: [*map(change, written)] if is_list else change(written)}
+    return entry
 
 
 def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpec:
@@ -101,17 +108,35 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
             {key: format_scalar(value) for key, value in data.get('env', {}).items()}
         ),
         cwd=data.get('cwd'),
-        required=data.get('required', False),
         restart=restart.get('when', 'on_failure'),
         restart_delay_sec=float(restart.get('delay', DEFAULT_RESTART_DELAY_SEC)),
         most_restarts=restart.get('max'),
+        on_exit=_parse_exit_actions(data, path),
         stop_signal=stop.get('signal', 'SIGINT'),
         stop_timeout_sec=_stop_timeout_sec(data),
         wait_for=parse_conditions(data, path),
+        delay_sec=float(data.get('delay', 0.0)),
+        on_demand=False,
         nodes=nodes,
         declares_all_ends=declares_all_ends,
         path=path,
     )
+
+
+def _parse_exit_actions(data: dict[str, Any], path: DataPath) -> tuple[ExitActionSpec, ...]:
+    written, at = data.get('on_exit', []), (*path, 'on_exit')
+    if not isinstance(written, list):
+        return (_parse_exit_action(written, at),)
+    return tuple(_parse_exit_action(each, (*at, index)) for index, each in enumerate(written))
+
+
+def _parse_exit_action(data: str | dict[str, Any], path: DataPath) -> ExitActionSpec:
+    if isinstance(data, dict):
+        return ExitActionSpec(parse_behaviour(data, path), data.get('start'), path)
+    if data == 'shutdown':
+        return ExitActionSpec(None, None, path)
+    behaviour = behaviour_at({'behaviour': data}, path)
+    return ExitActionSpec(replace(behaviour, path=path), None, path)
 
 
 def _arguments_of(data: dict[str, Any]) -> Iterator[str]:
@@ -140,7 +165,7 @@ def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpe
 def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
     kind = _kind_of(data)
     timeout_sec = float(data.get('timeout', DEFAULT_WAIT_SEC))
-    return ConditionSpec(kind, data[kind], timeout_sec, (*path, kind))
+    return ConditionSpec(kind, data[kind], timeout_sec, data.get('state'), (*path, kind))
 
 
 def _kind_of(condition: dict[str, Any]) -> ConditionKind:

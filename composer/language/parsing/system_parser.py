@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import marshal
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import ProcessSpec
     from composer.yaml_text.positions import DataPath
 
 
@@ -94,9 +96,22 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         environment=MappingProxyType(
             {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
-        processes=parse_entries(
-            data, (), 'processes', _keeping(before, 'processes', parse_process)
+        processes=_with_demand(
+            parse_entries(data, (), 'processes', _keeping(before, 'processes', parse_process))
         ),
+    )
+
+
+def _with_demand(processes: Mapping[str, ProcessSpec]) -> Mapping[str, ProcessSpec]:
+    """Return processes that know whether the end of another one starts them."""
+    started = {each.start for process in processes.values() for each in process.on_exit}
+    return MappingProxyType(
+        {
+            name: each
+            if each.on_demand == (name in started)
+            else replace(each, on_demand=name in started)
+            for name, each in processes.items()
+        }
     )
 
 

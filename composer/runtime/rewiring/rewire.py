@@ -24,6 +24,7 @@ from composer.runtime.rewiring.transaction import Transaction
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
+    from composer.language.specs import ProcessSpec
     from composer.planning.plan import Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.live_node import LiveNode
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import Starter
 
+# All others are of a moment, or final.
+_STATES = ('unconfigured', 'inactive', 'active')
 _SETTLE_SEC = 0.05
 _SETTLE_POLL_SEC = 0.0005
 
@@ -62,6 +65,10 @@ class Rewiring:
         self._old, self._new = old, new
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
         self._transaction = Transaction()
+        # Those of nodes with a lifecycle that are recreated.
+        self._states: dict[str, str] = {}
+        # The processes that ran on demand before they were ended.
+        self._running: set[str] = set()
 
     def wait_for_goals(
         self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
@@ -177,6 +184,8 @@ class Rewiring:
         """End nodes that are recreated; to undo that, they begin again with their state."""
         for full_name in names:
             node = self._nodes[full_name]
+            if node.lifecycle is not None:
+                self._states[full_name] = node.lifecycle.state
             if not self._restarter.make_way(full_name):
                 calls = ', '.join(str(call.owner) for call in node.running.calls())
                 message = f"node '{node.spec.key}' cannot be recreated, because it hangs: {calls}"
@@ -186,17 +195,35 @@ class Rewiring:
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
         again.take_over(node)
+        self._resume([again])
         self._starter.start_more([again], [])
+
+    def _resume(self, nodes: Iterable[LiveNode]) -> None:
+        """Let nodes come to the states that those had in whose place they come."""
+        for node in nodes:
+            state = self._states.get(node.full_name, '')
+            if node.lifecycle is not None and state in _STATES:
+                node.lifecycle.start = state
 
     def _end_processes(self, names: Iterable[str]) -> None:
         for name in names:
-            spec = self._processes.by_name[name].spec
+            process = self._processes.by_name[name]
+            if process.spec.on_demand and process.has_come_to('running'):
+                self._running.add(name)
             self._processes.remove(name)
-            self._transaction.on_undo(self._start_process, spec)
+            self._transaction.on_undo(self._start_processes, [process.spec])
 
-    def _start_process(self, spec: Any) -> None:
-        self._processes.by_name[spec.name] = process = ExternalProcess(spec)
-        self._starter.start_more([], [process])
+    def _start_processes(self, specs: Iterable[ProcessSpec]) -> None:
+        processes = [ExternalProcess(spec) for spec in specs]
+        self._processes.by_name.update({each.spec.name: each for each in processes})
+        self._starter.start_more([], processes)
+        self._start_again(processes)
+
+    def _start_again(self, processes: Iterable[ExternalProcess]) -> None:
+        """Start those that start on demand, if they ran before."""
+        for process in processes:
+            if process.spec.on_demand and process.spec.name in self._running:
+                self._starter.start_on_demand(process)
 
     def _begin(self, node_names: list[str], process_names: list[str]) -> None:
         """Create and start nodes and processes; each waits for what its `wait_for` names."""
@@ -213,9 +240,11 @@ class Rewiring:
 
         self._transaction.on_undo(remove_all)
         nodes = self._starter.create(self._after[name] for name in node_names)
+        self._resume(nodes)
         processes = [ExternalProcess(self._new.spec.processes[name]) for name in process_names]
         self._processes.by_name.update({each.spec.name: each for each in processes})
         self._starter.start_more(nodes, processes)
+        self._start_again(processes)
 
     def _change_nodes(self, plan: Plan, clashing: Collection[Target]) -> None:
         """Change what runs on: records, state, parameters and entities."""

@@ -53,6 +53,19 @@ class Ticking:
 ticking = Ticking()
 
 
+class Kept:
+    def __init__(self, node):
+        self.node = node
+
+    def tick(self, node, text='k'):
+        note(self.node if node is None else node, 'tick', text=text)
+        return text
+
+    async def tick_later(self, node):
+        note(node, 'tick_later')
+        return 'k'
+
+
 def hear(node, message, prefix=''):
     note(node, 'hear', prefix=prefix)
     return f'{prefix}{message.data}'
@@ -100,6 +113,10 @@ def follow(node, feedback):
 
 def begin(node, text=''):
     node.logger.debug(f'begun {text}')
+
+
+def ended(process, exit_code, text=''):
+    process.logger.debug(f'ended {text}')
 
 
 def fail_to_begin(node):
@@ -297,6 +314,27 @@ SYSTEM = {
             'services': {'ask': {'type': _TRIGGER, 'behaviour': 'parts:answer'}},
             'actions': {'count': {'type': _FIBONACCI, 'behaviour': 'parts:count'}},
         },
+        'managed': {
+            'lifecycle': {'start': 'active'},
+            'bond': False,
+            'subscriptions': {
+                'kept': {
+                    'type': _STRING,
+                    'topic': 'far',
+                    'behaviour': 'parts:hear',
+                    'while_inactive': 'keep',
+                },
+            },
+            'services': {
+                'managed_ask': {
+                    'type': _TRIGGER,
+                    'behaviour': 'parts:answer',
+                    'while_inactive': 'drop',
+                },
+            },
+            'timers': {'tick': {'period': 0.05, 'behaviour': 'parts:ticking'}},
+            'on_activate': 'parts:end',
+        },
         'user': {
             'namespace': '/inner',
             'service_clients': {'ask': {'type': _TRIGGER, 'service': '/ask'}},
@@ -306,7 +344,7 @@ SYSTEM = {
         },
     },
     'processes': {
-        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000']},
+        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000'], 'on_exit': ['parts:ended']},
         'packaged': {'package': 'sleeping', 'executable': 'sleeper', 'name': 'dreamer'},
     },
 }

@@ -12,7 +12,7 @@ from composer.entity_kinds import ENTITY_KINDS
 from composer.runtime.nodes.behaviour_node import Node
 
 # What a process need not know while it runs.
-_NOT_OF_PROCESSES = ('path', 'wait_for', 'description')
+_NOT_OF_PROCESSES = ('path', 'wait_for', 'delay_sec', 'description')
 
 
 def describe(system):
@@ -206,6 +206,7 @@ def _is_filled(cell):
 
 def describe_function(function, arguments):
     """Return a behaviour's name, arguments, code, and what its module's names mean."""
+    function = getattr(function, '__func__', function)
     target = function if isinstance(function, FunctionType) else type(function).__call__
     names = target.__globals__
     return {

@@ -27,6 +27,8 @@ _CONDITION = [
     {'process': 'sleeper'},
 ]
 _WAIT_FOR = [*_CONDITION, _CONDITION, {'topic': '/nowhere', 'timeout': 0.1}, [], None]
+_ON_EXIT = ['shutdown', 'parts:ended', {'start': 'packaged'}, [{'behaviour': 'parts:ended'}]]
+_DELAY = [0.05, 0.1, -1, None]
 _FILES = [['parameters.yaml'], ['parameters.yaml', 'others.yaml'], ['absent.yaml'], None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
 # Whatever its arguments are.
@@ -89,7 +91,9 @@ VALUES = {
     'condition.action': ['/count', None],
     'condition.node': ['listener', 'nobody', None],
     'condition.process': ['sleeper', 'nobody', None],
+    'condition.state': ['running', 'active', 'gone', None],
     'condition.timeout': [0.3, 5.0, 0, None],
+    'node.delay': _DELAY,
     'node.parameter_files': _FILES,
     'node.foreach': _FOREACH,
     'node.when': _WHEN,
@@ -105,6 +109,8 @@ VALUES = {
     'node.warn_after': _WARN_AFTER,
     'node.local_delivery': _BOOL,
     'node.parameters': [{'speed': 2.0, 'extra': [1.0, 2.0]}, {'bad name': []}, {}, None],
+    'parameter.foreach': _FOREACH,
+    'parameter.when': _WHEN,
     'parameter.default': [0.5, 2.0, 20, 'fast', [1, 2, 3], 1000.0, True, None],
     'parameter.type': ['double', 'integer', 'string', 'string_array', 'byte_array', 'real', None],
     'parameter.description': _STRINGS,
@@ -116,6 +122,8 @@ VALUES = {
     'node.state': [{'begun': True, 'last': 1}, {'more': [1]}, {'begun': []}, 5, None],
     'node.remap': _REMAP,
     'node.publishers': [{'out': 'std_msgs/msg/String'}, {'out': 'String'}, {}, None],
+    'publisher.foreach': _FOREACH,
+    'publisher.when': _WHEN,
     'publisher.type': _TYPES,
     'publisher.topic': _TOPIC,
     'publisher.qos': _QOS,
@@ -127,6 +135,8 @@ VALUES = {
         {},
         None,
     ],
+    'subscription.foreach': _FOREACH,
+    'subscription.when': _WHEN,
     'subscription.type': _TYPES,
     'subscription.topic': _TOPIC,
     'subscription.qos': _QOS,
@@ -135,15 +145,19 @@ VALUES = {
     'subscription.publish': ['echo', 'nothing', None],
     'subscription.group': _GROUP,
     'subscription.read_only': _BOOL,
+    'subscription.while_inactive': ['keep', 'drop', 'hold', None],
     'subscription.external': _EXTERNAL,
     'subscription.on_error': _ON_ERROR,
     'subscription.warn_after': _WARN_AFTER,
     'node.timers': [{'tick': _TICK}, {'tick': {**_TICK, 'with': {'text': 'n'}}}, {}, None],
+    'timer.foreach': _FOREACH,
+    'timer.when': _WHEN,
     'timer.period': [0.02, 0.05, 0.08, 100.0, '{{ 1 / 40 }}', -1.0, None],
     'timer.rate': [50, 25.0, 0, None],
     'timer.behaviour': [
         *('parts:tick', 'parts:steps', 'parts:few_steps', 'parts:tick_later', 'parts:ticking'),
         *('parts:steps_later', 'peer:tick', 'parts:tock', 'absent:tick', None),
+        *('parts:Kept.tick', 'parts:Kept.tick_later', 'parts:Kept.tock', 'parts:Ticking.tick'),
     ],
     'timer.with': [{'text': 'z'}, {'text': 'y'}, {'txt': 'z'}, None],
     'timer.publish': ['out', 'more', 'nothing', None],
@@ -158,15 +172,20 @@ VALUES = {
         {},
         None,
     ],
+    'service.foreach': _FOREACH,
+    'service.when': _WHEN,
     'service.type': _TRIGGERS,
     'service.service': ['/ask', '/tell', '~/ask', 'a b', None],
     'service.qos': [{'depth': 7}, {'depth': 0}, None],
     'service.behaviour': ['parts:answer', 'parts:answer_later', 'parts:anwser', None],
     'service.with': [{'text': 'no'}, {'txt': 'no'}, None],
     'service.group': _GROUP,
+    'service.while_inactive': ['keep', 'drop', 'hold', None],
     'service.on_error': _ON_ERROR,
     'service.warn_after': _WARN_AFTER,
     'node.service_clients': [{'ask': 'std_srvs/srv/Trigger'}, {'ask': 1}, {}, None],
+    'service_client.foreach': _FOREACH,
+    'service_client.when': _WHEN,
     'service_client.type': _TRIGGERS,
     'service_client.service': ['/ask', '/tell', None],
     'service_client.qos': [{'depth': 7}, {'depth': 0}, None],
@@ -177,6 +196,8 @@ VALUES = {
         {},
         None,
     ],
+    'action.foreach': _FOREACH,
+    'action.when': _WHEN,
     'action.type': _ACTIONS,
     'action.action': ['/count', '/compute', 'a b', None],
     'action.behaviour': ['parts:count', 'parts:count_at_once', 'parts:count_later', 'parts:c'],
@@ -186,6 +207,8 @@ VALUES = {
     'action.on_error': _ON_ERROR,
     'action.warn_after': _WARN_AFTER,
     'node.action_clients': [{'count': 'test_msgs/action/Fibonacci'}, {'count': 1}, {}, None],
+    'action_client.foreach': _FOREACH,
+    'action_client.when': _WHEN,
     'action_client.type': _ACTIONS,
     'action_client.action': ['/count', '/compute', None],
     'action_client.feedback': ['parts:follow', 'parts:folow', None],
@@ -195,6 +218,13 @@ VALUES = {
     'hook.behaviour': ['parts:begin', 'parts:end', 'parts:decide_later', 'parts:x'],
     'hook.with': [{'text': 'c'}, {'most': 60.0}, {'txt': 'c'}, None],
     'node.on_stop': ['parts:end', *_BEGIN, None],
+    **{
+        f'node.{key}': ['parts:end', *_BEGIN, None]
+        for key in ('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_error_state')
+    },
+    'node.lifecycle': [True, {'start': 'active'}, {'start': 'inactive'}, {'strt': 1}, 'yes', None],
+    'lifecycle.start': ['active', 'inactive', 'unconfigured', 'finalized', None],
+    'node.bond': [False, 'yes', None],
     'node.on_parameters': [
         *('parts:decide', 'parts:decide_later', 'parts:decde'),
         {'behaviour': 'parts:decide', 'with': {'most': 30.0}},
@@ -216,7 +246,10 @@ VALUES = {
     'process.log_level': ['debug', 'loud', None],
     'process.env': [{'A': 'b'}, {'A': 1, 'B': True}, {'A=': 'b'}, None],
     'process.cwd': ['pack', 'absent', None],
-    'process.required': [True, 'very', None],
+    'process.on_exit': [*_ON_EXIT, [{'start': 'no'}], 3, None],
+    'exit_action.start': ['packaged', 'sleeper', 'nobody', None],
+    'exit_action.behaviour': ['parts:ended', 'parts:ende', None],
+    'exit_action.with': [{'text': 'b'}, {'txt': 'b'}, None],
     'process.restart': [{'when': 'always'}, 'always', {}, None],
     'process_restart.when': ['always', 'never', 'sometimes', None],
     'process_restart.delay': [0.5, -1, None],
@@ -225,6 +258,7 @@ VALUES = {
     'process_stop.signal': ['SIGTERM', 'SIGKILL', 'SIGNAL', None],
     'process_stop.timeout': [1.5, -1, None],
     'process.wait_for': _WAIT_FOR,
+    'process.delay': _DELAY,
 }
 # Keys that no edit gives a value, and why.
 LEFT_OUT: dict[str, str] = {}

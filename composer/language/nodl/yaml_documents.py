@@ -1,0 +1,184 @@
+"""NoDL in YAML or JSON, version 2: what one node has, with QoS.
+
+Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from composer.ament import ament_prefixes, find_path
+from composer.diagnostics import Span
+from composer.language.nodl.node_builder import NodlNode
+from composer.language.qos import NANOSECONDS
+from composer.spelling import suggest
+from composer.yaml_text.reader import parse_document, read_document
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Diagnostic
+    from composer.yaml_text.document import Document
+    from composer.yaml_text.positions import DataPath
+
+_SECTIONS = {
+    'publishers': 'publishers',
+    'subscriptions': 'subscriptions',
+    'service_servers': 'services',
+    'service_clients': 'service_clients',
+    'action_servers': 'actions',
+    'action_clients': 'action_clients',
+}
+_KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *_SECTIONS)
+_POLICIES = ('history', 'depth', 'reliability', 'durability', 'liveliness')
+_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
+_SCALARS = ('int', 'double', 'string')
+# Of a parameter for each of several things, whose names another parameter has.
+_MAPPED = '__map_'
+_MOST_INCLUDED = 100
+
+
+def parse_yaml(content: bytes, name: str) -> tuple[list[NodlNode], list[Diagnostic]]:
+    """Return the node of a document, and what is wrong with it."""
+    findings: list[Diagnostic] = []
+    document = parse_document(content, name)
+    node = NodlNode(None, None, Span(document.positions.source, 1, 1, 0), findings)
+    _Reader(node).read(document, Path(name), [Path(name)])
+    return [node], findings
+
+
+class _Reader:
+    def __init__(self, node: NodlNode) -> None:
+        self._node = node
+        self._included = 0
+
+    def read(self, document: Document, path: Path, stack: list[Path]) -> None:
+        """Add what a document, and those that it includes, have."""
+        self._node.findings += document.diagnostics
+        data, positions = document.data, document.positions
+        if data is None:
+            return
+        if data.get('nodl_version') != 2:  # noqa: PLR2004 - the version that this module reads
+            place = positions.value(('nodl_version',))
+            self._node.report(place, "a NoDL document begins with 'nodl_version: 2'")
+            return
+        for key in data:
+            if key not in _KEYS:
+                help_text = suggest(key, _KEYS, 'the keys are')
+                self._node.report(positions.key((key,)), f"NoDL has no key '{key}'", help_text)
+        for key, section in _SECTIONS.items():
+            for index, end in enumerate(_list(data.get(key))):
+                self._add_end(document, section, end, (key, index))
+        self._add_parameters(document)
+        for index, reference in enumerate(_list(data.get('include'))):
+            self._include(document, reference, ('include', index), path, stack)
+
+    def _add_end(self, document: Document, section: str, end: Any, at: DataPath) -> None:
+        positions = document.positions
+        if not isinstance(end, dict) or not all(
+            isinstance(end.get(key), str) for key in ('name', 'type')
+        ):
+            self._node.report(positions.value(at), "an entry of NoDL has 'name' and 'type'")
+            return
+        spans = (positions.value((*at, 'name')), positions.value((*at, 'type')))
+        if not self._node.add_end(section, end['name'], end['type'], spans):
+            return
+        qos = end.get('qos')
+        if isinstance(qos, dict) and not section.startswith('action'):
+            entry = self._node.data[section][end['name']]
+            entry['qos'] = self._read_qos(qos, document, (*at, 'qos'))
+            path = (section, end['name'], 'qos')
+            self._node.values[path] = positions.value((*at, 'qos'))
+
+    def _read_qos(self, qos: dict[str, Any], document: Document, at: DataPath) -> dict[str, Any]:
+        policies: dict[str, Any] = {}
+        for key, value in qos.items():
+            name = key.removesuffix('_ns')
+            if key in _POLICIES and isinstance(value, str):
+                policies[key] = value.lower()
+            elif key == 'depth' and type(value) is int and value > 0:
+                policies[key] = value
+            elif key != name and name in _DURATIONS and type(value) is int and value >= 0:
+                # 0 is no limit.
+                policies |= {name: value / NANOSECONDS} if value else {}
+            else:
+                place = document.positions.value((*at, key))
+                known = [*_POLICIES, *(f'{each}_ns' for each in _DURATIONS)]
+                help_text = None if key in known else suggest(key, known, 'the policies are')
+                self._node.report(place, f"'{key}: {value}' is no QoS of NoDL", help_text)
+        return policies
+
+    def _add_parameters(self, document: Document) -> None:
+        parameters = document.data.get('parameters') if document.data else None
+        if not isinstance(parameters, dict):
+            return
+        self._node.data.setdefault('parameters', {})
+        is_open = any(_MAPPED in name for name in parameters)
+        for name, declared in parameters.items():
+            at = ('parameters', name)
+            kind = declared.get('type') if isinstance(declared, dict) else None
+            if not isinstance(kind, str):
+                message = f"the parameter '{name}' has no type"
+                self._node.report(document.positions.value(at), message)
+            elif kind != 'none' and not is_open:
+                spans = (document.positions.key(at), document.positions.value((*at, 'type')))
+                self._node.add_parameter(name, kind, spans, **_limits(declared))
+        if is_open:
+            # Which parameters there are depends on values.
+            del self._node.data['parameters']
+
+    def _include(
+        self, document: Document, reference: Any, at: DataPath, path: Path, stack: list[Path]
+    ) -> None:
+        text = reference.get('ref') if isinstance(reference, dict) else None
+        place = document.positions.value((*at, 'ref'))
+        found = _find_document(str(text), path.parent)
+        self._included += 1
+        if found is None:
+            self._node.report(place, f"there is no NoDL document '{text}'")
+        elif found in stack:
+            self._node.report(place, f"'{text}' includes itself")
+        elif self._included <= _MOST_INCLUDED:
+            self.read(read_document(found), found, [*stack, found])
+
+
+def _find_document(text: str, folder: Path) -> Path | None:
+    """Return the document that a reference names, if it is there."""
+    scheme, _, rest = text.partition('://')
+    if scheme == 'local':
+        path = folder / rest
+        return path if path.is_file() else None
+    package, _, name = rest.partition('/')
+    if scheme != 'nodl' or not name:
+        return None
+    index = f'share/ament_index/resource_index/nodl/{package}__{name}'
+    in_share = f'share/{package}/nodl/{name}.nodl.yaml'
+    prefixes = ament_prefixes()
+    return find_path(in_share, prefixes) or find_path(index, prefixes)
+
+
+def _limits(declared: dict[str, Any]) -> dict[str, Any]:
+    """Return the default and the limits of a parameter in the keys of the language."""
+    found: dict[str, Any] = {
+        key: declared[key] for key in ('description', 'read_only') if key in declared
+    }
+    if declared['type'] != 'byte_array' and 'default_value' in declared:
+        found['default'] = declared['default_value']
+    rules = declared.get('validation')
+    if not isinstance(rules, dict) or declared['type'] not in _SCALARS:
+        return found
+    rules = {key.removesuffix('<>'): value for key, value in rules.items()}
+    bounds = rules.get('bounds')
+    if isinstance(bounds, list) and len(bounds) == 2:  # noqa: PLR2004 - lower and upper
+        found['minimum'], found['maximum'] = bounds
+    for rule, key in (('gt_eq', 'minimum'), ('lt_eq', 'maximum')):
+        if rule in rules:
+            limit = rules[rule]
+            found[key] = limit[0] if isinstance(limit, list) and limit else limit
+    choices = rules.get('one_of')
+    if isinstance(choices, list) and choices and isinstance(choices[0], list):
+        found['choices'] = choices[0]
+    return found
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
