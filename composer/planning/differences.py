@@ -87,7 +87,7 @@ _NODES = _Rules(
         **dict.fromkeys(
             (
                 *('remap', 'rosout', 'parameter_services', 'type_description_service'),
-                'logger_services',
+                *('logger_services', 'lifecycle'),
             ),
             'ROS reads this when the node is created',
         ),
@@ -122,7 +122,7 @@ _OF_THE_SYSTEM = (
     'shutdown_timeout_sec',
     'diagnostics_period_sec',
 )
-_AT_ITS_START = ('on_start', 'wait_for', 'delay')
+_AT_ITS_START = ('on_start', 'wait_for', 'delay', 'lifecycle')
 # Parameters of every node, and the keys of a node that set them where parameter files do not.
 _GIVEN_BY_ROS = {
     'use_sim_time': 'use_sim_time',
@@ -337,7 +337,12 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
 def _modification(
     rules: _Rules, target: Target, name: str, span: Span, changes: list[Change]
 ) -> Operation:
-    reasons = (rules.fixed.get(each.key) or rules.fixed.get(each.top_key) for each in changes)
+    reasons = (
+        rules.fixed.get(each.key) or rules.fixed.get(each.top_key)
+        for each in changes
+        # Where a lifecycle starts counts from the next start.
+        if not (each.key == 'lifecycle' and each.old and each.new)
+    )
     reason = next(filter(None, reasons), '')
     keys = dict.fromkeys(each.top_key for each in changes)
     late = [key for key in keys if key in _AT_ITS_START and not reason]

@@ -314,6 +314,27 @@ SYSTEM = {
             'services': {'ask': {'type': _TRIGGER, 'behaviour': 'parts:answer'}},
             'actions': {'count': {'type': _FIBONACCI, 'behaviour': 'parts:count'}},
         },
+        'managed': {
+            'lifecycle': {'start': 'active'},
+            'bond': False,
+            'subscriptions': {
+                'kept': {
+                    'type': _STRING,
+                    'topic': 'far',
+                    'behaviour': 'parts:hear',
+                    'while_inactive': 'keep',
+                },
+            },
+            'services': {
+                'managed_ask': {
+                    'type': _TRIGGER,
+                    'behaviour': 'parts:answer',
+                    'while_inactive': 'drop',
+                },
+            },
+            'timers': {'tick': {'period': 0.05, 'behaviour': 'parts:ticking'}},
+            'on_activate': 'parts:end',
+        },
         'user': {
             'namespace': '/inner',
             'service_clients': {'ask': {'type': _TRIGGER, 'service': '/ask'}},

@@ -91,7 +91,7 @@ VALUES = {
     'condition.action': ['/count', None],
     'condition.node': ['listener', 'nobody', None],
     'condition.process': ['sleeper', 'nobody', None],
-    'condition.state': ['running', 'gone', None],
+    'condition.state': ['running', 'active', 'gone', None],
     'condition.timeout': [0.3, 5.0, 0, None],
     'node.delay': _DELAY,
     'node.parameter_files': _FILES,
@@ -145,6 +145,7 @@ VALUES = {
     'subscription.publish': ['echo', 'nothing', None],
     'subscription.group': _GROUP,
     'subscription.read_only': _BOOL,
+    'subscription.while_inactive': ['keep', 'drop', 'hold', None],
     'subscription.external': _EXTERNAL,
     'subscription.on_error': _ON_ERROR,
     'subscription.warn_after': _WARN_AFTER,
@@ -179,6 +180,7 @@ VALUES = {
     'service.behaviour': ['parts:answer', 'parts:answer_later', 'parts:anwser', None],
     'service.with': [{'text': 'no'}, {'txt': 'no'}, None],
     'service.group': _GROUP,
+    'service.while_inactive': ['keep', 'drop', 'hold', None],
     'service.on_error': _ON_ERROR,
     'service.warn_after': _WARN_AFTER,
     'node.service_clients': [{'ask': 'std_srvs/srv/Trigger'}, {'ask': 1}, {}, None],
@@ -216,6 +218,13 @@ VALUES = {
     'hook.behaviour': ['parts:begin', 'parts:end', 'parts:decide_later', 'parts:x'],
     'hook.with': [{'text': 'c'}, {'most': 60.0}, {'txt': 'c'}, None],
     'node.on_stop': ['parts:end', *_BEGIN, None],
+    **{
+        f'node.{key}': ['parts:end', *_BEGIN, None]
+        for key in ('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_error_state')
+    },
+    'node.lifecycle': [True, {'start': 'active'}, {'start': 'inactive'}, {'strt': 1}, 'yes', None],
+    'lifecycle.start': ['active', 'inactive', 'unconfigured', 'finalized', None],
+    'node.bond': [False, 'yes', None],
     'node.on_parameters': [
         *('parts:decide', 'parts:decide_later', 'parts:decde'),
         {'behaviour': 'parts:decide', 'with': {'most': 30.0}},
