@@ -113,6 +113,7 @@ class System:
         )
         self._processes.is_alone = not spec.nodes
         self._stop_request.kill_processes = self._processes.kill_all
+        self.state.find_lifecycles = self._find_lifecycles
         self._starter = Starter(self._nodes, self._processes, self._handle)
         self._exits = ExitActions(self._processes, self._starter, self._handle)
         self._processes.on_exit = self._exits.act
@@ -180,7 +181,7 @@ class System:
             self._graph_watcher.start()
             self._parameter_services.start()
             for node in self._nodes.values():
-                node.gate.serves = node.spec.on_start is None and not node.spec.starts_late
+                node.serve_at_once()
             self._executor.wake()
             prompt = self._starter.start(self._nodes.values(), self._processes.by_name.values())
         except BaseException:
@@ -290,6 +291,10 @@ class System:
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
+
+    def _find_lifecycles(self) -> dict[str, str]:
+        nodes = list(self._nodes.values())
+        return {node.full_name: node.lifecycle.state for node in nodes if node.lifecycle}
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again."""

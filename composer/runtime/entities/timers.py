@@ -142,16 +142,20 @@ class _Ticker:
             return False
         # `1` and `1.0` are equal, and not the same.
         is_same = repr(dict(behaviour.arguments)) == repr(dict(own.arguments))
-        return is_same and self._bound is self._node.functions[behaviour.name]
+        return is_same and self._bound == self._node.functions[behaviour.name]
 
-    def close(self, timeout_sec: float) -> None:
+    def close(self, timeout_sec: float, *, for_good: bool = True) -> None:
         """See `Suspended`: what the generator has in `finally:` runs."""
         if not self._turn.acquire(timeout=timeout_sec):
             # It is not suspended but hangs, and is reported for that.
             return
         generator, self._generator = self._generator, None
-        if generator is None:
-            return
+        if generator is not None:
+            self._close(generator, timeout_sec)
+        if not for_good:
+            self._turn.release()
+
+    def _close(self, generator: Any, timeout_sec: float) -> None:
         is_async = self._kind is FunctionKind.ASYNC_GENERATOR
         close = partial(_close_async, generator) if is_async else generator.close
         call = self._node.reported_call(self._owner, self._spec.path, close)
