@@ -155,7 +155,7 @@ def logs_command(system: str | None, *, follows: bool) -> int:
 def capture_command(
     nodes: tuple[str, ...], output: Path | None, format_name: str, timeout_sec: float
 ) -> int:
-    """Write what runs on this ROS graph as declarations of external processes.
+    """Write down what the nodes on this ROS graph have.
 
     Each NODE, or all nodes, with publishers, subscriptions, services, clients and actions, their
     types and QoS, and with parameters: to paste under `processes:`, so that `composer check`

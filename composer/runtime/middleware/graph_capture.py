@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 _POLL_SEC = 0.1
 # The graph is complete when nothing was new for so long.
-_SETTLED_SEC = 1.0
+_SETTLED_SEC = 1.5
 _LONGEST_SEARCH_SEC = 10.0
 # Something that is lacking may still come for so long after the last that was new.
-_PATIENCE_SEC = 3.0
+_PATIENCE_SEC = 5.0
 # So many nodes are asked at the same time.
 _ASKED_AT_ONCE = 16
 _TOPICS_OF_EVERY_NODE = ('/rosout', '/parameter_events')
