@@ -35,6 +35,7 @@ EXECUTABLES = {
     'demo_nodes_cpp': 'talker',
     'rclcpp_components': 'component_container',
     'lifecycle': 'lifecycle_talker',
+    'robot_state_publisher': 'robot_state_publisher',
 }
 # They call ros2, which is not among the wheels.
 NOT_RUN = ('Composable nodes', 'Lifecycle nodes')
@@ -102,9 +103,10 @@ def folder(tmp_path, monkeypatch):
 def write(folder, files):
     """Write an example with what the page leaves out; return the system's path and arguments."""
     for name, text in files.items():
-        is_whole = 'ros__parameters' in text
+        is_whole = 'ros__parameters' in text or name == 'limits.yaml'
         nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
         (folder / name).write_text(text if is_whole else f'version: 1\n{text}{nodes}')
+    (folder / 'arm.urdf').write_text('<robot/>\n')
     first = next(iter(files))
     words = re.search(r'^# arguments: (.*)$', files[first], re.MULTILINE)
     return folder / first, words[1].split() if words else []

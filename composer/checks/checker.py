@@ -34,7 +34,12 @@ from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
-from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.references import (
+    check_publish,
+    check_qos,
+    check_start_values,
+    check_types,
+)
 from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first
 from composer.input_limits import MAX_FINDINGS
@@ -80,6 +85,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_parameter_files,
     check_executables,
     check_launch_files,
+    check_start_values,
     check_left_out,
     check_waits,
     check_awaited_states,

@@ -279,7 +279,11 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
         (
             '{parameters: {a: {}}}',
-            ('missing-key', "'default' or 'type' is missing in parameter 'a'", None),
+            (
+                'missing-key',
+                "'default' or 'type' or 'command' or 'file' is missing in parameter 'a'",
+                None,
+            ),
         ),
         (
             '{parameters: {a: [[1]]}}',

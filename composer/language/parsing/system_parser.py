@@ -18,6 +18,7 @@ from composer.language.specs import (
     QosSpec,
     SystemSpec,
 )
+from composer.language.values.start_values import StartValues, fill_start_values
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
@@ -55,9 +56,12 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
             if section in ('nodes', 'processes'):
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
         _leave_out_entities(system, used, unused)
-        system.unused = parse_system(unused, name)
+        samples = StartValues()
+        filled = fill_start_values(unused, system.positions, samples, system.sampled_unused)
+        system.unused = parse_system(filled, name)
     system.data = used
-    system.spec = parse_system(used, name, before)
+    system.filled = fill_start_values(used, system.positions, system.start, system.sampled)
+    system.spec = parse_system(system.filled, name, before)
 
 
 def _leave_out_entities(
@@ -125,7 +129,7 @@ def _keeping(
     if before is None or before.spec is None:
         return parse
     specs: Mapping[str, Spec] = getattr(before.spec, section)
-    written = before.entries.get(section, {})
+    written = before.filled.get(section, {})
 
     def parse_changed(name: str, data: Any, path: DataPath) -> Spec:
         known = specs.get(name)
