@@ -428,6 +428,7 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        local_delivery: Of entities that do not say so, and are created while it runs.
         parameter_services: Whether others can list, read and set its parameters.
         rosout: Whether what it logs goes to `/rosout`, too.
         type_description_service: Whether it answers which types it uses.
@@ -448,6 +449,7 @@ class NodeSpec:
     description: str = ''
     log_level: LogLevel | None = None
     use_sim_time: bool = False
+    local_delivery: bool = True
     parameter_services: bool = True
     rosout: bool = True
     type_description_service: bool = False

@@ -14,6 +14,7 @@ from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
+from composer.runtime.entities.creators import create_entity
 from composer.runtime.external.exit_actions import ExitActions
 from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
@@ -150,6 +151,7 @@ class System:
             health=HealthRegistry(),
             topics=LocalTopics(self._executor),
             services=LocalServices(self._executor),
+            create_entity=create_entity,
         )
 
     @property
