@@ -28,6 +28,7 @@ Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
 LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
 LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+DrivenState: TypeAlias = Literal['inactive', 'active']
 WhileInactive: TypeAlias = Literal['drop', 'keep']
 ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
@@ -362,6 +363,7 @@ class ProcessSpec:
         namespace: The namespace of the nodes in it; `None` if the program has none.
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
+        lifecycle: The state that these are brought to; `None` to leave them alone.
         cwd: The folder it runs in; `None` for that of Composer.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
@@ -398,7 +400,13 @@ class ProcessSpec:
     on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
+    lifecycle: DrivenState | None
     path: DataPath
+
+    @property
+    def named_nodes(self) -> tuple[str, ...]:
+        """The full name of the node that it is told to have, if it is."""
+        return (join_names(self.namespace or '/', self.node_name),) if self.node_name else ()
 
     @property
     def starts_late(self) -> bool:
