@@ -28,6 +28,7 @@ Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
 LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
 LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+DrivenState: TypeAlias = Literal['inactive', 'active']
 WhileInactive: TypeAlias = Literal['drop', 'keep']
 ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
@@ -383,6 +384,7 @@ class ProcessSpec:
         namespace: The namespace of the nodes in it; `None` if the program has none.
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
+        lifecycle: The state that these are brought to; `None` to leave them alone.
         cwd: The folder it runs in; `None` for that of Composer.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
@@ -419,7 +421,13 @@ class ProcessSpec:
     on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
+    lifecycle: DrivenState | None
     path: DataPath
+
+    @property
+    def named_nodes(self) -> tuple[str, ...]:
+        """The full name of the node that it is told to have, if it is."""
+        return (join_names(self.namespace or '/', self.node_name),) if self.node_name else ()
 
     @property
     def starts_late(self) -> bool:
@@ -441,6 +449,7 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        local_delivery: Of entities that do not say so, and are created while it runs.
         parameter_services: Whether others can list, read and set its parameters.
         rosout: Whether what it logs goes to `/rosout`, too.
         type_description_service: Whether it answers which types it uses.
@@ -461,6 +470,7 @@ class NodeSpec:
     description: str = ''
     log_level: LogLevel | None = None
     use_sim_time: bool = False
+    local_delivery: bool = True
     parameter_services: bool = True
     rosout: bool = True
     type_description_service: bool = False

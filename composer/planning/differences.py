@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.bindings import exit_bindings, node_bindings
-from composer.language.specs import ParameterSpec, ProcessSpec
+from composer.language.specs import NodeSpec, ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.entity_kinds import EntityKind
     from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec
     from composer.planning.plan import Target
     from composer.planning.snapshot import Snapshot
 
@@ -329,6 +328,9 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
     if kind is ProcessSpec:
         skipped -= _ARGUMENTS
+    if kind is NodeSpec:
+        # Its entities say it, too.
+        skipped |= {'local_delivery'}
     return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 
@@ -343,7 +345,8 @@ def _modification(
     )
     reason = next(filter(None, reasons), '')
     keys = dict.fromkeys(each.top_key for each in changes)
-    late = [key for key in keys if key in _AT_ITS_START and not reason]
+    at_start = _AT_ITS_START if rules is not _PROCESSES else ('wait_for', 'delay')
+    late = [key for key in keys if key in at_start and not reason]
     return Operation(
         Action.RECREATE if reason else Action.CHANGE,
         rules.noun,

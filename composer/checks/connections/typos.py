@@ -146,7 +146,8 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     system, topology = context.system, context.topology
     specs = [context.spec, *([system.unused] if system.unused else [])]
     present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
-    for kind, name in (*topology.channels, *topology.left_out):
+    created = ((kind, name) for kind, name, _ in topology.created)
+    for kind, name in (*topology.channels, *topology.left_out, *created):
         present[kind].add(name)
     present['service'] |= topology.ros_services.keys()
     present['node'] = {node.full_name for spec in specs for node in spec.nodes.values()}
@@ -249,7 +250,7 @@ def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
 def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
     """Return whether a node may have topics and services that the file does not show."""
     return node.path in context.incomplete or any(
-        each.reaches_ros for each in context.readings(node)
+        each.reaches_ros or each.created for each in context.readings(node)
     )
 
 

@@ -40,6 +40,11 @@ def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
     }
 
 
+def parse_entity(section: str, node: Data, name: str, data: Any, path: DataPath) -> Any:
+    """Return the spec of one entity of a node."""
+    return _PARSERS[section](node, name, data, path)
+
+
 class RunOptions(TypedDict):
     """Options of an entity with behaviours: its own, or those of its node."""
 

@@ -120,6 +120,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         on_demand=False,
         nodes=nodes,
         declares_all_ends=declares_all_ends,
+        lifecycle=data.get('lifecycle'),
         path=path,
     )
 

@@ -36,6 +36,7 @@ from composer.runtime.nodes.callback_groups import (
     GatedReentrantGroup,
     LifecycleGate,
 )
+from composer.runtime.nodes.created_entities import EntityCreation
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
@@ -76,6 +77,7 @@ class LiveNode:
         serving: The callback group of requests to action servers.
         functions: The behaviours, by their names, as they were when the node was created or
             changed: one that goes calls those that it has known.
+        created: The behaviours of entities that other behaviours have created, by their names.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
         suspended: Behaviours that are ended before `on_stop`.
@@ -96,6 +98,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     functions: Mapping[str, Callable[..., Any]]
+    created: dict[str, Callable[..., Any]] = field(default_factory=dict)
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
     suspended: list[Suspended] = field(default_factory=list)
@@ -139,10 +142,23 @@ class LiveNode:
         node = self.behaviour_node
         if owner is not None:
             node = self._views.setdefault(owner, node.with_own_state())
-        function = self.functions[behaviour.name]
+        function = self.function_of(behaviour)
         if isinstance(function, Method):
             function = function.of(self._instance(function.owner))
         return partial(function, node, **behaviour.arguments)
+
+    def function_of(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
+        """Return the function of a behaviour: of the files, or one that a behaviour has given."""
+        return self.created.get(behaviour.name) or self.functions[behaviour.name]
+
+    def options(self) -> dict[str, Any]:
+        """Return what holds for entities that do not say otherwise, as keys of the node."""
+        spec = self.spec
+        return {
+            'on_error': spec.on_error,
+            'warn_after': spec.warn_after_sec,
+            'local_delivery': spec.local_delivery,
+        }
 
     def make_instances(self) -> None:
         """Make an instance of each class whose methods are behaviours of the node."""
@@ -289,12 +305,12 @@ class LiveNode:
         for kind in ENTITY_KINDS:
             if kind.is_timed:
                 timers: dict[str, Any] = self.entities.get(kind.section, {})
-                yield from (timer.ros for timer in timers.values())
+                yield from (timer.ros for timer in list(timers.values()))
 
     def flush_counts(self) -> None:
         """Log the counts of what has not been logged."""
         self.errors.flush()
-        for end in self.endpoints:
+        for end in list(self.endpoints):
             end.losses.flush()
 
     def change(self, noun: str, spec: Any, entity: LiveEntity) -> None:
@@ -368,11 +384,12 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     remote_parameters = RemoteParameters(
         ros, spec.namespace, waits, background, system.without_parameter_services
     )
-    return LiveNode(
+    creation = EntityCreation()
+    live = LiveNode(
         spec,
         system,
         ros,
-        behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
+        behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown, creation),
         errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
         entities=entities,
         waits=waits,
@@ -382,3 +399,5 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         serving=GatedMutuallyExclusiveGroup(gate),
         functions=system.functions,
     )
+    creation.node = live
+    return live
