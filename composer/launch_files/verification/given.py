@@ -22,6 +22,13 @@ _NOT_COMPARED = re.compile(
 )
 
 
+class _Loader(yaml.SafeLoader):
+    """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
+
+
+_Loader.add_constructor('tag:yaml.org,2002:python/tuple', _Loader.construct_yaml_seq)
+
+
 @dataclass
 class Given:
     """What a process was given.
@@ -116,7 +123,7 @@ def _add_remap(given: Given, rule: str) -> None:
 
 def _load(text: str, replaced: Mapping[str, str]) -> Any:
     try:
-        data = yaml.safe_load(_replace(text, replaced))
+        data = yaml.load(_replace(text, replaced), _Loader)  # noqa: S506 - a safe one
     except yaml.YAMLError:
         return {}
     return data if isinstance(data, dict) else {}
