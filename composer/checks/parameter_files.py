@@ -15,7 +15,7 @@ from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
 from composer.language.paths import PathError, explain_absent, resolve_path
-from composer.language.specs import NodeSpec
+from composer.language.specs import ComponentSpec, NodeSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
@@ -79,7 +79,7 @@ class _Library:
         self._context = context
         self._values_left = MAX_VALUES
 
-    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
+    def read(self, owner: NodeSpec | ProcessSpec | ComponentSpec) -> Iterator[str]:
         """Read the files of a node or process, and yield those that exist."""
         for index, text in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
@@ -125,7 +125,11 @@ class _Library:
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
-    owners: list[NodeSpec | ProcessSpec] = [*system.nodes.values(), *system.processes.values()]
+    owners: list[NodeSpec | ProcessSpec | ComponentSpec] = [
+        *system.nodes.values(),
+        *system.processes.values(),
+        *system.components,
+    ]
     for owner in owners:
         files = tuple(library.read(owner))
         if not files:
@@ -136,8 +140,8 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
         yield _User(name, files, node, overrides, is_run)
 
 
-def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
-    if isinstance(owner, NodeSpec):
+def _full_name(owner: NodeSpec | ProcessSpec | ComponentSpec) -> str | None:
+    if isinstance(owner, NodeSpec | ComponentSpec):
         return owner.full_name
     if owner.node_name is None or owner.namespace is None:
         return None

@@ -48,6 +48,7 @@ class ProcessSupervisor:
     Attributes:
         by_name: The processes.
         on_exit: Called with a process and its exit code when it has ended for good.
+        on_restart: Called with a process that was started again.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
     """
@@ -69,6 +70,7 @@ class ProcessSupervisor:
         self._log_levels = log_levels
         self.is_alone = False
         self.on_exit: Callable[[ExternalProcess, int], None] = lambda _process, _code: None
+        self.on_restart: Callable[[ExternalProcess], None] = lambda _process: None
         self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
@@ -83,7 +85,7 @@ class ProcessSupervisor:
         Raises:
             StartError: Its program does not exist, or cannot be run.
         """
-        if process.is_leaving:
+        if process.is_leaving or process.spec.external:
             return
         process.is_done = False
         try:
@@ -242,6 +244,8 @@ class ProcessSupervisor:
             self.start(process)
         except StartError as error:
             self.end_for_good(process, ExitCode.FAILED, str(error))
+            return
+        self.on_restart(process)
 
     def end_for_good(self, process: ExternalProcess, code: int, end: str) -> None:
         """Log how a process has ended, and do what is due then.

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from composer.language.specs import (
         ActionClientSpec,
         ActionSpec,
+        ComponentSpec,
         ConditionSpec,
         NodeSpec,
         ProcessSpec,
@@ -139,7 +140,7 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     return present
 
 
-def _full_name(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
+def _full_name(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
     kind = condition.kind
     if kind == 'node' or kind == 'process':  # noqa: PLR1714 - the type checker follows this
         return expand_name(condition.name, waiter.name, waiter.namespace or '/')

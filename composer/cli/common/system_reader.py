@@ -101,6 +101,7 @@ def list_files(context: CheckContext) -> set[Path]:
     named = [
         *(each.parameter_files for each in spec.nodes.values()),
         *(each.parameter_files for each in spec.processes.values()),
+        *(each.parameter_files for each in spec.components),
     ]
     for text in (text for texts in named for text in texts):
         # A package that is not installed is for the checks to say.

@@ -6,9 +6,9 @@ from dataclasses import MISSING, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from composer.language.parsing.conditions import parse_conditions
 from composer.language.parsing.entity_parser import parse_entities, parse_run_options
 from composer.language.parsing.entry_parser import Data, parse_behaviour
-from composer.language.parsing.process_parser import parse_conditions
 from composer.language.specs import BehaviourSpec, NodeSpec
 from composer.names import expand_namespace
 
