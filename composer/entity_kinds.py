@@ -181,11 +181,16 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         stand_in={'type': 'unknown/action/Unknown'},
     ),
 )
+# Those of the transitions of a node with a lifecycle.
+TRANSITION_BEHAVIOURS = (
+    *('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_error_state'),
+)
 # The behaviours of a node itself.
 NODE_BEHAVIOURS: tuple[BehaviourKey, ...] = (
     BehaviourKey('on_start', ('node',)),
     BehaviourKey('on_stop', ('node',)),
     BehaviourKey('on_parameters', ('node', 'changes')),
+    *(BehaviourKey(key, ('node',)) for key in TRANSITION_BEHAVIOURS),
 )
 
 # What a process calls when it has ended.

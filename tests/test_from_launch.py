@@ -24,7 +24,7 @@ import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 import rclpy
 rclpy.init()
-node = rclpy.create_node('program')
+node = __import__('rclpy.lifecycle').lifecycle.LifecycleNode('program')
 publisher = node.create_publisher(__import__('std_msgs.msg').msg.String, 'chatter', 10)
 try:
     rclpy.spin(node)
@@ -35,9 +35,10 @@ EXECUTABLES = {
     'demo_nodes_cpp': 'talker',
     'rclcpp_components': 'component_container',
     'lifecycle': 'lifecycle_talker',
+    'robot_state_publisher': 'robot_state_publisher',
 }
 # They call ros2, which is not among the wheels.
-NOT_RUN = ('Composable nodes', 'Lifecycle nodes')
+NOT_RUN = ('Composable nodes',)
 
 
 def read_examples():
@@ -102,9 +103,10 @@ def folder(tmp_path, monkeypatch):
 def write(folder, files):
     """Write an example with what the page leaves out; return the system's path and arguments."""
     for name, text in files.items():
-        is_whole = 'ros__parameters' in text
+        is_whole = 'ros__parameters' in text or name == 'limits.yaml'
         nodes = '' if re.search(r'^nodes:', text, re.MULTILINE) else 'nodes: {}\n'
         (folder / name).write_text(text if is_whole else f'version: 1\n{text}{nodes}')
+    (folder / 'arm.urdf').write_text('<robot/>\n')
     first = next(iter(files))
     words = re.search(r'^# arguments: (.*)$', files[first], re.MULTILINE)
     return folder / first, words[1].split() if words else []

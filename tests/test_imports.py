@@ -39,6 +39,7 @@ ROOMS = (
         'executor',
         'processes',
         'runtime',
+        'launch_files',
     ),
     'stubs',
     *('cli', 'api', '__init__', '__main__'),

@@ -17,6 +17,7 @@ from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.channels import check_channel_types, check_servers
 from composer.checks.connections.deadlocks import check_deadlocks
+from composer.checks.connections.lifecycles import check_awaited_states, check_lifecycles
 from composer.checks.connections.loops import check_loops
 from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.typos import check_typos
@@ -33,7 +34,12 @@ from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
-from composer.checks.references import check_publish, check_qos, check_types
+from composer.checks.references import (
+    check_publish,
+    check_qos,
+    check_start_values,
+    check_types,
+)
 from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first
 from composer.input_limits import MAX_FINDINGS
@@ -63,6 +69,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_messages,
     check_parameters,
     check_behaviour_sources,
+    check_lifecycles,
     check_missing_modules,
     check_compared_arguments,
     check_transforms,
@@ -78,8 +85,10 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_parameter_files,
     check_executables,
     check_launch_files,
+    check_start_values,
     check_left_out,
     check_waits,
+    check_awaited_states,
     check_environment,
     check_channel_types,
     check_servers,

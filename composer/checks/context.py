@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.ament import find_meant_package
-from composer.checks.connections.topology import Topology, build_topology
+from composer.checks.connections.topology import Topology, add_created, build_topology
 from composer.diagnostics import Related, diagnostic_at
 from composer.inference.behaviour_reader import BehaviourReader
 from composer.inference.message_types import MessageTypes
@@ -45,7 +45,12 @@ class CheckContext:
     @cached_property
     def topology(self) -> Topology:
         """What connects the nodes."""
-        return build_topology(self.system, self.spec, self.has_real_type)
+        topology = build_topology(self.system, self.spec, self.has_real_type)
+        for node in self.spec.nodes.values():
+            for reading in self.readings(node):
+                if reading.created:
+                    topology = add_created(topology, node, reading.created)
+        return topology
 
     @cached_property
     def behaviours(self) -> BehaviourReader:

@@ -1,12 +1,18 @@
-"""References: publishers, QoS profiles and interface types that an entry names."""
+"""References: what an entry names: publishers, QoS profiles, interface types, programs, files."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from composer.ament import explain_missing_package
+from composer.diagnostics import diagnostic_at
 from composer.interfaces.descriptions import MessageDescription
+from composer.language.includes.include_entry import shown_path
+from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
+from composer.programs import base_environment, find_program_problem, shell_environment
 from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import passes_message_on
 from composer.spelling import suggest
@@ -15,9 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
     from composer.interfaces.catalogue import InterfaceKind
     from composer.language.specs import NodeSpec, PublisherSpec, QosSpec, SubscriptionSpec
+    from composer.language.values.start_values import StartValue
     from composer.yaml_text.positions import DataPath
 
 
@@ -73,7 +80,7 @@ def _passes_on(
     if behaviour is None:
         return not context.was_dropped((*subscription.path, 'behaviour'))
     module = context.modules.find(behaviour.module)
-    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
+    source = module.find_function(behaviour.function) if isinstance(module, ModuleSource) else None
     if source is None or source.definition is None or not passes_message_on(source.definition):
         return False
     # A message can be the only field of another one.
@@ -157,3 +164,38 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
         part=name,
         help=suggest(name, names, f'its {noun}s are'),
     )
+
+
+def check_start_values(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that the programs and files exist that values come from; they are not run or read."""
+    for value in context.system.start.found:
+        if value.command:
+            yield from _check_command(value)
+        else:
+            yield from _check_file(value.file, value.spans[0])
+
+
+def _check_command(value: StartValue) -> Iterator[Diagnostic]:
+    program, *words = value.command
+    is_here = '/' in program and not Path(program).is_absolute()
+    environment = base_environment(shell_environment())
+    # It runs where the system is started.
+    problem = None if is_here else find_program_problem(program, Path(), environment)
+    if problem:
+        message, advice = problem
+        yield diagnostic_at(value.spans[0], 'missing-program', message, help=advice)
+    for word, span in zip(words, value.spans[1:], strict=True):
+        if word.startswith('/') and Path(word).suffix and '\0' not in word:
+            yield from _check_file(word, span)
+
+
+def _check_file(text: str, span: Span) -> Iterator[Diagnostic]:
+    try:
+        path = resolve_path(text, Path())
+    except PathError as error:
+        yield diagnostic_at(span, 'uninstalled-package', str(error), help=error.help)
+        return
+    # The functions of pathlib raise for names that are too long.
+    if not os.path.isfile(path):  # noqa: PTH113
+        message = f"there is no file '{shown_path(path)}'"
+        yield diagnostic_at(span, 'missing-file', message, help=explain_absent(path, span))

@@ -457,6 +457,27 @@ def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: P
     return write_stubs(words, set_values, output)
 
 
+@cli.command('import', context_settings=NUMBERS_ARE_VALUES)
+@click.argument('file', type=click.Path(path_type=Path))
+@click.argument('words', nargs=-1, metavar='[NAME:=VALUE]...')
+@click.option(
+    '--output',
+    '-o',
+    type=click.Path(path_type=Path),
+    help='Write the system to this file, and its parameter files beside it. Default: print it.',
+)
+def import_command(file: Path, words: tuple[str, ...], output: Path | None) -> int:
+    """Turn the launch file FILE (.launch.py, .xml or .yaml) into a system.
+
+    It is resolved by the installed launch and launch_ros, with these values for its arguments. All
+    of its arguments remain arguments of the system. What cannot be kept is a comment with the line
+    that it comes from.
+    """
+    from composer.cli.importing.import_launch import import_launch_file
+
+    return import_launch_file(file, words, output)
+
+
 @cli.command('new')
 @click.argument('name')
 def new_command(name: str) -> int:

@@ -14,6 +14,7 @@ from composer.cli.common.output import show_findings, wants_colour
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.values.start_reader import StartValueReader
 from composer.planning import json_document, text
 from composer.planning.differences import compare
 from composer.planning.snapshot import take_snapshot
@@ -109,6 +110,7 @@ def _read(
     checks: bool,
 ) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
     """Return the context of a system, and what was found in it."""
-    system = load_given(paths, words, set_values, before.system if before else None)
+    before_system = before.system if before else None
+    system = load_given(paths, words, set_values, before_system, StartValueReader())
     context = create_context(system, InterfaceCatalogue(), before)
     return context, check_in_context(system, context) if checks else system.diagnostics

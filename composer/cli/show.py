@@ -21,6 +21,8 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.parsing.containers import unfold_containers
 from composer.language.paths import resolve_path
+from composer.language.values.start_reader import StartValueReader
+from composer.language.values.start_values import replace_start_values
 from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
@@ -52,7 +54,7 @@ def show(
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_given(paths, words, set_values)
+    system = load_given(paths, words, set_values, reader=StartValueReader())
     show_findings(system.diagnostics)
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
@@ -84,7 +86,7 @@ def show_parameters(paths: Sequence[Path], words: Sequence[str], set_values: Seq
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_given(paths, words, set_values)
+    system = load_given(paths, words, set_values, reader=StartValueReader())
     findings = _check_parameters(system)
     show_findings(findings)
     if has_errors(findings) or system.spec is None:
@@ -150,7 +152,11 @@ def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
         if section in data:
             entries = data[section].items()
             absolute[section] = {name: _entry_with_absolute(entry) for name, entry in entries}
-    return absolute
+    return replace_start_values(absolute, lambda _, value: _with_absolute_file(value))
+
+
+def _with_absolute_file(value: dict[str, Any]) -> dict[str, Any]:
+    return value | {'file': _absolute(value['file'])} if 'file' in value else value
 
 
 def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:

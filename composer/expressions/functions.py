@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import yaml
 from jinja2 import TemplateRuntimeError
 
 from composer.ament import explain_missing_package, find_share, list_packages
@@ -51,6 +52,46 @@ def find_package_share(package: str) -> str:
     return str(share)
 
 
+def to_bool(value: Any) -> bool:
+    """Return whether a text is `true` or `1`, as the conditions of launch files do.
+
+    Raises:
+        TemplateRuntimeError: It is neither that nor `false` or `0`.
+    """
+    text = str(value).strip().lower()
+    if text not in _TRUTH:
+        message = f'{value!r} is neither true nor false'
+        raise TemplateRuntimeError(message)
+    return _TRUTH[text]
+
+
+def from_yaml(text: Any) -> Any:
+    """Return the value that a text is in YAML, as launch files read values of parameters.
+
+    Raises:
+        TemplateRuntimeError: It is no value that a parameter can have.
+    """
+    if not isinstance(text, str):
+        return text
+    if len(text) > _LONGEST_YAML or ('&' in text and '*' in text):
+        message = 'the text is too long, or has anchors'
+        raise TemplateRuntimeError(message)
+    try:
+        value = yaml.safe_load(text) if text else ''
+    except (yaml.YAMLError, ValueError) as error:
+        message = f'{text!r} is not YAML'
+        raise TemplateRuntimeError(message) from error
+    items = value if isinstance(value, list) else [value]
+    if not all(isinstance(item, bool | int | float | str) for item in items):
+        message = f'{text!r} is no value of a parameter'
+        raise TemplateRuntimeError(message)
+    return value
+
+
+_TRUTH = {'true': True, '1': True, 'false': False, '0': False}
+_LONGEST_YAML = 10_000
+# Filters beside those of jinja2; both have the names that they have in Ansible.
+FILTERS: Mapping[str, Callable[..., Any]] = {'bool': to_bool, 'from_yaml': from_yaml}
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     'env': read_environment,
     'find': find_package_share,

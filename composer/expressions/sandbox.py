@@ -14,7 +14,7 @@ from jinja2.runtime import new_context
 from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 
 from composer.expressions import ARGUMENTS, limits
-from composer.expressions.functions import FUNCTIONS
+from composer.expressions.functions import FILTERS, FUNCTIONS
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Sandbox(SandboxedEnvironment):
         self.budget = limits.Budget()
         self.explained = 0
         self.globals: dict[str, Any] = {'range': self.globals['range'], **FUNCTIONS}
-        self.filters = {name: self.filters[name] for name in sorted(_FILTERS)}
+        self.filters = {name: self.filters[name] for name in sorted(_FILTERS)} | dict(FILTERS)
         self._parsed: dict[str, nodes.Expr] = {}
         self._names: dict[str, frozenset[str]] = {}
         self._context = new_context(self, None, {}, globals=self.globals)

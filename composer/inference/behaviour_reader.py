@@ -24,6 +24,7 @@ from composer.inference.values import (
     UNKNOWN,
     Argument,
     Arguments,
+    Class,
     Function,
     Instance,
     Mapping,
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.bindings import Binding
-    from composer.language.specs import EndSpec, NodeSpec
+    from composer.language.specs import BehaviourSpec, EndSpec, NodeSpec
     from composer.python_source.module_finder import ModuleFinder
     from composer.yaml_text.positions import DataPath
 
@@ -202,10 +203,14 @@ def _moves(name: str, keepers: abc.Iterable[tuple[Binding, Reading]]) -> bool:
 def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: Wire) -> None:
     """Read a behaviour, and check the payloads that it gives away."""
     run, behaviour = evaluator.run, binding.behaviour
-    if not run.modules.has_name(module, behaviour.function):
+    if not run.modules.has_name(module, behaviour.class_name or behaviour.function):
         run.reading = missing_reading()
         return
-    function = _function_of(evaluator, evaluator.top_value(module, behaviour.function))
+    if behaviour.class_name:
+        named = _method_of(evaluator, module, behaviour)
+    else:
+        named = evaluator.top_value(module, behaviour.function)
+    function = _function_of(evaluator, named)
     if function is None:
         run.reading.open_all()
         return
@@ -217,10 +222,10 @@ def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: 
     if binding.key.key == 'on_parameters':
         given = PartOfNode('changes')
     positional = [NODE, given][: len(binding.parameters)]
-    named = [(name, _of_file(value, place)) for name, value in behaviour.arguments.items()]
+    constants = [(name, _of_file(value, place)) for name, value in behaviour.arguments.items()]
     arguments = Arguments(
         (*bound.positional, *(Argument(value, place) for value in positional)),
-        (*bound.named, *((name, Argument(value, place)) for name, value in named)),
+        (*bound.named, *((name, Argument(value, place)) for name, value in constants)),
     )
     callee.is_read = True
     if not evaluator.functions.fits(callee, arguments):
@@ -233,10 +238,27 @@ def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: 
     evaluator.classes.mention_held()
 
 
+def _method_of(evaluator: Evaluator, module: ModuleSource, behaviour: BehaviourSpec) -> Value:
+    """Return the method of the object that the node has of a class; its making is read, too."""
+    of = evaluator.top_value(module, behaviour.class_name)
+    if not isinstance(of, Class):
+        return UNKNOWN
+    init = evaluator.classes.class_attribute(of, '__init__', Instance(of))
+    place = Place(of.module, of.definition)
+    node = Arguments((Argument(NODE, place),))
+    takes_node = isinstance(init, Function) and evaluator.functions.fits(init, node)
+    made = evaluator.classes.instantiate(of, node if takes_node else Arguments())
+    if not isinstance(made, Instance):
+        return UNKNOWN
+    # All behaviours of the class have it.
+    made.is_shared = True
+    return evaluator.classes.class_attribute(of, behaviour.method_name, made) or UNKNOWN
+
+
 def _explain_call(run: Run, module: ModuleSource, binding: Binding, callee: Function) -> None:
     """Report a call that does not fit, of what its name alone does not tell."""
     name = binding.behaviour.function
-    source = module.functions.get(name)
+    source = module.find_function(name)
     if source is not None and source.signature is not None:
         # It has a finding at the name.
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.entity_kinds import TRANSITION_BEHAVIOURS
 from composer.inference.current_run import span_of
 from composer.inference.message_types import in_python
 from composer.inference.scopes import own_nodes
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from composer.python_source.syntax import FunctionNode
 
 # What ends a loop; that a call may raise is no way to end one.
+_WANTED = {'accept': 'whether to accept, or why not', 'on_parameters': 'None, or why not'}
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
 
 
@@ -111,8 +113,9 @@ def _is_endless(loop: ast.While) -> bool:
 
 
 def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None:
-    """Check what `accept` and `on_parameters` return: whether, or why not."""
+    """Check what `accept`, `on_parameters` and transitions return: whether, or why not."""
     kinds: dict[str, tuple[type, ...]] = {
+        **dict.fromkeys(TRANSITION_BEHAVIOURS, (bool, type(None))),
         'accept': (bool, str, type(None)),
         'on_parameters': (str, type(None)),
     }
@@ -122,7 +125,7 @@ def _check_answers(evaluator: Evaluator, scope: Scope, binding: Binding) -> None
         found = list(filter(None, map(_kind_name, several)))
         names = {each.__name__ for each in wanted or ()}
         if wanted and len(found) == len(several) and not names & set(found):
-            what = 'whether to accept, or why not' if bool in wanted else 'None, or why not'
+            what = _WANTED.get(binding.key.key, 'False if it failed, or nothing')
             evaluator.run.report(
                 'bad-answer',
                 place,

@@ -19,6 +19,15 @@ Waited: TypeAlias = Literal['', 'answer', 'end']
 Awaited: TypeAlias = 'Primitive | Held'
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
+# The methods of the node that create an entity, the noun of its kind, and the position of its
+# behaviour, if it has one.
+CREATING_METHODS = {
+    'create_publisher': ('publisher', None),
+    'create_subscription': ('subscription', 2),
+    'create_timer': ('timer', 1),
+    'create_service': ('service', 2),
+    'create_client': ('service client', None),
+}
 # The methods of the node that send something, and the noun of what they use by its name.
 SENDING_METHODS = {
     'publish': 'publisher',
@@ -56,6 +65,23 @@ class NodeUse:
     waits: Waited = ''
     is_change: bool = False
     among: tuple[str, ...] = ()
+
+
+@record
+class CreatedEntity:
+    """An entity that a behaviour creates: `node.create_publisher(…)`.
+
+    Attributes:
+        kind: The noun of its kind.
+        name: The name by which behaviours use it; `None` for one that is not known.
+        channel: The name of its topic or service, as it is given; `None` for any.
+        type: The full name of its type; `None` for any.
+    """
+
+    kind: str
+    name: str | None
+    channel: str | None
+    type: str | None
 
 
 @record
@@ -150,6 +176,7 @@ class Reading:
             it starts may do so, too.
         asked: What it asks first, as in `queue.empty()`.
         sleeps: How long it sleeps, in seconds, where, and where that is written.
+        created: The entities that it creates.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -177,6 +204,7 @@ class Reading:
     fills: dict[Awaited, set[bool]] = field(default_factory=dict)
     asked: set[Awaited] = field(default_factory=set)
     sleeps: list[tuple[float, Span, Span]] = field(default_factory=list)
+    created: list[CreatedEntity] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""
@@ -187,6 +215,7 @@ class Reading:
     def settle(self) -> None:
         """Forget what was noted twice."""
         self.blocks = list(dict.fromkeys(self.blocks))
+        self.created = list(dict.fromkeys(self.created))
         self.sleeps = list(dict.fromkeys(self.sleeps))
         self.uses = list(dict.fromkeys(self.uses))
         self.problems = list(dict.fromkeys(self.problems))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
 from composer.expressions import ARGUMENTS, is_argument_name
+from composer.language.values.start_values import SOURCE_KEYS, SOURCES
 from composer.records import record
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -29,12 +30,31 @@ ARGUMENT_TYPES = tuple(_SAMPLES)
 
 
 @record
+class StartDefault:
+    """A default that is read when the system starts.
+
+    Attributes:
+        data: Where it is from, as the file says it.
+    """
+
+    data: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        """Return where it is from in words."""
+        command, key = self.data.get('command'), self.data.get('key')
+        if isinstance(command, list):
+            return f"what '{' '.join(map(str, command))}' prints"
+        return f"'{key}' in {self.data['file']}" if key else f'the text of {self.data["file"]}'
+
+
+@record
 class ArgumentSpec:
     """An argument of a file.
 
     Attributes:
         type: `bool`, `integer`, `double` or `string`; empty if only a computed default tells it.
-        default: `None` if a value is required; a text with expressions if it is computed.
+        default: `None` if a value is required; a text with expressions, or where it is read
+            when the system starts, if it is computed.
         choices: The values that are allowed; none if all are.
     """
 
@@ -52,7 +72,8 @@ class ArgumentSpec:
     @property
     def is_computed(self) -> bool:
         """Whether the default is computed from other values."""
-        return isinstance(self.default, str) and '{{' in self.default
+        is_text = isinstance(self.default, str) and '{{' in self.default
+        return is_text or isinstance(self.default, StartDefault)
 
     @property
     def sample(self) -> Any:
@@ -136,6 +157,8 @@ def parse_declarations(data: Mapping[str, Any]) -> dict[str, ArgumentSpec]:
 def _read_argument(name: str, data: Any) -> ArgumentSpec:
     entry = data if isinstance(data, dict) else {'default': data}
     default = entry.get('default')
+    if not entry.keys().isdisjoint(SOURCES):
+        default = StartDefault({k: entry[k] for k in SOURCE_KEYS if k in entry})
     type_name = entry.get('type')
     if type_name not in ARGUMENT_TYPES:
         is_computed = isinstance(default, str) and '{{' in default

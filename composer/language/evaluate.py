@@ -37,7 +37,7 @@ def give_arguments(system: LoadedSystem, give_values: GiveValues) -> None:
     system.diagnostics += [*findings, *_check_variables(system)]
     is_usable = not findings and is_sound({'args': written})
     if not all(argument.type for argument in system.arguments.values()):
-        from composer.language.computed_values import infer_argument_types
+        from composer.language.values.computed_values import infer_argument_types
 
         samples = sample_values(system.arguments)
         system.arguments = infer_argument_types(system, system.arguments, samples)
@@ -47,16 +47,17 @@ def give_arguments(system: LoadedSystem, give_values: GiveValues) -> None:
 def evaluate_expressions(system: LoadedSystem) -> None:
     """Evaluate the expressions of a file, and repeat or leave out its entries."""
     data = system.entries
-    if not (_has_expressions(system.positions) or _has_conditions(data)):
+    is_plain = not (_has_expressions(system.positions) or _has_conditions(data))
+    if is_plain and not any(each.is_computed for each in system.arguments.values()):
         return
     # jinja2 takes a tenth of a check's time to import, and most files have no expressions.
     from composer.expressions.foreach import expand_document
-    from composer.language.computed_values import compute_values
+    from composer.language.values.computed_values import compute_values
 
     declarations = {key: data[key] for key in ('args', 'vars', 'check') if key in data}
     rest = {key: value for key, value in data.items() if key not in declarations}
     before = len(system.diagnostics)
-    scope = compute_values(system, system.arguments, system.given)
+    scope = compute_values(system, system.arguments, system.given, system.start)
     expanded = expand_document(system, rest, scope)
     # Of a file with too many entries nothing is left.
     system.data = None if expanded is None else expanded | declarations

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.language.arguments import ArgumentValues
+from composer.language.values.start_values import StartValues
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ class LoadedSystem(Document):
         inner_names: The namespaces, as written, and simple names of nodes that are called by
             their full names only because another node has the simple one.
         sampled_unused: As `sampled`, of what is left out.
+        start: The values that are read when the system starts.
+        filled: The data with these values, or samples of them, in place.
         spec: The system without the parts that were wrong; `None` if nothing could be read.
         unused: As `spec`, of the nodes and processes whose `when`, or that of their include, does
             not hold; and of nodes with entities whose `when` does not hold, with all of these.
@@ -50,6 +53,8 @@ class LoadedSystem(Document):
     chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     inner_names: dict[str, tuple[str, str]] = field(default_factory=dict)
     sampled_unused: list[Span] = field(default_factory=list)
+    start: StartValues = field(default_factory=StartValues)
+    filled: dict[str, Any] = field(default_factory=dict)
     spec: SystemSpec | None = None
     unused: SystemSpec | None = None
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)

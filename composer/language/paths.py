@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.ament import explain_missing_package, find_share, list_packages
 from composer.errors import ComposerError
 from composer.input_limits import explain_missing
+from composer.language.values.start_values import replace_start_values
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,7 +73,15 @@ def resolve_paths(system: LoadedSystem) -> None:
                 name: _with_paths(entry, (section, name), positions)
                 for name, entry in data[section].items()
             }
-    system.data = resolved
+    system.data = replace_start_values(
+        resolved, lambda path, value: _with_file(value, path, positions)
+    )
+
+
+def _with_file(value: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:
+    if 'file' not in value:
+        return value
+    return value | {'file': _resolved(value['file'], (*path, 'file'), positions)}
 
 
 def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from composer.language.arguments import GiveValues
+    from composer.language.values.start_values import ReadValue
     from composer.yaml_text.document import Document
 
 
@@ -43,6 +44,7 @@ def load_system(
     set_values: Sequence[str] = (),
     text: bytes | None = None,
     before: LoadedSystem | None = None,
+    read_value: ReadValue | None = None,
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -53,14 +55,16 @@ def load_system(
         set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
         text: The text of the file, if it is not to be read.
         before: A system whose records are kept where the data are the same.
+        read_value: Reads the values that are known when the system starts; `None` for samples.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
             nothing.
+        ComposerError: A value that is known when the system starts cannot be read.
     """
     confidential.begin([path, *layers])
     document = apply_set_values(_read([path, *layers], text), set_values)
-    return _load(document, path, partial(values_from_words, words=words), before)
+    return _load(document, path, partial(values_from_words, words=words), before, read_value)
 
 
 def load_combinations(
@@ -125,8 +129,10 @@ def _load(
     path: Path,
     give_values: GiveValues,
     before: LoadedSystem | None = None,
+    read_value: ReadValue | None = None,
 ) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
+    system.start.read = read_value
     if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
         # What is wrong with it would tell what is in it.
         message = 'this is a link to a file outside of the project that is not a system'

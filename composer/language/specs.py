@@ -26,6 +26,10 @@ ClockName: TypeAlias = Literal['ros', 'steady', 'system']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
+LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
+LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+DrivenState: TypeAlias = Literal['inactive', 'active']
+WhileInactive: TypeAlias = Literal['drop', 'keep']
 ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
 
@@ -41,12 +45,26 @@ REENTRANT = 'reentrant'
 
 @record
 class BehaviourSpec:
-    """A Python function by name, with constant keyword arguments."""
+    """A Python function by name, with constant keyword arguments.
+
+    Attributes:
+        function: Its name, or `Class.method`.
+    """
 
     module: str
     function: str
     arguments: Mapping[str, Any]
     path: DataPath
+
+    @property
+    def class_name(self) -> str:
+        """The class, if it is a method; otherwise empty."""
+        return self.function.rpartition('.')[0]
+
+    @property
+    def method_name(self) -> str:
+        """The name of the method or function alone."""
+        return self.function.rpartition('.')[2]
 
     @property
     def name(self) -> str:
@@ -115,6 +133,8 @@ class SubscriptionSpec:
         publish: The publisher for what the behaviour returns, or `None`.
         group: The callback group's name; `None` for the node's default group.
         read_only: Whether it shares its messages with others, as its behaviour only reads them.
+        while_inactive: What becomes of messages while the node has a lifecycle and is not active;
+            `None` for what fits the durability.
         external: Whether its publishers are in no file.
     """
 
@@ -126,6 +146,7 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     read_only: bool
+    while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
     warn_after_sec: float | None
@@ -159,6 +180,8 @@ class ServiceSpec:
 
     Attributes:
         group: The callback group's name; `None` for the node's default group.
+        while_inactive: What becomes of requests while the node has a lifecycle and is not active;
+            `None` is `drop`.
     """
 
     name: str
@@ -167,6 +190,7 @@ class ServiceSpec:
     qos: QosSpec
     behaviour: BehaviourSpec
     group: str | None
+    while_inactive: WhileInactive | None
     local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
@@ -247,13 +271,14 @@ class ConditionSpec:
         kind: What sort of thing it is.
         name: Its name as written; a relative one lies in the namespace of who waits.
         timeout_sec: After this the start fails.
-        state: What a process must have come to; `None` if it may run or have succeeded.
+        state: What a process must have come to; `None` if it may run or have succeeded. Or the
+            state that a node must be in, which has a lifecycle; `None` for any.
     """
 
     kind: ConditionKind
     name: str
     timeout_sec: float
-    state: ProcessState | None
+    state: ProcessState | LifecycleState | None
     path: DataPath
 
 
@@ -376,6 +401,7 @@ class ProcessSpec:
         namespace: The namespace of the nodes in it; `None` if the program has none.
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
+        lifecycle: The state that these are brought to; `None` to leave them alone.
         cwd: The folder it runs in; `None` for that of Composer.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
@@ -414,6 +440,7 @@ class ProcessSpec:
     on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
+    lifecycle: DrivenState | None
     components: Mapping[str, ComponentSpec]
     external: bool
     path: DataPath
@@ -422,6 +449,11 @@ class ProcessSpec:
     def full_name(self) -> str:
         """The full name of its node, if it is a container."""
         return join_names(self.namespace or '/', self.node_name or self.name)
+
+    @property
+    def named_nodes(self) -> tuple[str, ...]:
+        """The full name of the node that it is told to have, if it is."""
+        return (join_names(self.namespace or '/', self.node_name),) if self.node_name else ()
 
     @property
     def starts_late(self) -> bool:
@@ -443,6 +475,7 @@ class NodeSpec:
 
     Attributes:
         namespace: In full, as in `/robot`.
+        local_delivery: Of entities that do not say so, and are created while it runs.
         parameter_services: Whether others can list, read and set its parameters.
         rosout: Whether what it logs goes to `/rosout`, too.
         type_description_service: Whether it answers which types it uses.
@@ -452,6 +485,9 @@ class NodeSpec:
         wait_for: What must be there before it starts.
         delay_sec: Time between the moment when its conditions hold and its start.
         parameter_files: In ROS's own format; later ones win.
+        lifecycle: The state to which a node with a lifecycle brings itself; `None` for one
+            without.
+        bond: Whether it keeps a bond while it is active.
     """
 
     _: KW_ONLY
@@ -460,10 +496,12 @@ class NodeSpec:
     description: str = ''
     log_level: LogLevel | None = None
     use_sim_time: bool = False
+    local_delivery: bool = True
     parameter_services: bool = True
     rosout: bool = True
     type_description_service: bool = False
     logger_services: bool = False
+    bond: bool = False
     on_error: OnError
     warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
@@ -479,6 +517,12 @@ class NodeSpec:
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
+    lifecycle: LifecycleStart | None
+    on_configure: BehaviourSpec | None
+    on_activate: BehaviourSpec | None
+    on_deactivate: BehaviourSpec | None
+    on_cleanup: BehaviourSpec | None
+    on_error_state: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
     delay_sec: float
     parameter_files: tuple[str, ...]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.bindings import exit_bindings, node_bindings
-from composer.language.specs import ComponentSpec, ParameterSpec, ProcessSpec
+from composer.language.specs import ComponentSpec, NodeSpec, ParameterSpec, ProcessSpec
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Span
     from composer.entity_kinds import EntityKind
-    from composer.language.specs import NodeSpec
+    from composer.language.bindings import Binding
     from composer.planning.plan import Target
     from composer.planning.snapshot import Snapshot
 
@@ -83,10 +83,16 @@ _ENTITIES = {
 _NODES = _Rules(
     'node',
     'its state, parameters set while it ran, all that is queued',
-    dict.fromkeys(
-        ('remap', 'rosout', 'parameter_services', 'type_description_service', 'logger_services'),
-        'ROS reads this when the node is created',
-    ),
+    {
+        **dict.fromkeys(
+            (
+                *('remap', 'rosout', 'parameter_services', 'type_description_service'),
+                *('logger_services', 'lifecycle'),
+            ),
+            'ROS reads this when the node is created',
+        ),
+        'class': 'its instance is made with the node',
+    },
 )
 # The other fields of a process say how it is kept, not how it runs.
 _PROCESSES = _Rules(
@@ -127,7 +133,7 @@ _OF_THE_SYSTEM = (
     'shutdown_timeout_sec',
     'diagnostics_period_sec',
 )
-_AT_ITS_START = ('on_start', 'wait_for', 'delay')
+_AT_ITS_START = ('on_start', 'wait_for', 'delay', 'lifecycle')
 # Parameters of every node, and the keys of a node that set them where parameter files do not.
 _GIVEN_BY_ROS = {
     'use_sim_time': 'use_sim_time',
@@ -239,6 +245,7 @@ class _Comparison:
             readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
             further += compare_entries(*readings, 'state', old.state, new.state)
             further += self._changed_by_files(*readings)
+            further += self._changed_classes(*readings)
         own = list(self._compare(_NODES, (full_name, 'nodes', ''), old, new, further))
         yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
@@ -289,6 +296,20 @@ class _Comparison:
                 if before != after:
                     yield Change(key, before, after, old_span, new_span)
 
+    def _changed_classes(self, old: Reading, new: Reading) -> Iterator[Change]:
+        """Yield the classes of behaviours that have other code now."""
+        before, after = map(_find_classes, (old, new))
+        for name in before.keys() & after.keys():
+            if before[name].behaviour.module in self._stale:
+                yield Change(
+                    'class',
+                    name,
+                    name,
+                    old.snapshot.positions.value(before[name].behaviour.path),
+                    new.snapshot.positions.value(after[name].behaviour.path),
+                    is_code=True,
+                )
+
     def _changed_override(self, name: str, old: NodeSpec, new: NodeSpec) -> Iterator[Change]:
         """Yield the change of what parameter files say of a parameter."""
         before = self._old.overrides.get(old.full_name, {}).get(name)
@@ -331,6 +352,16 @@ class _Comparison:
         return Reading(snapshot, snapshot.spec, ())
 
 
+def _find_classes(reading: Reading) -> dict[str, Binding]:
+    """Return the classes of a node's behaviours, each with the first of these."""
+    found: dict[str, Binding] = {}
+    for binding in node_bindings(reading.record):
+        behaviour = binding.behaviour
+        if behaviour.class_name:
+            found.setdefault(f'{behaviour.module}:{behaviour.class_name}', binding)
+    return found
+
+
 @cache
 def _compared_fields(kind: Any) -> tuple[str, ...]:
     """Return the fields of a class of records that are compared."""
@@ -338,16 +369,25 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
     if kind in (ProcessSpec, ComponentSpec):
         skipped -= _ARGUMENTS
+    if kind is NodeSpec:
+        # Its entities say it, too.
+        skipped |= {'local_delivery'}
     return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 
 def _modification(
     rules: _Rules, target: Target, name: str, span: Span, changes: list[Change]
 ) -> Operation:
-    reasons = (rules.fixed.get(each.key) or rules.fixed.get(each.top_key) for each in changes)
+    reasons = (
+        rules.fixed.get(each.key) or rules.fixed.get(each.top_key)
+        for each in changes
+        # Where a lifecycle starts counts from the next start.
+        if not (each.key == 'lifecycle' and each.old and each.new)
+    )
     reason = next(filter(None, reasons), '')
     keys = dict.fromkeys(each.top_key for each in changes)
-    late = [key for key in keys if key in _AT_ITS_START and not reason]
+    at_start = _AT_ITS_START if rules is not _PROCESSES else ('wait_for', 'delay')
+    late = [key for key in keys if key in at_start and not reason]
     return Operation(
         Action.RECREATE if reason else Action.CHANGE,
         rules.noun,

@@ -97,7 +97,7 @@ def _find_generators(context: CheckContext) -> Iterator[str]:
             module = context.modules.find(behaviour.module)
             source = None
             if not isinstance(module, MissingModule):
-                source = module.functions.get(behaviour.function)
+                source = module.find_function(behaviour.function)
             if source is not None and source.kind is not None and source.kind.is_generator:
                 yield behaviour.name
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 from collections import Counter
 from contextlib import suppress
@@ -34,6 +35,8 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+# Longer lines of classes are not followed.
+MOST_BASES = 20
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 
 
@@ -118,6 +121,39 @@ class ModuleSource:
     tokens: int = 0
     body: tuple[ast.stmt, ...] = field(default=(), repr=False)
     content: bytes | None = field(default=None, repr=False)
+
+    def find_function(self, name: str) -> FunctionSource | None:
+        """Return a function by its name, or a method as `Class.method`, without its `self`."""
+        owner, _, method = name.rpartition('.')
+        if not owner:
+            return self.functions.get(name)
+        of = self.functions.get(owner)
+        if of is None or of.definition is not None:
+            return None
+        return self._find_method(of, method, MOST_BASES)
+
+    def _find_method(self, of: FunctionSource, name: str, depth: int) -> FunctionSource | None:
+        """Return a method of a class; one that nobody knows if it may have others than these."""
+        definition = of.class_definition
+        if definition is None or not depth:
+            return FunctionSource()
+        own = [each for each in definition.body if getattr(each, 'name', '') == name]
+        if own and isinstance(own[-1], ast.FunctionDef | ast.AsyncFunctionDef):
+            return _as_method(own[-1])
+        nodes = list(ast.walk(definition))
+        if name in {each.id for each in stored_names(nodes)} | nested_names(nodes):
+            return FunctionSource()
+        if definition.decorator_list or definition.keywords:
+            return FunctionSource()
+        for base in definition.bases:
+            simple = base.id if isinstance(base, ast.Name) else ''
+            if simple == 'object':
+                continue
+            known = self.functions.get(simple)
+            found = self._find_method(known or FunctionSource(), name, depth - 1)
+            if found is not None:
+                return found
+        return None
 
     @cached_property
     def source(self) -> SourceFile:
@@ -325,6 +361,22 @@ class _ModuleReader:
         """Store the meaning of a name; a name with several meanings has none."""
         if self.imports.setdefault(name, full_name) != full_name:
             self.imports[name] = ''
+
+
+def _as_method(node: FunctionNode) -> FunctionSource:
+    """Return a function of a class as it is called: without its first parameter."""
+    decorators = [ast.unparse(each) for each in node.decorator_list]
+    if decorators == ['staticmethod']:
+        return FunctionSource(node)
+    if decorators not in ([], ['classmethod']):
+        return FunctionSource()
+    method, arguments = copy.copy(node), copy.copy(node.args)
+    positional = [*arguments.posonlyargs, *arguments.args][1:]
+    by_position = max(len(arguments.posonlyargs) - 1, 0)
+    arguments.posonlyargs, arguments.args = positional[:by_position], positional[by_position:]
+    arguments.defaults = arguments.defaults[-len(positional) :] if positional else []
+    method.args = arguments
+    return FunctionSource(method)
 
 
 def _describe_constant(value: object) -> str:

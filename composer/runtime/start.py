@@ -5,6 +5,7 @@ The entities of a node are created, `on_start` runs, then behaviours may be call
 
 from __future__ import annotations
 
+import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -14,17 +15,20 @@ from composer.errors import StartError
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.tracebacks import represent
 from composer.runtime.entities.creators import create_entities
+from composer.runtime.lifecycle.transitions import Lifecycle
 from composer.runtime.logs import set_level
+from composer.runtime.nodes.callback_groups import LifecycleGate
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
 from composer.runtime.wait_for import WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-    from composer.language.specs import ComponentSpec, NodeSpec
+    from composer.language.specs import BehaviourSpec, ComponentSpec, NodeSpec
     from composer.processes.external_process import ExternalProcess
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.external.components import Components
+    from composer.runtime.nodes.live_entity import NodeLifecycle
     from composer.runtime.nodes.system_handle import SystemHandle
 
 _POLL_SEC = 0.05
@@ -123,7 +127,7 @@ class Starter:
         """
         for node in nodes:
             self._system.executor.add_node(node.ros)
-            node.gate.serves = node.spec.on_start is None and not node.spec.starts_late
+            node.serve_at_once()
         self.open(self.start(nodes, processes, components))
         for node in nodes:
             node.ros.start_parameter_services()
@@ -138,29 +142,49 @@ class Starter:
         if self._system.stop.is_set:
             return
         node.has_begun = True
-        if hook is None:
-            return
+        if hook is not None:
+            self._call_on_start(node, hook)
+        if node.lifecycle is not None:
+            self._bring_up(node, node.lifecycle)
+        node.gate.serves = not self._system.stop.is_set
+        self._system.executor.wake()
+
+    def _call_on_start(self, node: LiveNode, hook: BehaviourSpec) -> None:
         failures: list[BaseException] = []
         function = node.bind(hook)
         call = node.reported_call(Owner('on_start'), hook.path, function, failures.append)
         _, ended = node.begin(call)
-        while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
-            if self._system.is_outdated():
-                message = f"node '{node.spec.key}': the files have changed during its on_start"
-                raise StartError(message)
+        self._wait(node, ended, 'on_start')
         if failures:
             # `on_stop` is not called for it.
             node.has_begun = False
             message = f"node '{node.spec.key}': on_start raised {represent(failures[0])}"
             raise StartError(message) from failures[0]
-        node.gate.serves = not self._system.stop.is_set
-        self._system.executor.wake()
+
+    def _bring_up(self, node: LiveNode, lifecycle: NodeLifecycle) -> None:
+        """Bring a node to the state in which it starts.
+
+        Raises:
+            StartError: It did not get there.
+        """
+        ended = threading.Event()
+        task = self._system.executor.create_task(lifecycle.require, lifecycle.start)
+        task.add_done_callback(lambda _task: ended.set())
+        self._wait(node, ended, 'transitions')
+        if task.done() and (error := task.exception()):
+            raise error
+
+    def _wait(self, node: LiveNode, ended: threading.Event, what: str) -> None:
+        while not ended.wait(_POLL_SEC) and not self._system.stop.is_set:
+            if self._system.is_outdated():
+                message = f"node '{node.spec.key}': the files have changed during its {what}"
+                raise StartError(message)
 
     def open(self, nodes: Iterable[LiveNode]) -> None:
         """Let the behaviours of nodes that have started be called."""
         for node in nodes:
             node.gate.open()
-            for timer in node.timers():
+            for timer in () if node.gate.rests else node.timers():
                 with suppress(InvalidHandle):
                     # `on_start` may have destroyed it.
                     timer.reset()
@@ -168,7 +192,11 @@ class Starter:
 
     def _waiting_starter(self) -> WaitingStarter:
         return WaitingStarter(
-            self._system.context, self._nodes, self._processes.by_name, self._system.positions
+            self._system.context,
+            self._system.executor,
+            self._nodes,
+            self._processes.by_name,
+            self._system.positions,
         )
 
     def _start_late(self, node: LiveNode) -> None:
@@ -184,5 +212,7 @@ class Starter:
         except Exception as error:
             message = f"node '{spec.key}' cannot be created: {error}"
             raise StartError(message) from error
+        if isinstance(node.gate, LifecycleGate):
+            node.lifecycle = Lifecycle(node, node.gate)
         self._nodes[spec.full_name] = node
         return node

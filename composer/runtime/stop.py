@@ -133,7 +133,8 @@ class _NodeStop:
 
 
 def _has_work_left(node: LiveNode) -> bool:
-    return bool(node.suspended) or (node.spec.on_stop is not None and node.has_begun)
+    has_end = node.spec.on_stop is not None or node.lifecycle is not None
+    return bool(node.suspended) or (has_end and node.has_begun)
 
 
 def _cancel_timers(node: LiveNode) -> None:
@@ -149,6 +150,8 @@ def _finish(node: LiveNode, timeout_sec: float) -> None:
         behaviour.close(timeout_sec)
     node.gate.serves = False
     node.waits.allow_at_stop()
+    if node.lifecycle is not None and node.has_begun:
+        node.lifecycle.leave(timeout_sec)
     hook = node.spec.on_stop
     if hook is None or not node.has_begun:
         return

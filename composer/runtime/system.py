@@ -14,6 +14,7 @@ from composer.processes.supervisor import ProcessSupervisor
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
+from composer.runtime.entities.creators import create_entity
 from composer.runtime.external.components import Components
 from composer.runtime.external.exit_actions import ExitActions
 from composer.runtime.health.deliveries import find_deliveries
@@ -21,6 +22,7 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
+from composer.runtime.lifecycle.driver import LifecycleDriver
 from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.messages.local_services import LocalServices
@@ -117,9 +119,14 @@ class System:
         self._stop_request.kill_processes = self._processes.kill_all
         self._components = Components(self._handle)
         self._processes.on_restart = self._components.reload
+        self.state.find_lifecycles = self._find_lifecycles
         self._starter = Starter(self._nodes, self._processes, self._components, self._handle)
         self._exits = ExitActions(self._processes, self._starter, self._handle)
         self._processes.on_exit = self._exits.act
+        self._driver = LifecycleDriver(
+            self._context, self._executor, self._stop_request, self._processes
+        )
+        self._processes.on_run = self._driver.begin
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = ControlNode(
@@ -148,6 +155,7 @@ class System:
             health=HealthRegistry(),
             topics=LocalTopics(self._executor),
             services=LocalServices(self._executor),
+            create_entity=create_entity,
         )
 
     @property
@@ -184,7 +192,7 @@ class System:
             self._graph_watcher.start()
             self._parameter_services.start()
             for node in self._nodes.values():
-                node.gate.serves = node.spec.on_start is None and not node.spec.starts_late
+                node.serve_at_once()
             self._executor.wake()
             prompt = self._starter.start(self._nodes.values(), self._processes.by_name.values())
         except BaseException:
@@ -303,6 +311,10 @@ class System:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
 
+    def _find_lifecycles(self) -> dict[str, str]:
+        nodes = list(self._nodes.values())
+        return {node.full_name: node.lifecycle.state for node in nodes if node.lifecycle}
+
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again.
 
@@ -383,6 +395,7 @@ class System:
         self._control.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
+        self._driver.close()
         self._executor.stop(_EXECUTOR_STOP_SEC)
         self._hang_watcher.stop()
         release(self._context)

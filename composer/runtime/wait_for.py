@@ -8,13 +8,15 @@ from __future__ import annotations
 import threading
 from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from composer.ament import remaps_actions
 from composer.errors import StartError
+from composer.language.specs import LifecycleState
 from composer.names import expand_name, remap_name
 from composer.records import record
 from composer.runtime.behaviours.waits import WaitNotice
+from composer.runtime.lifecycle.remote_lifecycle import RemoteLifecycle
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.ros_graph import RosGraph, create_graph_node, describe_graph
 from composer.runtime.nodes.system_handle import never
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node as RosNode
 
+    from composer.executor import ComposerExecutor
     from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.nodes.live_node import LiveNode
@@ -44,6 +47,7 @@ _AWAITED_STATES = {
     'running': "process '{}' to run",
     'ended': "the end of process '{}'",
     'succeeded': "process '{}' to succeed",
+    **{each: f"node '{{}}' to be {each}" for each in get_args(LifecycleState)},
 }
 
 
@@ -73,6 +77,7 @@ class WaitingStarter:
     """Starts each waiting node and process as soon as its conditions hold.
 
     Args:
+        executor: Spins the node that asks other nodes for their states.
         nodes: The nodes of the system; what is in those that have not started does not count.
         processes: The processes of the system, by their names.
     """
@@ -80,11 +85,14 @@ class WaitingStarter:
     def __init__(
         self,
         context: Context,
+        executor: ComposerExecutor,
         nodes: Mapping[str, LiveNode],
         processes: Mapping[str, ExternalProcess],
         positions: SourceMap,
     ) -> None:
         self._context = context
+        self._executor = executor
+        self._remotes: dict[str, RemoteLifecycle] = {}
         self._nodes = nodes
         self._processes = processes
         self._positions = positions
@@ -125,6 +133,8 @@ class WaitingStarter:
                     if not started:
                         woken.wait(_POLL_SEC)
         finally:
+            self._executor.remove_node(node)
+            self._remotes.clear()
             node.destroy_node()
 
     def _start_ready(
@@ -137,7 +147,7 @@ class WaitingStarter:
         ready = []
         for waiter in pending:
             conditions = () if id(waiter) in self._held else waiter.conditions
-            missing = [each for each in conditions if not self._holds(waiter, each, graph)]
+            missing = [each for each in conditions if not self._holds(waiter, each, graph, node)]
             if not missing:
                 held = self._held.setdefault(id(waiter), now)
                 if now >= held + waiter.delay_sec:
@@ -153,10 +163,26 @@ class WaitingStarter:
                 waiter.start()
         return ready
 
-    def _holds(self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph) -> bool:
+    def _holds(
+        self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph, node: RosNode
+    ) -> bool:
         if condition.kind == 'process':
-            return self._processes[condition.name].has_come_to(condition.state)
-        return graph.has(condition.kind, waiter.resolve(condition))
+            state: Any = condition.state
+            return self._processes[condition.name].has_come_to(state)
+        name = waiter.resolve(condition)
+        if condition.state is None:
+            return graph.has(condition.kind, name)
+        return name not in graph.hidden and self._state_of(name, node) == condition.state
+
+    def _state_of(self, name: str, node: RosNode) -> str:
+        """Return the state of a node with a lifecycle; '' if it is not known."""
+        own = self._nodes.get(name)
+        if own is not None:
+            return own.lifecycle.state if own.lifecycle else ''
+        if name not in self._remotes:
+            self._remotes[name] = RemoteLifecycle(node, name)
+            self._executor.add_node(node)
+        return self._remotes[name].look()
 
     def _notice(self, waiter: Waiter, condition: ConditionSpec) -> WaitNotice:
         """Return what says that a condition is waited for."""
@@ -200,6 +226,11 @@ class WaitingStarter:
             for node in self._nodes.values()
             if node.full_name in graph.hidden and name in graph.names_of(node, condition.kind)
         ]
+        if condition.state and graph.has('node', name):
+            own, remote = self._nodes.get(name), self._remotes.get(name)
+            state = own.lifecycle.state if own and own.lifecycle else remote and remote.look()
+            is_it = f'it is {state}' if state else 'it tells no state, and may have no lifecycle'
+            return StartError(f"{who} {waited} '{name}' to be {condition.state}: {is_it}")
         message = f"{who} {waited} '{name}': {_REASONS[condition.kind]}"
         if late:
             nodes = ' and '.join(f"'{each}'" for each in late)

@@ -189,8 +189,12 @@ def _explain_dependency(error: ValidationError) -> Iterator[Violation]:
 
 
 def _explain_exclusion(error: ValidationError) -> Iterator[Violation]:
-    if isinstance(error.instance, dict):
-        yield conflicting_keys(error, error.validator_value['required'])
+    if not isinstance(error.instance, dict):
+        return
+    excluded = error.validator_value
+    for each in excluded.get('anyOf', [excluded]):
+        if all(key in error.instance for key in each['required']):
+            yield conflicting_keys(error, each['required'])
 
 
 def _explain_alternatives(error: ValidationError) -> Iterator[Violation]:

@@ -180,6 +180,12 @@ def is_sound(part: dict[str, Any]) -> bool:
     return not _find_violations(_REQUIRED | part)
 
 
+def find_problem(part: dict[str, Any]) -> str | None:
+    """Return what is wrong with some top-level keys alone; `None` if they are valid."""
+    violations = _find_violations(_REQUIRED | part)
+    return violations[0].message if violations else None
+
+
 def lacks_keys(part: dict[str, Any]) -> bool:
     """Return whether keys are missing in some top-level keys alone, expressions or not."""
     return any(each.rule == 'missing-key' for each in _find_violations(_REQUIRED | part))

@@ -57,9 +57,10 @@ class Received:
 
 @dataclass(slots=True)
 class FunctionUse:
-    """A function at the top level of a module, and what is known of its use.
+    """A function at the top level of a module or class, and what is known of its use.
 
     Attributes:
+        is_method: Whether its first parameter is the object.
         received: By parameter.
         bindings: The nodes and places that it is bound to.
         is_called: Whether the project itself calls or passes it.
@@ -69,11 +70,13 @@ class FunctionUse:
     received: dict[str, Received] = field(default_factory=dict)
     bindings: list[tuple[NodeSpec, Binding]] = field(default_factory=list)
     is_called: bool = False
+    is_method: bool = False
 
     def names(self) -> list[str]:
         """Return the names of the positional parameters."""
         arguments = self.definition.args
-        return [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        return names[1:] if self.is_method else names
 
     def give(self, name: str, received: Received) -> None:
         """Note what a parameter is given."""
@@ -90,6 +93,8 @@ def find_received_values(
         for statement in module.tree.body
         if isinstance(statement, _FUNCTIONS) and not statement.decorator_list
     }
+    for name, module in modules.items():
+        functions |= _methods_of(name, module)
     _give_bound(context, functions)
     sizes = -1
     for _ in range(_MOST_ROUNDS):
@@ -100,6 +105,16 @@ def find_received_values(
             break
         sizes = grown
     return functions
+
+
+def _methods_of(name: str, module: ProjectModule) -> dict[FunctionKey, FunctionUse]:
+    return {
+        (name, f'{of.name}.{each.name}'): FunctionUse(each, is_method=True)
+        for of in module.tree.body
+        if isinstance(of, ast.ClassDef)
+        for each in of.body
+        if isinstance(each, _FUNCTIONS) and not each.decorator_list
+    }
 
 
 def changed_names(function: FunctionNode) -> set[str]:
@@ -144,11 +159,14 @@ def _give_bound(context: CheckContext, functions: Mapping[FunctionKey, FunctionU
             if use is None:
                 continue
             use.bindings.append((node, binding))
+            own = Received(nodes={node.key: None})
+            init = f'{binding.behaviour.class_name}.__init__'
+            maker = functions.get((binding.behaviour.module, init))
+            if maker is not None and maker.names():
+                maker.give(maker.names()[0], own)
             given = message_given(binding)
             messages = Received(messages={given: None}) if given else Received(is_open=True)
-            for name, received in zip(
-                use.names(), (Received(nodes={node.key: None}), messages), strict=False
-            ):
+            for name, received in zip(use.names(), (own, messages), strict=False):
                 use.give(name, received)
 
 
@@ -160,6 +178,10 @@ class _Calls:
     functions: Mapping[FunctionKey, FunctionUse]
 
     def follow(self) -> None:
+        methods: dict[str, list[FunctionUse]] = {}
+        for (_, name), method in self.functions.items():
+            if method.is_method:
+                methods.setdefault(name.rpartition('.')[2], []).append(method)
         for statement in self.module.tree.body:
             own = self.functions.get((self.module.name, getattr(statement, 'name', '')))
             is_own = own is not None and own.definition is statement
@@ -175,6 +197,9 @@ class _Calls:
                     use = self._function(node)
                     if use and isinstance(node.ctx, ast.Load):
                         _open_all(use)
+                    # It may be a method, of whatever object.
+                    for each in methods.get(getattr(node, 'attr', ''), ()):
+                        _open_all(each)
 
     def _known(self, use: FunctionUse) -> dict[str, Received]:
         """Return what the parameters of a function are, without those that it changes.

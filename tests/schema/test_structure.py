@@ -145,10 +145,21 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ('{log_level: 3}', ('bad-value', ONE_OF_LEVELS + '3', None)),
         ('{use_sim_time: 1}', ('wrong-type', 'expected true or false, got 1', None)),
         ('{remap: {a: 1}}', ('wrong-type', 'expected a string, got 1', None)),
-        ('{on_start: tick}', ('bad-value', "expected package.module:function; got 'tick'", None)),
+        (
+            '{on_start: tick}',
+            (
+                'bad-value',
+                "expected package.module:function, or package.module:Class.method; got 'tick'",
+                None,
+            ),
+        ),
         (
             '{on_start: "a:b:c"}',
-            ('bad-value', "expected package.module:function; got 'a:b:c'", None),
+            (
+                'bad-value',
+                "expected package.module:function, or package.module:Class.method; got 'a:b:c'",
+                None,
+            ),
         ),
         ('{on_start: [a:b]}', ('wrong-type', 'expected a string or a mapping, got a list', None)),
         (
@@ -268,7 +279,11 @@ A_TYPE = 'expected a message type in full, as in std_msgs/msg/String; got '
         ),
         (
             '{parameters: {a: {}}}',
-            ('missing-key', "'default' or 'type' is missing in parameter 'a'", None),
+            (
+                'missing-key',
+                "'default' or 'type' or 'command' or 'file' is missing in parameter 'a'",
+                None,
+            ),
         ),
         (
             '{parameters: {a: [[1]]}}',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import sys
 from typing import TYPE_CHECKING, Any, get_args
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.entity_kinds import BehaviourKey
     from composer.language.bindings import Binding
+    from composer.language.specs import BehaviourSpec
     from composer.python_source.modules import FunctionKind, FunctionSource, ModuleSource
 
 # Modules of the standard library with functions that take anything, such as `print`.
@@ -116,12 +118,41 @@ def _check_source(
         )
     elif isinstance(module, MissingModule):
         yield _explain_missing_module(context, binding, module)
-    elif function := module.functions.get(behaviour.function):
+    elif function := module.find_function(behaviour.function):
         for found in check_behaviour_call(context, binding, function.kind, function.signature):
             places = _places_of(module, function)
             yield found.with_related(Related('it is defined here', at) for at in places)
+        yield from _check_constructor(context, behaviour, module)
     elif not module.is_open:
         yield _explain_missing_function(context, binding, module)
+
+
+def _check_constructor(
+    context: CheckContext, behaviour: BehaviourSpec, module: ModuleSource
+) -> Iterator[Diagnostic]:
+    """Check that the class of a method can be made with its node, or without arguments."""
+    of = module.functions.get(behaviour.class_name)
+    signature = of.signature if of and of.class_definition else None
+    if of is None or of.class_definition is None or signature is None:
+        return
+    if not (_binds(signature, 'node') or _binds(signature)):
+        shown = str(signature).replace('=Ellipsis', '=…')
+        yield context.at_value(
+            behaviour.path,
+            'bad-signature',
+            f'{behaviour.class_name}{shown} is made with its node, as '
+            f'{behaviour.class_name}(node), or without arguments',
+            part=behaviour.class_name,
+            related=[Related('it is defined here', module.place_of(of.class_definition.lineno))],
+        )
+
+
+def _binds(signature: inspect.Signature, *arguments: str) -> bool:
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        return False
+    return True
 
 
 def _places_of(module: ModuleSource, function: FunctionSource) -> Iterator[Span]:
@@ -164,6 +195,8 @@ def _explain_missing_function(
     context: CheckContext, binding: Binding, module: ModuleSource
 ) -> Diagnostic:
     behaviour = binding.behaviour
+    if behaviour.class_name:
+        return _explain_missing_method(context, behaviour, module)
     what = module.constants.get(behaviour.function)
     if what:
         return context.at_value(
@@ -178,6 +211,37 @@ def _explain_missing_function(
         f"{behaviour.module} has no function '{behaviour.function}'",
         part=behaviour.function,
         help=_suggest_function(behaviour.function, module),
+    )
+
+
+def _explain_missing_method(
+    context: CheckContext, behaviour: BehaviourSpec, module: ModuleSource
+) -> Diagnostic:
+    owner = module.functions.get(behaviour.class_name)
+    of = owner.class_definition if owner else None
+    if of is None:
+        classes = [name for name, each in module.functions.items() if each.class_definition]
+        return context.at_value(
+            behaviour.path,
+            'unknown-behaviour',
+            f"{behaviour.module} has no class '{behaviour.class_name}'",
+            part=behaviour.class_name,
+            help=suggest(behaviour.class_name, classes, 'it has', 'it has no classes'),
+        )
+    methods = [
+        each.name for each in of.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)
+    ]
+    return context.at_value(
+        behaviour.path,
+        'unknown-behaviour',
+        f"the class '{behaviour.class_name}' has no method '{behaviour.method_name}'",
+        part=behaviour.method_name,
+        help=suggest(
+            behaviour.method_name,
+            [each for each in methods if each[0] != '_'],
+            'it has',
+            'it has no methods',
+        ),
     )
 
 

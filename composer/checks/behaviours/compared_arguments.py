@@ -38,7 +38,7 @@ def check_compared_arguments(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _read_pairs(context: CheckContext, behaviour: BehaviourSpec) -> set[tuple[str, str]]:
     module = context.modules.find(behaviour.module)
-    source = module.functions.get(behaviour.function) if isinstance(module, ModuleSource) else None
+    source = module.find_function(behaviour.function) if isinstance(module, ModuleSource) else None
     return _compared_pairs(source.definition) if source and source.definition else set()
 
 

@@ -102,7 +102,7 @@ class _Walk:
         if isinstance(module, MissingModule) or key in self._visited:
             return
         self._visited.add(key)
-        source = module.functions.get(behaviour.function)
+        source = module.find_function(behaviour.function)
         definition = source.definition if source else None
         for statement in definition.body if definition else ():
             if not isinstance(statement, _PLAIN):

@@ -82,12 +82,15 @@ def _check_names(
     for name, node in context.spec.nodes.items():
         # A behaviour may declare parameters with rclpy.
         is_open = any(reading.reaches_ros for _, reading in uses[name])
+        created = {(each.kind, each.name) for _, read in uses[name] for each in read.created}
         used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
             known = declared[binding.behaviour.name]
             sought = {each.name for each in reading.uses if each.is_change and each.has_default}
             for use in reading.uses:
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
+                    continue
+                if (use.kind, use.name) in created or (use.kind, None) in created:
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue

@@ -49,7 +49,7 @@ def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _find_problems(context: CheckContext, behaviour: BehaviourSpec, wire: Wire) -> Iterator[str]:
     module = context.modules.find(behaviour.module)
-    source = isinstance(module, ModuleSource) and module.functions.get(behaviour.function)
+    source = isinstance(module, ModuleSource) and module.find_function(behaviour.function)
     if not isinstance(module, ModuleSource) or not source or source.definition is None:
         return
     yield from _check_parameters(context, wire, module, source.definition)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from composer.checks.connections.cycles import find_knots, find_way
 from composer.checks.connections.wait_conditions import StartOrder
 from composer.diagnostics import Related
-from composer.entity_kinds import KIND_OF_NOUN
+from composer.entity_kinds import KIND_OF_NOUN, TRANSITION_BEHAVIOURS
 from composer.language.specs import REENTRANT, ActionClientSpec, ActionSpec, NodeSpec
 from composer.records import record
 
@@ -188,6 +188,8 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
             when = f"after the {part} of node '{server.name}'"
         elif hook == 'on_stop' and is_own:
             when = 'until on_stop'
+        elif hook in TRANSITION_BEHAVIOURS and is_own:
+            when = 'while the node is active'
         else:
             continue
         help_text = 'put that node before this one'
@@ -205,7 +207,9 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
 
 _HOOK_HELP = {
     'on_start': 'call it in a timer, which runs when all nodes have started',
-    'on_stop': 'call what the service does as a plain function',
+    **dict.fromkeys(
+        ('on_stop', *TRANSITION_BEHAVIOURS), 'call what the service does as a plain function'
+    ),
 }
 
 

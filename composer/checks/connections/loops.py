@@ -111,7 +111,7 @@ def _always_answers(context: CheckContext, behaviour: BehaviourSpec) -> bool:
     module = context.modules.find(behaviour.module)
     if not isinstance(module, ModuleSource):
         return False
-    source = module.functions.get(behaviour.function)
+    source = module.find_function(behaviour.function)
     if source is None or source.definition is None:
         return False
     kinds = (FunctionKind.PLAIN, FunctionKind.COROUTINE)

@@ -6,11 +6,17 @@ Jazzy does not remap the names of actions, only those of the topics and services
 
 from __future__ import annotations
 
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.ament import remaps_actions
-from composer.entity_kinds import CHANNEL_KINDS, KIND_OF_SECTION, ChannelKind, EntityKind
+from composer.entity_kinds import (
+    CHANNEL_KINDS,
+    KIND_OF_NOUN,
+    KIND_OF_SECTION,
+    ChannelKind,
+    EntityKind,
+)
 from composer.language.specs import DeclaredEndSpec, NodeSpec
 from composer.names import expand_name, find_namespace_problem, find_topic_name_problem, remap_name
 from composer.records import record
@@ -18,6 +24,7 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    from composer.inference.reading import CreatedEntity
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import (
         ComponentSpec,
@@ -147,6 +154,7 @@ class Topology:
         ros_services: The services that ROS itself gives to the nodes: their types by full names.
         possible: Ends that channels may have as well: their names depend on an argument that is
             not given yet, or they are missing or misnamed because of another error.
+        created: The channels of ends that behaviours create, and whether these provide.
         left_out: The channels of nodes and entities that are left out by their `when`.
     """
 
@@ -154,6 +162,7 @@ class Topology:
     ros_services: Mapping[str, str]
     possible: frozenset[PossibleEnd]
     left_out: frozenset[tuple[ChannelKind, str]]
+    created: set[tuple[ChannelKind, str, bool]] = field(default_factory=set)
 
     def of_kind(self, kind: ChannelKind) -> Iterator[Channel]:
         """Yield the channels of a kind."""
@@ -181,8 +190,25 @@ class Topology:
     def may_have_more(self, channel: Channel) -> bool:
         """Return whether the end that a channel lacks may be one of the possible ones."""
         is_provider = not channel.providers
+        if (channel.kind, channel.name, is_provider) in self.created:
+            return True
         types = (None, *(end.entity.type for end in channel.ends))
         return any((channel.kind, is_provider, type_) in self.possible for type_ in types)
+
+
+def add_created(topology: Topology, node: NodeSpec, created: Iterable[CreatedEntity]) -> Topology:
+    """Return a topology with what a behaviour of a node creates."""
+    possible = set(topology.possible)
+    for each in created:
+        kind = KIND_OF_NOUN[each.kind]
+        if kind.channel is None:
+            continue
+        if each.channel is None:
+            possible.add((kind.channel, kind.provides, each.type))
+        else:
+            name = full_name(node, kind.channel, each.channel)
+            topology.created.add((kind.channel, name, kind.provides))
+    return replace(topology, possible=frozenset(possible))
 
 
 def build_topology(

@@ -38,6 +38,7 @@ _SEPARATORS = re.compile(r'[/_]')
 _SHORTEST = 4
 # Two letters in the wrong order are a slip in these, too: `/cmd_vle`.
 _SHORTEST_SWAPPED = 3
+_MIDDLING = 6
 _LONG = 8
 # More names than these are not compared one by one.
 _MOST_COMPARED = 2_000
@@ -65,13 +66,39 @@ def find_typo(word: str, options: Iterable[str]) -> str | None:
     return None
 
 
+def is_slip(name: str, other: str) -> bool:
+    """Return whether one of two names, whose ends both lack another end, may mean the other.
+
+    More differences than in `find_typo` are slips then: an end would fit, and nothing else does.
+    """
+    words, others = _SEPARATORS.split(name), _SEPARATORS.split(other)
+    if len(words) != len(others):
+        # A lost underscore, as in `cmdvel`.
+        last, near = (each.replace('_', '') for each in (name, other))
+        return last == near
+    pairs = [pair for pair in zip(words, others, strict=True) if pair[0] != pair[1]]
+    if len(pairs) != 1 or _digits(pairs[0][0]) != _digits(pairs[0][1]):
+        return False
+    if _has_prefix(*pairs[0]):
+        return False
+    shortest = min(map(len, pairs[0]))
+    most = 0 if shortest < _SHORTEST_SWAPPED else 1 if shortest < _MIDDLING else 2
+    return count_edits(*(word.lower() for word in pairs[0])) <= most
+
+
 def _is_typo(word: str, other: str) -> bool:
     shortest = min(len(word), len(other))
-    if _digits(word) != _digits(other):
+    if _digits(word) != _digits(other) or _has_prefix(word, other):
         return False
     if shortest < _SHORTEST:
         return shortest >= _SHORTEST_SWAPPED and _is_swapped(word, other)
     return count_edits(word.lower(), other.lower()) <= (2 if len(word) >= _LONG else 1)
+
+
+def _has_prefix(word: str, other: str) -> bool:
+    """Return whether one is the other after a letter, which makes another word: `estop`."""
+    short, long = sorted((word, other), key=len)
+    return long[1:] == short and long[:1] != short[:1]
 
 
 def _is_swapped(word: str, other: str) -> bool:
@@ -120,7 +147,8 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     system, topology = context.system, context.topology
     specs = [context.spec, *([system.unused] if system.unused else [])]
     present: dict[str, set[str]] = {'topic': set(), 'service': set(), 'action': set()}
-    for kind, name in (*topology.channels, *topology.left_out):
+    created = ((kind, name) for kind, name, _ in topology.created)
+    for kind, name in (*topology.channels, *topology.left_out, *created):
         present[kind].add(name)
     present['service'] |= topology.ros_services.keys()
     present['node'] = {node.full_name for spec in specs for node in spec.nodes.values()}
@@ -223,7 +251,7 @@ def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
 def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
     """Return whether a node may have topics and services that the file does not show."""
     return node.path in context.incomplete or any(
-        each.reaches_ros for each in context.readings(node)
+        each.reaches_ros or each.created for each in context.readings(node)
     )
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import OF_ACTIONS, TOPICS_OF_ROS, is_misnamed
-from composer.checks.connections.typos import find_typo
+from composer.checks.connections.typos import find_typo, is_slip
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
                 near = partners.nearest(channel, end)
                 # A program may well publish what nobody here needs.
                 is_missed = is_known and not (end.is_declared and end.kind.provides)
-                if not (is_missed or (near and find_typo(channel.name, [near]))):
+                if not (is_missed or (near and _is_likely(context, end, channel, near))):
                     continue
                 yield _explain(context, channel, end, near, *end.kind.unmatched)
 
@@ -45,6 +45,16 @@ def _knows_all_ends(context: CheckContext) -> bool:
     processes = context.spec.processes.values()
     lost = any(path[:1] == ('processes',) for path in context.system.dropped)
     return not lost and all(process.declares_all_ends for process in processes)
+
+
+def _is_likely(context: CheckContext, end: Endpoint, channel: Channel, near: str) -> bool:
+    """Return whether a name means another one, although a program may have an end of that name."""
+    other = context.topology.channels[channel.kind, near]
+    # What one node hears and publishes may well be called alike: `scan` and `scans`.
+    if any(each.node is end.node for each in other.ends):
+        return False
+    is_typo = find_typo(channel.name, [near]) is not None
+    return is_typo or (_is_alone(context, other) and is_slip(channel.name, near))
 
 
 def _is_alone(context: CheckContext, channel: Channel) -> bool:

@@ -7,10 +7,11 @@ import os
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import Diagnostic
+from composer.diagnostics import Diagnostic, has_errors
 from composer.entity_kinds import WORK_KEYS
 from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, read_file
 from composer.language.pipeline import load_system
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.values.start_reader import StartValueReader
 
 _STANDARD_INPUT = '-'
 _SUFFIXES = ('.yaml', '.yml')
@@ -121,18 +123,37 @@ def load_given(
     words: Sequence[str] | None = None,
     set_values: Sequence[str] = (),
     before: LoadedSystem | None = None,
+    reader: StartValueReader | None = None,
 ) -> LoadedSystem:
     """Return the system that a command line gives: a file, its layers and arguments.
 
     Args:
         before: A system whose records are kept where the data are the same.
+        reader: Reads the values that are known when the system starts, if the file has no errors;
+            `None` for samples.
 
     Raises:
         UsageError: The words or the values to set do not fit the file.
+        StartValueError: A value that is known when the system starts cannot be read.
     """
+    load = create_loader(paths, words, set_values, before)
+    system = load()
+    if reader is None or not system.start.found or has_errors(system.diagnostics):
+        return system
+    return load(read_value=reader.read)
+
+
+def create_loader(
+    paths: Sequence[Path],
+    words: Sequence[str] | None = None,
+    set_values: Sequence[str] = (),
+    before: LoadedSystem | None = None,
+) -> partial[LoadedSystem]:
+    """Return what loads a system as often as it is called; see `load_given`."""
     path, text = read_standard_input(paths[0])
-    layers = paths[1:]
-    return load_system(path, words, layers=layers, set_values=set_values, text=text, before=before)
+    return partial(
+        load_system, path, words, layers=paths[1:], set_values=set_values, text=text, before=before
+    )
 
 
 def read_standard_input(path: Path, name: str = '<stdin>') -> tuple[Path, bytes | None]:

@@ -90,6 +90,8 @@ class ImportCheck:
 
 def _shape_of(function: Callable[..., Any]) -> _Shape:
     """Return how a function runs, and how it is called."""
+    if isinstance(function, behaviours.Method):
+        function = function.stand_in()
     # What a wrapper returns may be something else than what it wraps.
     kind = None if hasattr(function, '__wrapped__') else behaviours.kind_of(function)
     return kind, behaviours.signature_of(function)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
-from composer.cli.common.file_selection import load_given
+from composer.cli.common.file_selection import create_loader
 from composer.cli.common.import_check import import_behaviours
 from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.paths import PathError, resolve_path
+from composer.language.values.start_reader import StartValueReader
+from composer.language.values.start_values import list_named_files
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -35,11 +38,13 @@ class SystemReader:
         paths: The file and its layers.
         words: Values for the arguments that the file declares.
         set_values: Values to change.
+        reader: Reads the values that are known when the system starts.
     """
 
     paths: Sequence[Path]
     words: Sequence[str]
     set_values: Sequence[str]
+    reader: StartValueReader = field(default_factory=StartValueReader)
 
     def check(self, report: Report = show_findings) -> CheckContext | None:
         """Return a system without errors; `None` if there are errors.
@@ -64,11 +69,18 @@ class SystemReader:
 
         Raises:
             UsageError: The arguments do not fit the file.
+            StartValueError: A value that is known when the system starts cannot be read.
         """
         system_before = before.system if before else None
-        system = load_given(self.paths, self.words, self.set_values, system_before)
+        load = create_loader(self.paths, self.words, self.set_values, system_before)
+        system = load()
         context = create_context(system, InterfaceCatalogue(), before)
         findings = check_in_context(system, context)
+        if system.start.found and not has_errors(findings):
+            # No command is run for a system with errors.
+            system = load(read_value=self.reader.read)
+            context = create_context(system, InterfaceCatalogue(), before)
+            findings = check_in_context(system, context)
         named = list_files(context) if context else {*system.files, *system.named}
         return context, [*self.paths, *named], findings
 
@@ -98,6 +110,7 @@ def list_files(context: CheckContext) -> set[Path]:
     """Return the files that a system is read from, and those that it lacks."""
     spec = context.spec
     files = {*context.system.files, *context.system.named, *context.modules.list_files()}
+    files |= list_named_files(context.system.start.found)
     named = [
         *(each.parameter_files for each in spec.nodes.values()),
         *(each.parameter_files for each in spec.processes.values()),

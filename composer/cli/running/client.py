@@ -46,6 +46,8 @@ class Client:
 
     Attributes:
         domain_id: The ROS domain that it is in.
+        node: The node itself.
+        executor: The one that the node is in; it runs while it is waited for something.
 
     Raises:
         RosNotFoundError: There is no rclpy, or no std_srvs.
@@ -72,7 +74,7 @@ class Client:
         context.init([], initialize_logging=False)
         self._exit.callback(context.try_shutdown)
         self.domain_id: int = context.get_domain_id()
-        self._node = Node(
+        self.node = Node(
             f'_composer_client_{os.getpid()}',
             context=context,
             use_global_arguments=False,
@@ -80,10 +82,10 @@ class Client:
             start_parameter_services=False,
             parameter_overrides=[Parameter('start_type_description_service', value=False)],
         )
-        self._exit.callback(self._node.destroy_node)
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(self._node)
-        self._exit.callback(self._executor.shutdown)
+        self._exit.callback(self.node.destroy_node)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+        self._exit.callback(self.executor.shutdown)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -128,11 +130,11 @@ class Client:
 
     @contextmanager
     def _client(self, service: Any, name: str) -> Iterator[Any]:
-        client = self._node.create_client(service, name)
+        client = self.node.create_client(service, name)
         try:
             yield client
         finally:
-            self._node.destroy_client(client)
+            self.node.destroy_client(client)
 
     def _call(self, client: Any, request: Any, system: RunningSystem, timeout_sec: float) -> Any:
         deadline = time.monotonic() + timeout_sec
@@ -141,7 +143,7 @@ class Client:
             raise ComposerError(message)
         future = client.call_async(request)
         while not future.done():
-            self._executor.spin_until_future_complete(future, _LOOK_SEC)
+            self.executor.spin_until_future_complete(future, _LOOK_SEC)
             if future.done():
                 break
             if not client.service_is_ready():
@@ -156,19 +158,19 @@ class Client:
         """Call services, all at the same time; return their messages, `None` for no answer."""
         from std_srvs.srv import Trigger
 
-        clients = [self._node.create_client(Trigger, name) for name in services]
+        clients = [self.node.create_client(Trigger, name) for name in services]
         wait_until(lambda: all(each.service_is_ready() for each in clients), STATUS_SEC)
         calls = [each.call_async(Trigger.Request()) for each in clients]
         deadline = time.monotonic() + STATUS_SEC
         for call in calls:
-            self._executor.spin_until_future_complete(call, max(0.0, deadline - time.monotonic()))
+            self.executor.spin_until_future_complete(call, max(0.0, deadline - time.monotonic()))
         for client in clients:
-            self._node.destroy_client(client)
+            self.node.destroy_client(client)
         return [call.result().message if call.done() else None for call in calls]
 
     def list_services(self) -> list[str]:
         """Return the full names of all services on the graph."""
-        return [name for name, _ in self._node.get_service_names_and_types()]
+        return [name for name, _ in self.node.get_service_names_and_types()]
 
 
 def wait_until(condition: Callable[[], bool], timeout_sec: float) -> bool:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
 
 _LONGEST_SEC = 60.0
+_ANSWER_SEC = 5.0
 
 _system = click.argument('system', required=False)
 _timeout = click.option(
@@ -123,4 +126,53 @@ def logs_command(system: str | None, *, follows: bool) -> int:
     return show_logs(system, follows=follows)
 
 
-COMMANDS = (ps_command, top_command, logs_command, reload_command, restart_command, down_command)
+@click.command('capture')
+@click.argument('nodes', nargs=-1, metavar='[NODE]...')
+@click.option(
+    '-o',
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar='FILE',
+    help='The file to write. Default: standard output.',
+)
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(['yaml', 'nodl', 'nodl-xml']),
+    default='yaml',
+    show_default=True,
+    help='What to write: processes of a system, or a NoDL document.',
+)
+@click.option(
+    '--timeout',
+    'timeout_sec',
+    type=click.FloatRange(min=0, min_open=True),
+    default=_ANSWER_SEC,
+    show_default=True,
+    metavar='SEC',
+    help='How long nodes may take to say which parameters they have.',
+)
+def capture_command(
+    nodes: tuple[str, ...], output: Path | None, format_name: str, timeout_sec: float
+) -> int:
+    """Write down what the nodes on this ROS graph have.
+
+    Each NODE, or all nodes, with publishers, subscriptions, services, clients and actions, their
+    types and QoS, and with parameters: to paste under `processes:`, so that `composer check`
+    knows what they have. NODE is a full name, or what follows the last slash of it. If a node
+    does not say its parameters, the exit code is 1.
+    """
+    from composer.cli.running.capture import capture
+
+    return capture(nodes, format_name=format_name, output=output, timeout_sec=timeout_sec)
+
+
+COMMANDS = (
+    capture_command,
+    ps_command,
+    top_command,
+    logs_command,
+    reload_command,
+    restart_command,
+    down_command,
+)

@@ -84,6 +84,11 @@ def _notes(system: RunningSystem) -> list[str]:
     told = {
         'health': (status['health'] or {}).get('message', ''),
         'last reload': status['last_error'],
+        'not active': ', '.join(
+            f'{node} is {state}'
+            for node, state in status['lifecycles'].items()
+            if state != 'active'
+        ),
     }
     texts = {key: escape(' '.join(text.split())) for key, text in told.items() if text}
     return [f'{escape(system.name)}: {key}: {text[:_LONGEST_NOTE]}' for key, text in texts.items()]

@@ -58,6 +58,9 @@ NODE_METHODS = frozenset(
     {
         'call',
         'call_async',
+        *('create_client', 'create_publisher', 'create_service', 'create_subscription'),
+        'create_timer',
+        'destroy',
         'get_parameters',
         'now',
         'publish',

@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING
 from composer.entity_kinds import KIND_OF_NOUN
 from composer.inference.current_run import name_place, span_of
 from composer.inference.evaluation.part import Part
-from composer.inference.reading import SENDING_METHODS, RemoteParameter
+from composer.inference.reading import (
+    CREATING_METHODS,
+    SENDING_METHODS,
+    CreatedEntity,
+    RemoteParameter,
+)
 from composer.inference.values import (
     BY_PARAMETER,
     CHOSEN,
+    NODE,
     NONE,
     UNKNOWN,
     Alternatives,
@@ -22,6 +28,7 @@ from composer.inference.values import (
     Instance,
     Mapping,
     Message,
+    MessageClass,
     PartOfNode,
     Place,
     Scalar,
@@ -50,6 +57,8 @@ class NodeCalls(Part):
             return PartOfNode('time')
         if method in ('set_parameters', 'get_parameters'):
             return self._call_parameters(method, arguments)
+        if method in CREATING_METHODS:
+            return self._create(method, arguments)
         if method not in SENDING_METHODS:
             return UNKNOWN
         kind = SENDING_METHODS[method]
@@ -90,6 +99,41 @@ class NodeCalls(Part):
             results.append(result)
         found = join(results)
         return Awaitable(found) if method == 'call_async' else found
+
+    def _create(self, method: str, arguments: Arguments) -> Value:
+        """Note the entity that a call creates, and read its behaviour."""
+        run = self._evaluator.run
+        noun, position = CREATING_METHODS[method]
+        kind = KIND_OF_NOUN[noun]
+        of_type = arguments.get(0, 'msg_type') or arguments.get(0, 'srv_type')
+        type_name = None
+        if kind.channel and of_type is not None:
+            type_name = _type_named(of_type.value)
+        channel = arguments.get(1, 'topic') or arguments.get(1, 'srv_name')
+        if kind.channel and channel is not None:
+            run.decide(channel.value)
+            asked = dict(arguments.named).get('name', channel)
+            names = _texts(asked.value)
+            texts = _texts(channel.value)
+            if is_chosen(channel.value):
+                # A parameter may have another value than the file gives it.
+                texts.append(None)
+            for text in texts:
+                for name in names if len(names) == 1 else [None]:
+                    run.reading.created.append(CreatedEntity(noun, name, text, type_name))
+        behaviour = None if position is None else arguments.get(position, 'behaviour')
+        if behaviour is not None:
+            given: list[Value] = [NODE]
+            if kind.channel:
+                part = '_Request' if kind.channel == 'service' else ''
+                given.append(Message(f'{type_name}{part}') if type_name else UNKNOWN)
+            called = Arguments(tuple(Argument(each, behaviour.place) for each in given))
+            with run.condition():
+                self._evaluator.calls.invoke(behaviour.value, called, behaviour.place, waits=False)
+        for argument in arguments.all():
+            if argument is not behaviour:
+                self._evaluator.escape(argument.value)
+        return UNKNOWN
 
     def call_goal(self, owner: PartOfNode, method: str, place: Place, *, waits: bool) -> Value:
         """Return what a method of a goal may return."""
@@ -269,6 +313,22 @@ class NodeCalls(Part):
                 run.reading.open_kinds.add('parameter')
                 found.append(UNKNOWN)
         return join(found)
+
+
+def _type_named(value: Value) -> str | None:
+    """Return the full name of the interface type that a value is, if that is known."""
+    if isinstance(value, MessageClass):
+        return value.type
+    known = isinstance(value, Constant) and isinstance(value.value, str)
+    return value.value if known else None  # type: ignore[union-attr]
+
+
+def _texts(value: Value) -> list[str | None]:
+    """Return the texts that a value may be; `None` is any."""
+    return [
+        each.value if isinstance(each, Constant) and isinstance(each.value, str) else None
+        for each in alternatives(value)
+    ]
 
 
 def _kind_of(value: Value) -> type | None:

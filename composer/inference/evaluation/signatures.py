@@ -13,6 +13,12 @@ if TYPE_CHECKING:
 _SIGNATURES: dict[tuple[str, str], str] = {
     ('node', 'call'): 'name, payload=None, timeout=5.0',
     ('node', 'call_async'): 'name, payload=None, timeout=5.0',
+    ('node', 'create_client'): 'srv_type, srv_name, **options',
+    ('node', 'create_publisher'): 'msg_type, topic, qos=None, **options',
+    ('node', 'create_service'): 'srv_type, srv_name, behaviour, **options',
+    ('node', 'create_subscription'): 'msg_type, topic, behaviour, qos=None, **options',
+    ('node', 'create_timer'): 'period, behaviour, **options',
+    ('node', 'destroy'): 'entity',
     ('node', 'get_parameters'): 'node_name, names, timeout=5.0',
     ('node', 'now'): '',
     ('node', 'publish'): 'name, payload',

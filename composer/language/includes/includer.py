@@ -18,6 +18,7 @@ from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
 from composer.language.loaded_system import LoadedSystem
+from composer.language.values.start_values import StartValues
 from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
@@ -147,6 +148,7 @@ class Includer:
             entry.report('too-deep', message)
             return None
         part = LoadedSystem.of(self._document(path, real), path)
+        part.start = StartValues() if is_left_out else entry.system.start
         if 'version' not in part.entries and not may_show_lines(real):
             # What is wrong with it would tell what is in it.
             message = f"'{entry.file}' is not a system, and lies outside of the project"

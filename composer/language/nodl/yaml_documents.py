@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath
 
-_SECTIONS = {
+SECTIONS = {
     'publishers': 'publishers',
     'subscriptions': 'subscriptions',
     'service_servers': 'services',
@@ -28,9 +28,9 @@ _SECTIONS = {
     'action_servers': 'actions',
     'action_clients': 'action_clients',
 }
-_KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *_SECTIONS)
+_KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *SECTIONS)
 _POLICIES = ('history', 'depth', 'reliability', 'durability', 'liveliness')
-_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
+DURATION_KEYS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 _SCALARS = ('int', 'double', 'string')
 # Of a parameter for each of several things, whose names another parameter has.
 _MAPPED = '__map_'
@@ -65,7 +65,7 @@ class _Reader:
             if key not in _KEYS:
                 help_text = suggest(key, _KEYS, 'the keys are')
                 self._node.report(positions.key((key,)), f"NoDL has no key '{key}'", help_text)
-        for key, section in _SECTIONS.items():
+        for key, section in SECTIONS.items():
             for index, end in enumerate(_list(data.get(key))):
                 self._add_end(document, section, end, (key, index))
         self._add_parameters(document)
@@ -97,12 +97,12 @@ class _Reader:
                 policies[key] = value.lower()
             elif key == 'depth' and type(value) is int and value > 0:
                 policies[key] = value
-            elif key != name and name in _DURATIONS and type(value) is int and value >= 0:
+            elif key != name and name in DURATION_KEYS and type(value) is int and value >= 0:
                 # 0 is no limit.
                 policies |= {name: value / NANOSECONDS} if value else {}
             else:
                 place = document.positions.value((*at, key))
-                known = [*_POLICIES, *(f'{each}_ns' for each in _DURATIONS)]
+                known = [*_POLICIES, *(f'{each}_ns' for each in DURATION_KEYS)]
                 help_text = None if key in known else suggest(key, known, 'the policies are')
                 self._node.report(place, f"'{key}: {value}' is no QoS of NoDL", help_text)
         return policies

@@ -40,6 +40,11 @@ def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
     }
 
 
+def parse_entity(section: str, node: Data, name: str, data: Any, path: DataPath) -> Any:
+    """Return the spec of one entity of a node."""
+    return _PARSERS[section](node, name, data, path)
+
+
 class RunOptions(TypedDict):
     """Options of an entity with behaviours: its own, or those of its node."""
 
@@ -106,6 +111,7 @@ def _parse_subscription(node: Data, name: str, data: Data, path: DataPath) -> Su
         publish=data.get('publish'),
         group=data.get('group'),
         read_only=data.get('read_only', False),
+        while_inactive=data.get('while_inactive'),
         external=data.get('external', False),
         path=path,
         **parse_run_options(data, node),
@@ -134,6 +140,7 @@ def _parse_service(node: Data, name: str, data: Data, path: DataPath) -> Service
         qos=parse_entity_qos(data, path, is_service=True),
         behaviour=behaviour_at(data, path),
         group=data.get('group'),
+        while_inactive=data.get('while_inactive'),
         local_delivery=_allows_local_delivery(data, node),
         path=path,
         **parse_run_options(data, node),

@@ -122,6 +122,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         on_demand=False,
         nodes=(*nodes, *map(declare_component, components.values())),
         declares_all_ends=declares_all_ends and not components,
+        lifecycle=data.get('lifecycle'),
         components=components,
         external=data.get('external', False),
         path=path,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import marshal
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from composer.language.specs import (
     QosSpec,
     SystemSpec,
 )
+from composer.language.values.start_values import StartValues, fill_start_values
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_ENTITIES = 4
+_BOND = 'bond'
+_PACKAGES = Path(__file__).parents[2] / 'interfaces' / 'packages'
 # The last version in which equal data are written alike, whoever else holds them.
 _MARSHAL_VERSION = 2
 
@@ -57,9 +61,12 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
             if section in ('nodes', 'processes'):
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
         _leave_out_entities(system, used, unused)
-        system.unused = parse_system(unused, name)
+        samples = StartValues()
+        filled = fill_start_values(unused, system.positions, samples, system.sampled_unused)
+        system.unused = parse_system(filled, name)
     system.data = used
-    system.spec = parse_system(used, name, before)
+    system.filled = fill_start_values(used, system.positions, system.start, system.sampled)
+    system.spec = parse_system(system.filled, name, before)
 
 
 def _leave_out_entities(
@@ -89,6 +96,9 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
     interfaces = data.get('interfaces', {})
     if any(map(is_container, data.get('processes', {}).values())):
         interfaces = {LOADING_PACKAGE: str(LOADING_DEFINITIONS)} | interfaces
+    if any(node.get('bond') for node in data.get('nodes', {}).values()):
+        # It is on no package index.
+        interfaces = {_BOND: str(_PACKAGES / _BOND)} | interfaces
     return SystemSpec(
         name=name,
         description=data.get('description', ''),
@@ -127,7 +137,7 @@ def _keeping(
     if before is None or before.spec is None:
         return parse
     specs: Mapping[str, Spec] = getattr(before.spec, section)
-    written = before.entries.get(section, {})
+    written = before.filled.get(section, {})
 
     def parse_changed(name: str, data: Any, path: DataPath) -> Spec:
         known = specs.get(name)

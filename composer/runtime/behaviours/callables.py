@@ -9,10 +9,12 @@ import threading
 import traceback
 from contextlib import contextmanager
 from functools import partial
+from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
 from composer.python_source.modules import FunctionKind
+from composer.records import record
 from composer.runtime.behaviours.tracebacks import summarize
 
 if TYPE_CHECKING:
@@ -59,6 +61,8 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
             be called.
     """
     module = import_module(spec.module)
+    if spec.class_name:
+        return _import_method(module, spec)
     function = getattr(module, spec.function, None)
     if function is None:
         message = f"{spec.module} has no function '{spec.function}'"
@@ -69,12 +73,59 @@ def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
     return function  # type: ignore[no-any-return]
 
 
+@record
+class Method:
+    """A method of a class of which each node has one instance.
+
+    It stands in the table of a system's behaviours; a node calls that of its own instance.
+    """
+
+    owner: type
+    name: str
+
+    def __call__(self, *_arguments: Any, **_named: Any) -> Any:
+        """Refuse: only an instance has something to call."""
+        message = f'{self.owner.__qualname__}.{self.name} has no instance'
+        raise TypeError(message)
+
+    def of(self, instance: object) -> Callable[..., Any]:
+        """Return it as a function of an instance."""
+        return getattr(instance, self.name)  # type: ignore[no-any-return]
+
+    def stand_in(self) -> Callable[..., Any]:
+        """Return a function that is called, and runs, as that of an instance."""
+        found = inspect.getattr_static(self.owner, self.name)
+        is_bound = inspect.isfunction(found)
+        return MethodType(found, self.owner) if is_bound else getattr(self.owner, self.name)
+
+
+def make_instance(owner: type, node: Any) -> Any:
+    """Return an instance of a class, made with its node if it takes that."""
+    signature = signature_of(owner)
+    try:
+        takes_node = signature is not None and bool(signature.bind(node))
+    except TypeError:
+        takes_node = False
+    return owner(node) if takes_node else owner()
+
+
+def _import_method(module: ModuleType, spec: BehaviourSpec) -> Callable[..., Any]:
+    owner = getattr(module, spec.class_name, None)
+    if not isinstance(owner, type):
+        message = f"{spec.module} has no class '{spec.class_name}'"
+        raise BehaviourImportError(message)
+    if not callable(getattr(owner, spec.method_name, None)):
+        message = f"{spec.module}:{spec.class_name} has no method '{spec.method_name}'"
+        raise BehaviourImportError(message)
+    return Method(owner, spec.method_name)
+
+
 _ANY = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 
 def kind_of(function: Callable[..., Any]) -> FunctionKind:
     """Return how a function runs; of an object with `__call__`, how that does."""
-    target: Any = inspect.unwrap(function)
+    target: Any = inspect.unwrap(_called(function))
     while isinstance(target, partial):
         target = inspect.unwrap(target.func)
     if not inspect.isroutine(target) and not inspect.isclass(target):
@@ -88,6 +139,7 @@ def kind_of(function: Callable[..., Any]) -> FunctionKind:
 
 def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
     """Return a function's signature; `None` for functions of C that have none."""
+    function = _called(function)
     try:
         own = inspect.signature(function, follow_wrapped=False)
         # A wrapper that takes whatever comes passes it on.
@@ -95,6 +147,10 @@ def signature_of(function: Callable[..., Any]) -> inspect.Signature | None:
         return inspect.signature(function) if own.parameters and passes_on else own
     except (TypeError, ValueError):
         return None
+
+
+def _called(function: Callable[..., Any]) -> Callable[..., Any]:
+    return function.stand_in() if isinstance(function, Method) else function
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from composer.planning.snapshot_data import encode_snapshot
+from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.control.protocol import VERSION
 from composer.runtime.health.system_state import Outcome
 
@@ -65,7 +66,11 @@ def top_answer(
                 _describe_entity(key, report, has_cpu=latest.has_cpu)
                 for key, report in latest.by_entity.items()
             ]
-            + [_describe_delivery(key, each) for key, each in deliveries.items()],
+            + [_describe_delivery(key, each) for key, each in deliveries.items()]
+            + [
+                _describe_figureless((node, Owner('lifecycle', each)), None, '')
+                for node, each in state.find_lifecycles().items()
+            ],
         }
     )
 
@@ -118,6 +123,10 @@ def _describe_entity(key: EntityKey, report: EntityReport, *, has_cpu: bool) -> 
 
 
 def _describe_delivery(key: EntityKey, delivery: Delivery) -> dict[str, Any]:
+    return _describe_figureless(key, delivery.way, delivery.reason)
+
+
+def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[str, Any]:
     node, owner = key
     unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
     none = ('calls', 'errors', 'dropped', 'late', 'skipped')
@@ -130,8 +139,8 @@ def _describe_delivery(key: EntityKey, delivery: Delivery) -> dict[str, Any]:
         'message': '',
         **dict.fromkeys(unknown),
         **dict.fromkeys(none, 0),
-        'delivery': delivery.way,
-        'delivery_reason': delivery.reason,
+        'delivery': way,
+        'delivery_reason': reason,
     }
 
 

@@ -225,7 +225,8 @@ class _Execution:
 
     def is_ending(self) -> bool:
         """Return whether goals are neither accepted nor continued."""
-        return self._node.system.stop.is_set or not self._node.gate.serves
+        gate = self._node.gate
+        return self._node.system.stop.is_set or not gate.serves or gate.rests
 
     def _run_function(self, goal: Any, _progress: Progress) -> Any:
         return self._succeed(goal, self._begin(goal.request))

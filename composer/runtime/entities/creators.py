@@ -37,6 +37,10 @@ CREATORS: dict[str, Callable[[LiveNode, Any], LiveEntity]] = {
 }
 
 
+# Instances of classes of behaviours are made before these, and find all that they may use.
+_FIRST_WITH_BEHAVIOURS = 'action_clients'
+
+
 def create_entities(nodes: Sequence[LiveNode]) -> None:
     """Create all that nodes declare, one kind of entity after the other.
 
@@ -50,10 +54,18 @@ def create_entities(nodes: Sequence[LiveNode]) -> None:
         with _failing_for(node):
             node.parameters = NodeParameters(node)
     for section, create in CREATORS.items():
+        for node in nodes if section == _FIRST_WITH_BEHAVIOURS else ():
+            with _failing_for(node):
+                node.make_instances()
         for node in nodes:
             with _failing_for(node):
                 for spec in getattr(node.spec, section).values():
                     node.entities[section][spec.name] = create(node, spec)
+    for node in nodes:
+        with _failing_for(node):
+            # Last, for its class to find all that it may use.
+            if node.parameters is not None:
+                node.parameters.ask(node.spec.on_parameters)
 
 
 def create_entity(node: LiveNode, section: str, spec: Any) -> LiveEntity:

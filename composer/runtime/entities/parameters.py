@@ -54,7 +54,6 @@ class NodeParameters:
         node.ros.add_post_set_parameters_callback(self._note)
         for spec in node.spec.parameters.values():
             self.declare(spec)
-        self.ask(node.spec.on_parameters)
 
     def declare(self, spec: ParameterSpec) -> None:
         """Declare a parameter.

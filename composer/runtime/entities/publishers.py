@@ -24,12 +24,22 @@ class Publisher:
         publish: Publishes a payload on it.
     """
 
-    __slots__ = ('_endpoint', '_local', '_node', '_ros', 'publish')
+    __slots__ = (
+        '_endpoint',
+        '_has_dropped',
+        '_local',
+        '_node',
+        '_publish',
+        '_ros',
+        '_spec',
+        'publish',
+    )
 
     def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
         message_class = import_interface(spec.type)
         profile = create_qos_profile(spec.qos, node.system.profiles)
         self._node = node
+        self._spec = spec
         self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
         self._ros = node.ros.create_publisher(
             message_class,
@@ -49,7 +59,22 @@ class Publisher:
             is_held = message is payload and getrefcount(payload) > unheld
             send(message, is_held=is_held)
 
-        self.publish: Publish = publish
+        self._publish: Publish = publish
+        self._has_dropped = False
+        self.publish: Publish = self._publish
+        self.rest(rests=not node.gate.may_publish)
+
+    def rest(self, *, rests: bool) -> None:
+        """Drop what is published, as the node is not active; or publish again."""
+        self._has_dropped = False
+        self.publish = self._drop if rests else self._publish
+
+    def _drop(self, payload: Payload, unheld: int = UNHELD_ARGUMENT) -> None:  # noqa: ARG002 - as `Publish`
+        node, lifecycle = self._node, self._node.lifecycle
+        if not self._has_dropped and lifecycle is not None:
+            self._has_dropped = True
+            text = f"publisher '{self._spec.name}' drops what is published"
+            node.ros.get_logger().warning(f'{text}: the node is {lifecycle.state}')
 
     def delivery(self) -> tuple[str, str]:
         """Return which way messages go now, and why; see `LocalPublisher.delivery`."""

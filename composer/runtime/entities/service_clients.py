@@ -78,6 +78,9 @@ class ServiceClient:
         server = self._local.server
         if server is None:
             return self._client.call_async(request)
+        if server.find_refusal is not None and (reason := server.find_refusal()):
+            message = f"'{self._service}' answers no requests: {reason}"
+            raise ServiceNotAvailableError(message)
         return server.call(request, is_held=is_held)
 
     def _is_available(self) -> bool:

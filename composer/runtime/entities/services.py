@@ -10,6 +10,7 @@ from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.messages.delivery_policies import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import create_qos_profile
+from composer.runtime.nodes.callback_groups import LifecycleGate
 from composer.runtime.system_executor import NoResponseError
 
 if TYPE_CHECKING:
@@ -36,16 +37,32 @@ class Service:
             node.ros, self._ros, key, queue_depth(self._ros.qos_profile)
         )
         self._local.allow(is_allowed=spec.local_delivery)
+        self._rest(spec)
 
     def change(self, spec: ServiceSpec) -> None:
         """See `LiveEntity`."""
         self._ros.callback = _create_callback(self._node, spec)
         self._local.allow(is_allowed=spec.local_delivery)
+        self._rest(spec)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.system.services.remove(self._local)
         self._node.ros.destroy_service(self._ros)
+
+    def _rest(self, spec: ServiceSpec) -> None:
+        """Have requests kept or dropped while the node is not active."""
+        gate = self._node.gate
+        if isinstance(gate, LifecycleGate):
+            is_dropped = spec.while_inactive != 'keep'
+            gate.drop(self._ros, is_dropped=is_dropped)
+            self._local.find_refusal = self._find_refusal if is_dropped else None
+
+    def _find_refusal(self) -> str:
+        node = self._node
+        if node.lifecycle is None or not (node.gate.rests and node.gate.serves):
+            return ''
+        return f"node '{node.spec.key}' is {node.lifecycle.state}"
 
 
 def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
@@ -64,15 +81,25 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     def checked(response: Any) -> Any:
         if response is not FAILED:
             return response
-        if node.gate.serves:
+        if isinstance(node.gate, LifecycleGate) and node.gate.rests:
+            _tell_refusal(node, node.gate, owner)
+        elif node.gate.serves:
             node.system.failures.note(full_name)
         message = f'{owner} of {node.spec.key} has no response'
         raise NoResponseError(message)
 
     def serve(request: Any, _response: Any) -> Any:
-        return checked(run(request))
+        return checked(FAILED if node.gate.rests else run(request))
 
     async def serve_async(request: Any, _response: Any) -> Any:
-        return checked(await run(request))
+        return checked(FAILED if node.gate.rests else await run(request))
 
     return serve_async if call.is_async else serve
+
+
+def _tell_refusal(node: LiveNode, gate: LifecycleGate, owner: Owner) -> None:
+    """Log that a request is not answered, once until the node is active."""
+    if node.lifecycle is not None and str(owner) not in gate.has_refused:
+        gate.has_refused.add(str(owner))
+        text = f'{owner} answers no requests: the node is {node.lifecycle.state}'
+        node.ros.get_logger().warning(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from functools import partial
+from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
@@ -121,10 +122,13 @@ class _Ticker:
         self._generator: Any = None
         # Ticks of a reentrant group overlap, which a generator cannot: it skips such a tick.
         self._turn = threading.Lock()
+        # The thread that resumes the generator, and whether that was to close it meanwhile.
+        self._thread = 0
+        self._is_closed = False
         if spec.behaviour is None:
             self.function: Callable[[], Any] = _Constant(node, spec).message
             return
-        self._bound = node.functions[spec.behaviour.name]
+        self._bound = node.function_of(spec.behaviour)
         self._begin = self.function = node.bind(spec.behaviour, owner)
         self._kind = kind_of(self._begin)
         if self._kind is FunctionKind.GENERATOR:
@@ -142,16 +146,24 @@ class _Ticker:
             return False
         # `1` and `1.0` are equal, and not the same.
         is_same = repr(dict(behaviour.arguments)) == repr(dict(own.arguments))
-        return is_same and self._bound is self._node.functions[behaviour.name]
+        return is_same and self._bound == self._node.function_of(behaviour)
 
-    def close(self, timeout_sec: float) -> None:
+    def close(self, timeout_sec: float, *, for_good: bool = True) -> None:
         """See `Suspended`: what the generator has in `finally:` runs."""
+        if self._thread == get_ident():
+            # The generator itself removes its timer.
+            self._is_closed = True
+            return
         if not self._turn.acquire(timeout=timeout_sec):
             # It is not suspended but hangs, and is reported for that.
             return
         generator, self._generator = self._generator, None
-        if generator is None:
-            return
+        if generator is not None:
+            self._close(generator, timeout_sec)
+        if not for_good:
+            self._turn.release()
+
+    def _close(self, generator: Any, timeout_sec: float) -> None:
         is_async = self._kind is FunctionKind.ASYNC_GENERATOR
         close = partial(_close_async, generator) if is_async else generator.close
         call = self._node.reported_call(self._owner, self._spec.path, close)
@@ -168,7 +180,11 @@ class _Ticker:
         try:
             if self._generator is None:
                 self._generator = self._begin()
-            return next(self._generator)
+            self._thread = get_ident()
+            result = next(self._generator)
+            if self._is_closed:
+                self._generator.close()
+            return result  # noqa: TRY300 - what it raises by then is its own
         except StopIteration as end:
             self.timer.cancel()
             return end.value
@@ -177,6 +193,7 @@ class _Ticker:
             self._generator = None
             raise
         finally:
+            self._thread = 0
             self._turn.release()
 
     async def _resume_async(self) -> Any:

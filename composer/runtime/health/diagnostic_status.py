@@ -95,6 +95,18 @@ def delivery_status(node: str, owner: Owner, delivery: Delivery, system: str) ->
     )
 
 
+def lifecycle_status(node: str, state: str, system: str) -> DiagnosticStatus:
+    """Return the status of a lifecycle: the state that it is in."""
+    is_over = state == 'finalized'
+    return DiagnosticStatus(
+        name=f'{node}: lifecycle',
+        hardware_id=system,
+        level=DiagnosticStatus.WARN if is_over else DiagnosticStatus.OK,
+        message=state,
+        values=[KeyValue(key='state', value=state)],
+    )
+
+
 def _name(node: str, owner: Owner) -> str:
     task = str(owner).replace("'", '')
     return f'{node}: {task}'

@@ -112,6 +112,7 @@ class DiagnosticsPublisher:
         from composer.runtime.health.diagnostic_status import (
             StatusWriter,
             delivery_status,
+            lifecycle_status,
             system_status,
         )
 
@@ -139,6 +140,10 @@ class DiagnosticsPublisher:
             statuses += [
                 delivery_status(*key, each, self._state.name)
                 for key, each in self._find_deliveries().items()
+            ]
+            statuses += [
+                lifecycle_status(node, each, self._state.name)
+                for node, each in self._state.find_lifecycles().items()
             ]
             stamp = self._node.get_clock().now().to_msg()
             for start in range(0, len(statuses), _MOST_STATUSES):

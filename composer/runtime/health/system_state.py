@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
 
 @record
@@ -51,6 +51,7 @@ class SystemState:
         is_up: Whether it has started.
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
+        find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
     """
 
     def __init__(self, name: str, file: str) -> None:
@@ -59,6 +60,7 @@ class SystemState:
         self.is_up = False
         self.is_stopping = False
         self.last_reload: ReloadReport | None = None
+        self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
         self.begun = time.monotonic()
         self._started = time.time()
         self._reloads = 0
@@ -115,6 +117,7 @@ class SystemState:
             'uptime_sec': self.uptime_sec,
             'log': find_log(),
             'last_error': self.last_error,
+            'lifecycles': dict(self.find_lifecycles()),
             'last_reload': last
             and {
                 'time': last.time,

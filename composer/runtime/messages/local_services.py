@@ -87,10 +87,13 @@ class LocalServer(LocalEnd):
     Attributes:
         inbox: Takes requests: objects as `executor.open_inbox` says.
         clients: How many clients of the system have its name and type.
+        find_refusal: Returns why it refuses requests now, or an empty string; `None` if it never
+            does.
     """
 
     inbox: Inbox
     clients = 0
+    find_refusal: Callable[[], str] | None = None
 
     def call(self, request: Any, *, is_held: bool) -> Future:
         """Hand a request to a service over, and return the future of its response.

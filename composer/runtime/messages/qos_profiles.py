@@ -15,7 +15,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from composer.language.qos import INFINITE, NANOSECONDS, resolve_qos
+from composer.language.qos import DURATIONS, INFINITE, NANOSECONDS, resolve_qos
 from composer.language.qos_conflicts import CONFLICTS, MATCHED_DURATIONS
 
 if TYPE_CHECKING:
@@ -56,6 +56,23 @@ def read_policies(profile: QoSProfile) -> dict[str, Any]:
         if 0 < duration_ns < _LONGEST_NS:
             policies[name] = duration_ns / NANOSECONDS
     return policies
+
+
+def is_qos_profile(value: object) -> bool:
+    """Return whether a value is a profile of rclpy."""
+    return isinstance(value, QoSProfile)
+
+
+def write_policies(profile: QoSProfile) -> dict[str, Any]:
+    """Return a profile of rclpy as a file has it."""
+    written: dict[str, Any] = {name: getattr(profile, name).name.lower() for name in _POLICIES}
+    if profile.depth:
+        written['depth'] = profile.depth
+    for name in DURATIONS:
+        duration_ns = getattr(profile, name).nanoseconds
+        if 0 < duration_ns < _LONGEST_NS:
+            written[name] = duration_ns / NANOSECONDS
+    return written
 
 
 def _convert(key: str, value: Any) -> Any:

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger
     from rclpy.time import Time
 
+    from composer.runtime.nodes.created_entities import (
+        CreatedClient,
+        CreatedEntity,
+        CreatedPublisher,
+        CreatedTimer,
+        EntityCreation,
+    )
     from composer.runtime.nodes.goals import Goal
     from composer.runtime.nodes.remote_parameters import RemoteParameters
 
@@ -93,6 +100,7 @@ class Node:
     """
 
     __slots__ = (
+        '_creation',
         '_entities',
         '_remote_parameters',
         '_shutdown',
@@ -110,6 +118,7 @@ class Node:
         entities: Mapping[str, Mapping[str, Any]],
         remote_parameters: RemoteParameters,
         shutdown: Callable[[int], None],
+        creation: EntityCreation,
     ) -> None:
         self.name: str = ros.get_name()
         self.ros = ros
@@ -117,6 +126,7 @@ class Node:
         self.own_state: dict[str, Any] = {}
         self.parameters = Parameters(ros)
         self._entities = entities
+        self._creation = creation
         self._remote_parameters = remote_parameters
         self._shutdown = shutdown
 
@@ -221,6 +231,72 @@ class Node:
             ParametersRefusedError: It has no such parameters.
         """
         return self._remote_parameters.get(node_name, names, timeout)
+
+    def create_publisher(
+        self, msg_type: Any, topic: str, qos: Any = None, **options: Any
+    ) -> CreatedPublisher:
+        """Create a publisher, as those that the file declares.
+
+        It belongs to the node, and goes with it; so do all that are created here.
+
+        Args:
+            msg_type: The class of its messages, or its name as in `std_msgs/msg/String`.
+            qos: A depth, the name of a profile, policies as in the file, or rclpy's profile.
+            options: `name`, by which `node.publish` knows it (otherwise that of the topic), and
+                the keys that a publisher has in the file.
+
+        Raises:
+            EntityError: It cannot be created so.
+        """
+        data = {'type': msg_type, 'topic': topic, 'qos': qos, **options}
+        created: CreatedPublisher = self._creation.create('publishers', data, topic)
+        return created
+
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        behaviour: Callable[..., Any],
+        qos: Any = None,
+        **options: Any,
+    ) -> CreatedEntity:
+        """Create a subscription, whose behaviour is called as `behaviour(node, message)`.
+
+        The other arguments are those of `create_publisher`.
+        """
+        data = {'type': msg_type, 'topic': topic, 'qos': qos, **options}
+        created: CreatedEntity = self._creation.create('subscriptions', data, topic, behaviour)
+        return created
+
+    def create_timer(
+        self, period: float, behaviour: Callable[..., Any], **options: Any
+    ) -> CreatedTimer:
+        """Create a timer, whose behaviour is called as `behaviour(node)` each `period` seconds.
+
+        Without a `name` it has that of the function.
+        """
+        data = {'period': period, **options}
+        name = str(getattr(behaviour, '__name__', 'timer'))
+        created: CreatedTimer = self._creation.create('timers', data, name, behaviour)
+        return created
+
+    def create_service(
+        self, srv_type: Any, srv_name: str, behaviour: Callable[..., Any], **options: Any
+    ) -> CreatedEntity:
+        """Create a service, whose behaviour is called as `behaviour(node, request)`."""
+        data = {'type': srv_type, 'service': srv_name, **options}
+        created: CreatedEntity = self._creation.create('services', data, srv_name, behaviour)
+        return created
+
+    def create_client(self, srv_type: Any, srv_name: str, **options: Any) -> CreatedClient:
+        """Create a service client; `node.call` knows it by its `name`, or that of the service."""
+        data = {'type': srv_type, 'service': srv_name, **options}
+        created: CreatedClient = self._creation.create('service_clients', data, srv_name)
+        return created
+
+    def destroy(self, entity: CreatedEntity) -> None:
+        """Remove what one of the `create_…` methods has returned."""
+        self._creation.destroy(entity)
 
     def shutdown(self, code: int = 0) -> None:
         """Stop the whole system, after this behaviour has returned, with an exit code."""

@@ -8,7 +8,7 @@ The executor asks a group before it takes a message, so nothing is lost at a clo
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
-from weakref import ref
+from weakref import WeakSet, ref
 
 from rclpy.action import ActionServer
 from rclpy.callback_groups import (
@@ -35,9 +35,13 @@ class Gate:
             `on_start` to its `on_stop`.
         is_paused: Whether none begins for now, while entities are exchanged; what has begun goes
             on.
+        rests: Whether the node has a lifecycle, and is not active.
+        may_publish: Whether its publishers publish.
     """
 
     __slots__ = ('_stop', 'is_open', 'is_paused', 'serves')
+    rests = False
+    may_publish = True
 
     def __init__(self, stop: StopRequest) -> None:
         self._stop = stop
@@ -71,6 +75,41 @@ class Gate:
     def allows_requests(self) -> bool:
         """Return whether behaviours of services and actions may begin."""
         return self.serves
+
+
+class LifecycleGate(Gate):
+    """The gate of a node with a lifecycle, which rests until the node is active.
+
+    Attributes:
+        dropping: The entities whose messages or requests are taken meanwhile, and dropped.
+        has_refused: Those of which that was said since the node came to rest.
+    """
+
+    def __init__(self, stop: StopRequest) -> None:
+        super().__init__(stop)
+        self.rests = True
+        self.may_publish = False
+        self.dropping: WeakSet[Any] = WeakSet()
+        self.has_refused: set[str] = set()
+
+    def allows(self, entity: Any) -> bool:
+        """See the base class; goals are rejected."""
+        if not self.rests:
+            return super().allows(entity)
+        is_taken = entity in self.dropping or isinstance(entity, ActionServer)
+        return is_taken and super().allows(entity)
+
+    def allows_events(self) -> bool:
+        """See the base class."""
+        return not self.rests and super().allows_events()
+
+    def allows_requests(self) -> bool:
+        """See the base class."""
+        return not self.rests and super().allows_requests()
+
+    def drop(self, entity: Any, *, is_dropped: bool) -> None:
+        """Let what comes to an entity be dropped while the node rests, or be kept."""
+        (self.dropping.add if is_dropped else self.dropping.discard)(entity)
 
 
 class _TidyGroup(CallbackGroup):

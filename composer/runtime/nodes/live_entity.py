@@ -11,8 +11,12 @@ if TYPE_CHECKING:
 class Suspended(Protocol):
     """A behaviour that has begun, and is suspended until its next turn."""
 
-    def close(self, timeout_sec: float) -> None:
-        """End it; what it raises is reported."""
+    def close(self, timeout_sec: float, *, for_good: bool = True) -> None:
+        """End it; what it raises is reported.
+
+        Args:
+            for_good: Whether it never begins anew.
+        """
 
 
 class LiveEntity(Protocol):
@@ -47,6 +51,32 @@ class NodeParameters(Protocol):
 
     def ask(self, behaviour: BehaviourSpec | None) -> None:
         """Ask this behaviour about changes from now on."""
+
+
+class NodeLifecycle(Protocol):
+    """The lifecycle of a node that runs.
+
+    Attributes:
+        start: The state to which it brings itself when it starts.
+    """
+
+    start: str
+
+    @property
+    def state(self) -> str:
+        """The state that it is in, as in `active`."""
+
+    def begin(self) -> None:
+        """Let others change its state, as the node has started."""
+
+    def require(self, goal: str) -> None:
+        """Bring an unconfigured node to a state, or raise."""
+
+    def leave(self, timeout_sec: float) -> None:
+        """Bring it down, before the node goes."""
+
+    def follow(self) -> None:
+        """Do what the node says now that was edited."""
 
 
 class BehaviourOptions(Protocol):

@@ -15,14 +15,18 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
 from composer.entity_kinds import ENTITY_KINDS
-from composer.errors import SystemStoppingError
+from composer.errors import StartError, SystemStoppingError
+from composer.language.bindings import node_bindings
 from composer.language.specs import REENTRANT
+from composer.runtime.behaviours.callables import Method, make_instance
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
+from composer.runtime.behaviours.tracebacks import summarize
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.health.missed import count_missed
+from composer.runtime.lifecycle.lifecycle_node import LifecycleRosNode
 from composer.runtime.messages.ownership import UNHELD_RESULT
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
@@ -30,7 +34,9 @@ from composer.runtime.nodes.callback_groups import (
     Gate,
     GatedMutuallyExclusiveGroup,
     GatedReentrantGroup,
+    LifecycleGate,
 )
+from composer.runtime.nodes.created_entities import EntityCreation
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
@@ -49,6 +55,7 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_entity import (
         BehaviourOptions,
         LiveEntity,
+        NodeLifecycle,
         NodeParameters,
         Suspended,
     )
@@ -70,11 +77,13 @@ class LiveNode:
         serving: The callback group of requests to action servers.
         functions: The behaviours, by their names, as they were when the node was created or
             changed: one that goes calls those that it has known.
+        created: The behaviours of entities that other behaviours have created, by their names.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
         suspended: Behaviours that are ended before `on_stop`.
         limits: How long behaviours may run, by their owners.
         parameters: Its declared parameters, once its entities are created.
+        lifecycle: Its lifecycle; `None` for a node without.
     """
 
     spec: NodeSpec
@@ -89,6 +98,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     functions: Mapping[str, Callable[..., Any]]
+    created: dict[str, Callable[..., Any]] = field(default_factory=dict)
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
     suspended: list[Suspended] = field(default_factory=list)
@@ -96,8 +106,10 @@ class LiveNode:
     running: RunningCalls = field(default_factory=RunningCalls)
     has_begun: bool = False
     parameters: NodeParameters | None = None
+    lifecycle: NodeLifecycle | None = None
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _views: dict[Owner, Node] = field(default_factory=dict)
+    _instances: dict[type, Any] = field(default_factory=dict)
     _is_destroyed: bool = False
 
     @property
@@ -130,7 +142,40 @@ class LiveNode:
         node = self.behaviour_node
         if owner is not None:
             node = self._views.setdefault(owner, node.with_own_state())
-        return partial(self.functions[behaviour.name], node, **behaviour.arguments)
+        function = self.function_of(behaviour)
+        if isinstance(function, Method):
+            function = function.of(self._instance(function.owner))
+        return partial(function, node, **behaviour.arguments)
+
+    def function_of(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
+        """Return the function of a behaviour: of the files, or one that a behaviour has given."""
+        return self.created.get(behaviour.name) or self.functions[behaviour.name]
+
+    def options(self) -> dict[str, Any]:
+        """Return what holds for entities that do not say otherwise, as keys of the node."""
+        spec = self.spec
+        return {
+            'on_error': spec.on_error,
+            'warn_after': spec.warn_after_sec,
+            'local_delivery': spec.local_delivery,
+        }
+
+    def make_instances(self) -> None:
+        """Make an instance of each class whose methods are behaviours of the node."""
+        for binding in node_bindings(self.spec):
+            method = self.functions[binding.behaviour.name]
+            if isinstance(method, Method):
+                self._instance(method.owner)
+
+    def _instance(self, owner: type) -> Any:
+        """Return the node's instance of a class; it is made with the first that needs it."""
+        if owner not in self._instances:
+            try:
+                self._instances[owner] = make_instance(owner, self.behaviour_node)
+            except Exception as error:
+                message = f'{owner.__qualname__}.__init__ raised {summarize(error)}'
+                raise StartError(message) from error
+        return self._instances[owner]
 
     def call(
         self,
@@ -177,6 +222,7 @@ class LiveNode:
         path: DataPath,
         function: Callable[..., Any],
         failed: Callable[[BaseException], None] | None = None,
+        deliver: Callable[[Any], Any] = discard_result,
     ) -> BehaviourCall:
         """Return the call of a function whose errors are reported, and no more.
 
@@ -184,6 +230,7 @@ class LiveNode:
 
         Args:
             failed: Takes what it raised, after that has been reported.
+            deliver: Takes what it returned.
         """
         if owner not in self.limits:
             self._limit(owner, path, self.spec)
@@ -195,7 +242,16 @@ class LiveNode:
             if failed is not None:
                 failed(error)
 
-        return BehaviourCall(owner, function, self.running, deliver=discard_result, failed=report)
+        return BehaviourCall(owner, function, self.running, deliver=deliver, failed=report)
+
+    def serve_at_once(self) -> None:
+        """Answer requests from now on, if the node has nothing to do before."""
+        spec = self.spec
+        if spec.on_start or spec.starts_late or spec.lifecycle not in (None, 'unconfigured'):
+            return
+        self.gate.serves = True
+        if self.lifecycle:
+            self.lifecycle.begin()
 
     def begin(self, call: BehaviourCall, *arguments: Any) -> tuple[Future, threading.Event]:
         """Run a behaviour in the executor.
@@ -249,12 +305,12 @@ class LiveNode:
         for kind in ENTITY_KINDS:
             if kind.is_timed:
                 timers: dict[str, Any] = self.entities.get(kind.section, {})
-                yield from (timer.ros for timer in timers.values())
+                yield from (timer.ros for timer in list(timers.values()))
 
     def flush_counts(self) -> None:
         """Log the counts of what has not been logged."""
         self.errors.flush()
-        for end in self.endpoints:
+        for end in list(self.endpoints):
             end.losses.flush()
 
     def change(self, noun: str, spec: Any, entity: LiveEntity) -> None:
@@ -316,22 +372,24 @@ def _drop(by_owner: dict[Owner, Any], noun: str, name: str) -> None:
 def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     """Create a node without entities."""
     entries = system.parameter_files.get(spec.full_name, {})
-    ros = ComposedRosNode(spec, system.context, system.ros_arguments, entries)
+    kind = LifecycleRosNode if spec.lifecycle else ComposedRosNode
+    ros = kind(spec, system.context, system.ros_arguments, entries)
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
-    gate = Gate(system.stop)
+    gate = LifecycleGate(system.stop) if spec.lifecycle else Gate(system.stop)
     waits = Waits(system.executor, system.stop)
     state = SimpleNamespace()
     state.__dict__.update(copy.deepcopy(dict(spec.state)))
     remote_parameters = RemoteParameters(
         ros, spec.namespace, waits, background, system.without_parameter_services
     )
-    return LiveNode(
+    creation = EntityCreation()
+    live = LiveNode(
         spec,
         system,
         ros,
-        behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown),
+        behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown, creation),
         errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
         entities=entities,
         waits=waits,
@@ -341,3 +399,5 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         serving=GatedMutuallyExclusiveGroup(gate),
         functions=system.functions,
     )
+    creation.node = live
+    return live

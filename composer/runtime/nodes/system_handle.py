@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from composer.runtime.health.statistics import HealthRegistry
     from composer.runtime.messages.local_delivery import LocalTopics
     from composer.runtime.messages.local_services import LocalServices
+    from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
     from composer.yaml_text.positions import SourceMap
@@ -69,6 +70,7 @@ class SystemHandle:
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
         services: Hands requests over between its nodes.
+        create_entity: Creates one entity more of a `LiveNode`, of a section, from its record.
         is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
     """
 
@@ -89,4 +91,5 @@ class SystemHandle:
     health: HealthRegistry
     topics: LocalTopics
     services: LocalServices
+    create_entity: Callable[[Any, str, Any], LiveEntity]
     is_outdated: Callable[[], bool] = never

@@ -110,7 +110,7 @@ class NodeChange:
             created = self._create(operation.target, spec)
             transaction.on_undo(created.destroy)
             if section == 'timers':
-                transaction.on_commit(_start_timer, created)
+                transaction.on_commit(_start_timer, node, created)
             transaction.on_undo(entities.pop, name, None)
             entities[name] = created
         if before is not None:
@@ -136,6 +136,9 @@ class NodeChange:
         """Change what the node itself does."""
         node, before, spec, transaction = self._node, self._before, self._after, self._transaction
         keys = {each.top_key for each in operation.changes}
+        if 'bond' in keys and node.lifecycle:
+            transaction.on_undo(node.lifecycle.follow)
+            node.lifecycle.follow()
         if 'log_level' in keys:
             requests = node.system.log_levels
             transaction.on_undo(set_level, before, requests)
@@ -182,7 +185,8 @@ def _set_sim_time(node: LiveNode, *, value: bool) -> None:
         raise StartError(message)
 
 
-def _start_timer(timer: Any) -> None:
+def _start_timer(node: LiveNode, timer: Any) -> None:
     with suppress(Exception):
         # A behaviour may have destroyed it.
-        timer.ros.reset()
+        if not node.gate.rests:
+            timer.ros.reset()

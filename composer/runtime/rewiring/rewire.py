@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import Starter
 
+# All others are of a moment, or final.
+_STATES = ('unconfigured', 'inactive', 'active')
 _SETTLE_SEC = 0.05
 _SETTLE_POLL_SEC = 0.0005
 
@@ -64,6 +66,8 @@ class Rewiring:
         self._old, self._new = old, new
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
         self._transaction = Transaction()
+        # Those of nodes with a lifecycle that are recreated.
+        self._states: dict[str, str] = {}
         # The processes that ran on demand before they were ended.
         self._running: set[str] = set()
 
@@ -174,7 +178,10 @@ class Rewiring:
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
             self._transaction.on_undo(process.change, process.spec)
+            before = process.spec.lifecycle
             process.change(self._new.spec.processes[name])
+            if process.run is not None and process.spec.lifecycle != before:
+                self._transaction.on_commit(self._processes.on_run, process.run)
         for full_name in removed:
             if full_name in nodes:
                 self._transaction.on_commit(self._restarter.remove, full_name)
@@ -207,6 +214,8 @@ class Rewiring:
         """End nodes that are recreated; to undo that, they begin again with their state."""
         for full_name in names:
             node = self._nodes[full_name]
+            if node.lifecycle is not None:
+                self._states[full_name] = node.lifecycle.state
             if not self._restarter.make_way(full_name):
                 calls = ', '.join(str(call.owner) for call in node.running.calls())
                 message = f"node '{node.spec.key}' cannot be recreated, because it hangs: {calls}"
@@ -216,7 +225,15 @@ class Rewiring:
     def _begin_again(self, node: LiveNode) -> None:
         (again,) = self._starter.create([node.spec])
         again.take_over(node)
+        self._resume([again])
         self._starter.start_more([again], [])
+
+    def _resume(self, nodes: Iterable[LiveNode]) -> None:
+        """Let nodes come to the states that those had in whose place they come."""
+        for node in nodes:
+            state = self._states.get(node.full_name, '')
+            if node.lifecycle is not None and state in _STATES:
+                node.lifecycle.start = state
 
     def _end_processes(self, names: Iterable[str]) -> None:
         for name in names:
@@ -260,6 +277,7 @@ class Rewiring:
 
         self._transaction.on_undo(remove_all)
         nodes = self._starter.create(self._after[name] for name in node_names)
+        self._resume(nodes)
         processes = [ExternalProcess(self._new.spec.processes[name]) for name in process_names]
         self._processes.by_name.update({each.spec.name: each for each in processes})
         self._starter.start_more(nodes, processes, components)

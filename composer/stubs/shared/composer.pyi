@@ -1,6 +1,6 @@
 """What behaviours use of Composer; in place of the package itself when behaviours are checked."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from composer_stubs import Logger
@@ -44,6 +44,25 @@ class Node:
     def get_parameters(
         self, node_name: str, names: Iterable[str], timeout: float | None = 5.0
     ) -> dict[str, Any]: ...
+    def create_publisher(
+        self, msg_type: Any, topic: str, qos: Any = None, **options: Any
+    ) -> Any: ...
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        behaviour: Callable[..., Any],
+        qos: Any = None,
+        **options: Any,
+    ) -> Any: ...
+    def create_timer(
+        self, period: float, behaviour: Callable[..., Any], **options: Any
+    ) -> Any: ...
+    def create_service(
+        self, srv_type: Any, srv_name: str, behaviour: Callable[..., Any], **options: Any
+    ) -> Any: ...
+    def create_client(self, srv_type: Any, srv_name: str, **options: Any) -> Any: ...
+    def destroy(self, entity: Any) -> None: ...
     def shutdown(self, code: int = 0) -> None: ...
 
 class Process:

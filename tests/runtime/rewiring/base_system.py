@@ -53,6 +53,19 @@ class Ticking:
 ticking = Ticking()
 
 
+class Kept:
+    def __init__(self, node):
+        self.node = node
+
+    def tick(self, node, text='k'):
+        note(self.node if node is None else node, 'tick', text=text)
+        return text
+
+    async def tick_later(self, node):
+        note(node, 'tick_later')
+        return 'k'
+
+
 def hear(node, message, prefix=''):
     note(node, 'hear', prefix=prefix)
     return f'{prefix}{message.data}'
@@ -300,6 +313,27 @@ SYSTEM = {
             },
             'services': {'ask': {'type': _TRIGGER, 'behaviour': 'parts:answer'}},
             'actions': {'count': {'type': _FIBONACCI, 'behaviour': 'parts:count'}},
+        },
+        'managed': {
+            'lifecycle': {'start': 'active'},
+            'bond': False,
+            'subscriptions': {
+                'kept': {
+                    'type': _STRING,
+                    'topic': 'far',
+                    'behaviour': 'parts:hear',
+                    'while_inactive': 'keep',
+                },
+            },
+            'services': {
+                'managed_ask': {
+                    'type': _TRIGGER,
+                    'behaviour': 'parts:answer',
+                    'while_inactive': 'drop',
+                },
+            },
+            'timers': {'tick': {'period': 0.05, 'behaviour': 'parts:ticking'}},
+            'on_activate': 'parts:end',
         },
         'user': {
             'namespace': '/inner',

@@ -206,6 +206,7 @@ def _is_filled(cell):
 
 def describe_function(function, arguments):
     """Return a behaviour's name, arguments, code, and what its module's names mean."""
+    function = getattr(function, '__func__', function)
     target = function if isinstance(function, FunctionType) else type(function).__call__
     names = target.__globals__
     return {

@@ -41,7 +41,7 @@ def check_runs(system, observer, plan, told):
 
 def _should_run(node, section, name, entity):
     spec = getattr(node.spec, section)[name]
-    if spec.behaviour is None or not node.gate.is_open:
+    if spec.behaviour is None or not node.gate.is_open or node.gate.rests:
         return False
     if section != 'timers':
         return spec.type in _TYPES

@@ -10,11 +10,14 @@ from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
+from composer.errors import StartError
 from composer.expressions import ARGUMENTS
 from composer.expressions.scope import Scope
 from composer.expressions.templates import TemplateEvaluator
-from composer.language.arguments import find_declaration_errors
+from composer.language.arguments import StartDefault, find_declaration_errors, find_value_problem
+from composer.language.values.start_values import StartValues, parse_start_value
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+from composer.schema.structure import is_sound
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
@@ -48,10 +51,30 @@ def infer_argument_types(
 
 
 def compute_values(
-    document: Document, declared: Mapping[str, ArgumentSpec], given: ArgumentValues
+    document: Document,
+    declared: Mapping[str, ArgumentSpec],
+    given: ArgumentValues,
+    start: StartValues | None = None,
 ) -> Scope:
-    """Return what the expressions of a file have in scope; errors are added to its findings."""
-    return _Computation(document, declared, given).compute()
+    """Return what the expressions of a file have in scope; errors are added to its findings.
+
+    Args:
+        start: Where the values come from that are read when the system starts.
+
+    Raises:
+        ComposerError: Such a value cannot be read.
+    """
+    return _Computation(document, declared, given, start or StartValues()).compute()
+
+
+def _data_of(argument: ArgumentSpec) -> Any:
+    default = argument.default
+    return dict(default.data) if isinstance(default, StartDefault) else default
+
+
+def _is_sound(argument: ArgumentSpec) -> bool:
+    """Return whether the schema has nothing to say against where a default is read from."""
+    return is_sound({ARGUMENTS: {argument.name: _data_of(argument)}})
 
 
 def _scalar_type(value: Any) -> str:
@@ -61,9 +84,14 @@ def _scalar_type(value: Any) -> str:
 
 class _Computation:
     def __init__(
-        self, document: Document, declared: Mapping[str, ArgumentSpec], given: ArgumentValues
+        self,
+        document: Document,
+        declared: Mapping[str, ArgumentSpec],
+        given: ArgumentValues,
+        start: StartValues,
     ) -> None:
         self._document = document
+        self._start = start
         self._declared = declared
         self._values = dict(given.values)
         self._samples = set(given.samples)
@@ -76,7 +104,7 @@ class _Computation:
             if name not in declared
         }
         self._pending = {
-            name: argument.default
+            name: _data_of(argument)
             for name, argument in declared.items()
             if name not in given.values
         } | self._variables
@@ -140,10 +168,27 @@ class _Computation:
 
     def _compute_default(self, argument: ArgumentSpec) -> None:
         path = self._path(argument.name)
-        value = self._evaluator.evaluate(argument.default, path)
+        value = self._evaluator.evaluate(_data_of(argument), path)
         if self._evaluator.has_failed(path):
             self._use_sample(argument.name)
             return
+        if isinstance(argument.default, StartDefault):
+            if not _is_sound(argument):
+                self._use_sample(argument.name)
+                return
+            data = {**value, 'type': argument.type}
+            if 'file' in data and not data['file'].startswith('package://'):
+                folder = self._document.positions.value((*path, 'file')).source.folder
+                data['file'] = str(folder / data['file'])
+            name = f"argument '{argument.name}'"
+            source = parse_start_value(name, data, path, self._document.positions)
+            value, is_sample = self._start.value_of(source)
+            if is_sample:
+                self._use_sample(argument.name)
+                return
+            if problem := find_value_problem(argument, value):
+                message = f'{source.span}: {problem}'
+                raise StartError(message)
         if argument.type:
             value = convert_parameter_value(value, argument.type)
         computed = replace(argument, default=value)

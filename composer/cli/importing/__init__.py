@@ -1,0 +1,1 @@
+"""`composer import`: launch files to systems."""

@@ -1,0 +1,73 @@
+"""`composer import`: print or write the system that a launch file is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from composer.errors import ComposerError, ExitCode, UsageError
+from composer.launch_files.importing import import_file
+from composer.launch_files.system_file import render_system
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from composer.launch_files.system_file import SystemFile
+
+_ENDINGS = ('.py', '.xml', '.yaml', '.yml')
+
+
+def import_launch_file(path: Path, words: Sequence[str], output: Path | None) -> int:
+    """Import a launch file; return the exit code.
+
+    Args:
+        words: The arguments, `name:=value`.
+        output: Where the system is written; `None` to print it.
+
+    Raises:
+        UsageError: The arguments are not of that form, or it is no launch file.
+        ComposerError: It cannot be imported, or the output cannot be written.
+    """
+    given = _read_words(words)
+    if path.suffix not in _ENDINGS:
+        message = f"'{path}' is no launch file: it ends with none of {', '.join(_ENDINGS)}"
+        raise UsageError(message)
+    if not path.is_file():
+        message = f"there is no file '{path}'"
+        raise ComposerError(message)
+    stem = output.stem if output else path.name.partition('.')[0]
+    system = render_system(import_file(path, given), path.name, stem)
+    if output is not None:
+        _write(system, output)
+    else:
+        click.echo(system.text, nl=False)
+        if system.files:
+            names = ', '.join(system.files)
+            click.echo(f'{names}: parameter files of the system; -o writes them, too', err=True)
+    return ExitCode.DONE
+
+
+def _read_words(words: Sequence[str]) -> dict[str, str]:
+    given = {}
+    for word in words:
+        name, separator, value = word.partition(':=')
+        if not separator or not name:
+            message = f"'{word}' is no argument of a launch file"
+            raise UsageError(message, help='write NAME:=VALUE')
+        given[name] = value
+    return given
+
+
+def _write(system: SystemFile, output: Path) -> None:
+    written = {output: system.text}
+    written |= {output.parent / name: text for name, text in system.files.items()}
+    for path, text in written.items():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding='utf-8')
+        except OSError as error:
+            message = f'cannot write {path}: {error.strerror}'
+            raise ComposerError(message) from error
+        click.echo(f'wrote {path}', err=True)

@@ -1,0 +1,202 @@
+"""Parameters of launch files: mappings and files in their order → the keys of a process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from composer.launch_files.substitutions import Resolver, class_names, private, read_file
+from composer.launch_files.texts import Computed, Text, constant, read_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from composer.launch_files.place import Place
+
+
+@dataclass
+class Parameters:
+    """What a node is given.
+
+    Attributes:
+        values: Those that no file overrides.
+        files: Paths, mappings of the language, or contents of files yet to be written.
+    """
+
+    values: dict[str, Any] = field(default_factory=dict)
+    files: list[Any] = field(default_factory=list)
+
+
+@dataclass
+class NewFile:
+    """A parameter file that the import writes beside the system."""
+
+    data: dict[str, Any]
+
+
+class ParameterReader:
+    """Reads the parameters of nodes at one place of a launch file."""
+
+    def __init__(self, place: Place) -> None:
+        self._resolver = Resolver(place)
+        self._remark = place.remark
+        self._parse = place.loader.parse
+
+    def read(self, given: Iterable[Any], common: Iterable[Any]) -> Parameters:
+        """Return the parameters of a node.
+
+        Args:
+            common: What `SetParameter` and `SetParametersFromFile` give to all nodes.
+        """
+        read = Parameters()
+        for item in common:
+            if isinstance(item, tuple):
+                self._add_values(read, {item[0]: item[1]})
+            else:
+                read.files.append(item.written())
+        for item in given:
+            kinds = class_names(item)
+            if 'ParameterFile' in kinds:
+                self._add_file(read, item)
+            elif 'Parameter' in kinds:
+                self._add_values(read, {self._resolver.text(item.name).written(): self._one(item)})
+            else:
+                self._add_values(read, self.values(item))
+        return read
+
+    def values(self, written: Mapping[Any, Any]) -> dict[str, Any]:
+        """Return the values of a mapping that `launch_ros` has normalized."""
+        found = {}
+        for key, value in written.items():
+            name = self._resolver.text(key).written()
+            found[name] = self._value(value)
+        return found
+
+    def _one(self, item: Any) -> Any:
+        return self._value(private(item, 'parameter_value'))
+
+    def _value(self, written: Any) -> Any:
+        if 'ParameterValue' in class_names(written):
+            return self._described(written)
+        if isinstance(written, tuple) and written and isinstance(written[0], list | tuple):
+            return [self._resolver.text(each).typed() for each in written]
+        if isinstance(written, tuple) and written and hasattr(written[0], 'perform'):
+            return self._command(written) or self._resolver.text(written).typed()
+        return list(written) if isinstance(written, tuple) else written
+
+    def _described(self, written: Any) -> Any:
+        value, kind = private(written, 'value'), private(written, 'value_type')
+        if not (isinstance(value, list | tuple) or hasattr(value, 'perform')):
+            return value
+        command = self._command(value)
+        if command:
+            return command
+        if kind in (None, str):
+            text = self._resolver.text(value)
+            return text.written() if kind is str else text.typed()
+        if isinstance(value, list | tuple) and value and not hasattr(value[0], 'perform'):
+            return [self._typed(each, kind) for each in value]
+        return self._typed(value, kind)
+
+    def _typed(self, written: Any, kind: Any) -> Any:
+        if isinstance(written, bool | int | float):
+            return written
+        text = self._resolver.text(written)
+        if kind is float or kind == list[float]:
+            if text.is_constant:
+                read = read_yaml(text.text)
+                return [float(x) for x in read] if isinstance(read, list) else float(text.text)
+            return Computed(f'{{{{ {text.code} | float }}}}', float(text.text))
+        return text.written() if kind is str else text.typed()
+
+    def _command(self, written: Any) -> dict[str, Any] | None:
+        words = self._resolver.command_words(written)
+        return {'command': [word.written() for word in words]} if words else None
+
+    def _add_values(self, read: Parameters, values: dict[str, Any]) -> None:
+        if not read.files:
+            read.values |= values
+            return
+        names = set(values)
+        if any(names & _names_in(file) for file in read.files):
+            read.files.append(NewFile(values))
+        else:
+            read.values |= values
+
+    def _add_file(self, read: Parameters, item: Any) -> None:
+        path = self._resolver.text(private(item, 'param_file'))
+        substitutes = private(item, 'allow_substs')
+        is_template = substitutes is True or (
+            substitutes is not False and self._resolver.text(substitutes).text.lower() == 'true'
+        )
+        if is_template:
+            data = read_file(path.text)
+            if not isinstance(data, dict):
+                self._remark(f"'{path.text}' cannot be read: its substitutions are kept as text")
+            else:
+                read.files.append(NewFile(self._translated(data)))
+                return
+        if Path(path.text).is_file() or not Path(path.text).parent.is_dir():
+            read.files.append(path.written())
+            if self._resolver.is_new_file(path.text):
+                self._keep_content(read, path)
+        else:
+            self._remark(f"there is no parameter file '{path.text}': launch goes on without it")
+
+    def _keep_content(self, read: Parameters, path: Text) -> None:
+        data = read_file(path.text)
+        if isinstance(data, dict) and path.is_constant:
+            read.files[-1] = NewFile(_unmarked(data))
+
+    def _translated(self, data: Any) -> Any:
+        if isinstance(data, dict):
+            return {self._plain(key): self._translated(value) for key, value in data.items()}
+        if isinstance(data, list):
+            return [self._translated(item) for item in data]
+        if isinstance(data, str) and '$(' in data:
+            return self._resolver.text(self._parse(data)).typed()
+        return data
+
+    def _plain(self, key: Any) -> Any:
+        if isinstance(key, str) and '$(' in key:
+            return self._resolver.text(self._parse(key)).written()
+        return key
+
+
+def _unmarked(data: Any) -> Any:
+    """Return data with expressions in place of marks."""
+    if isinstance(data, dict):
+        return {constant(str(key)).written(): _unmarked(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_unmarked(item) for item in data]
+    if isinstance(data, str) and not constant(data).is_constant:
+        return constant(data).typed()
+    return data
+
+
+def _names_in(file: Any) -> set[str]:
+    """Return the names of all parameters in a file; of one that cannot be read, of every name."""
+    if isinstance(file, NewFile):
+        data: Any = file.data
+    else:
+        data = read_file(file) if '{{' not in file else None
+    if data is None:
+        return _EveryName()
+    return set(_flat(data, ''))
+
+
+class _EveryName(set[str]):
+    """The names in a file that nobody has read."""
+
+    def __rand__(self, other: Any) -> set[str]:
+        return set(other)
+
+
+def _flat(data: Any, prefix: str) -> Iterable[str]:
+    if not isinstance(data, dict):
+        yield prefix
+        return
+    for key, value in data.items():
+        # What stands above `ros__parameters` are names of nodes.
+        yield from _flat(value, '' if key == 'ros__parameters' else f'{prefix}.{key}'.strip('.'))

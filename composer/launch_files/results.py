@@ -1,0 +1,73 @@
+"""What a launch file consists of: arguments, processes, and what cannot be kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+from composer.expressions import is_variable_name
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from composer.launch_files.surroundings import Wait
+    from composer.launch_files.texts import Text
+
+
+class LaunchError(ComposerError):
+    """A launch file cannot be read."""
+
+
+@dataclass
+class Argument:
+    """A launch argument; all are texts.
+
+    Attributes:
+        default: `None` if a value is required.
+        fixed: Whether functions of the launch file depend on its value, so that it cannot change.
+    """
+
+    name: str
+    default: Text | None
+    description: str
+    choices: tuple[str, ...]
+    given: str | None = None
+    fixed: bool = False
+
+
+@dataclass
+class Entry:
+    """A process of the system.
+
+    Attributes:
+        section: `processes` or `containers`.
+        action: The object of `launch` that it is made of.
+        remarks: What could not be kept of it.
+    """
+
+    section: str
+    name: str
+    data: dict[str, Any]
+    action: Any
+    origin: str
+    when: str
+    holds: bool
+    waits: list[Wait]
+    environment: dict[str, Text | None]
+    remarks: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Imported:
+    """What a launch file consists of."""
+
+    arguments: dict[str, Argument] = field(default_factory=dict)
+    entries: list[Entry] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+
+def argument_code(name: str) -> str:
+    """Return the expression for an argument."""
+    return name if is_variable_name(name) else f"args['{name}']"

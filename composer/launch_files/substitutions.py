@@ -1,0 +1,350 @@
+"""Substitutions of launch files → texts, with expressions where they depend on arguments.
+
+Objects of `launch` are recognised by the names of their classes: nothing of it is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from composer.ament import find_share
+from composer.launch_files.marks import run_marked
+from composer.launch_files.python_expressions import UnlikeError, translate
+from composer.launch_files.results import LaunchError
+from composer.launch_files.texts import (
+    EMPTY,
+    Code,
+    Text,
+    chosen,
+    constant,
+    joined,
+    one,
+    read_yaml,
+    split_words,
+    unmarked,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.launch_files.place import Place
+
+_SHARE = re.compile(r'^(?:file://)?(/[^\s:]*?)/share/([A-Za-z]\w*)(?=/|$)')
+# What `LaunchConfigAsBool` takes for true.
+_TRUE = ('true', '1', 'yes', 'on')
+# Where the files of packages would be that are not installed.
+_ABSENT = '/share/of/package'
+
+
+def private(owner: Any, name: str) -> Any:
+    """Return a private attribute of an object of `launch`, whichever class it is of."""
+    for kind in type(owner).__mro__:
+        mangled = f'_{kind.__name__.lstrip("_")}__{name}'
+        if hasattr(owner, mangled):
+            return getattr(owner, mangled)
+    return getattr(owner, name, getattr(owner, f'_{name}', None))
+
+
+def class_names(value: Any) -> list[str]:
+    """Return the names of the classes of an object, its own first."""
+    return [kind.__name__ for kind in type(value).__mro__]
+
+
+class Resolver:
+    """Resolves substitutions at one place of a launch file.
+
+    Args:
+        place: Where it is, and who is told what cannot be kept.
+    """
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._scope = place.scope
+        self._context = place.loader.context
+        self._remark = place.remark
+
+    def text(self, written: Any) -> Text:
+        """Return the text of a substitution, of a text, or of a sequence of both."""
+        if written is None:
+            return EMPTY
+        if isinstance(written, str | Path):
+            return _constant(str(written))
+        if isinstance(written, bool | int | float):
+            return _constant(str(written))
+        if isinstance(written, list | tuple):
+            return joined(map(self.text, written))
+        return self._substitution(written)
+
+    def is_true(self, written: Any) -> Text:
+        """Return a text for something that is true or false."""
+        if isinstance(written, bool):
+            return _constant('true' if written else 'false')
+        return self.text(written)
+
+    def _substitution(self, written: Any) -> Text:
+        for name in class_names(written):
+            if name in _KINDS:
+                found: Text = getattr(self, _KINDS[name])(written)
+                return found
+        return self._performed(written)
+
+    def _performed(self, written: Any) -> Text:
+        """Return what `launch` makes of a substitution, with marks where arguments are in it."""
+        text, fixed = run_marked(
+            self._scope, lambda marks: self._perform(written, marks), self._outcome
+        )
+        if fixed:
+            self._place.fix(fixed)
+            shown = ', '.join(fixed)
+            self._remark(f'{type(written).__name__} was resolved: it depends on {shown}')
+        return _constant(text)
+
+    def _perform(self, written: Any, marks: frozenset[str]) -> tuple[str, list[str]]:
+        self._scope.fill(self._context, marks)
+        with self._place.loader.reading() as read:
+            try:
+                return str(self._context.perform_substitution(written)), read
+            except Exception as error:
+                kind = type(written).__name__
+                message = f'{self._place.origin}: {kind} cannot be resolved: {error}'
+                raise LaunchError(message) from error
+
+    def _outcome(self, text: str) -> str:
+        """Return what a substitution gives: of a new file, what stands in it."""
+        path = unmarked(text)
+        return unmarked(repr(read_file(path))) if self.is_new_file(path) else path
+
+    def is_new_file(self, path: str) -> bool:
+        """Return whether a helper of the launch file has written a file just now."""
+        try:
+            is_new = Path(path).stat().st_mtime >= self._place.started
+        except (OSError, ValueError):
+            return False
+        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
+
+    def _text(self, written: Any) -> Text:
+        return _constant(str(written.text))
+
+    def _configuration(self, written: Any) -> Text:
+        name = self.text(private(written, 'variable_name')).text
+        value = self._scope.configurations.get(name)
+        if isinstance(value, Text):
+            return value
+        default = private(written, 'default')
+        if name in self._place.given:
+            return _constant(self._place.given[name])
+        if default is None:
+            origin = self._place.origin
+            message = f"{origin}: the launch configuration '{name}' is used, but nothing sets it"
+            raise LaunchError(message)
+        return self.text(default)
+
+    def _variable(self, written: Any) -> Text:
+        name = self.text(private(written, 'name')).text
+        default = private(written, 'default_value')
+        if (own := self._scope.environment.get(name)) is not None:
+            return own
+        if default is None:
+            return one(f"env('{name}')", os.environ.get(name, ''))
+        otherwise = self.text(default)
+        text = os.environ.get(name, otherwise.text)
+        return one(f"env('{name}', {otherwise.code})", text)
+
+    def _share(self, written: Any) -> Text:
+        name = self.text(private(written, 'package'))
+        share = find_share(name.text)
+        return one(f'find({name.code})', str(share or f'{_ABSENT}/{name.text}'))
+
+    def _prefix(self, written: Any) -> Text:
+        name = self.text(private(written, 'package')).text
+        share = find_share(name)
+        text = str(share.parent.parent) if share else f'{_ABSENT}/{name}'
+        return one(f"(find('{name}').removesuffix('/share/{name}'))", text)
+
+    def _executable_in_package(self, written: Any) -> Text:
+        program = self.text(private(written, 'executable'))
+        package = self.text(private(written, 'package'))
+        return joined((self._prefix(written), Text(('/lib',)), package, program), '/')
+
+    def _path(self, written: Any) -> Text:
+        parts = [self.text(each) for each in private(written, 'substitutions')]
+        path = EMPTY
+        for part in parts:
+            if part.text.startswith('/') or not path.parts:
+                path = part
+            else:
+                path = joined((path, part), '' if path.text.endswith('/') else '/')
+        return path
+
+    def _file(self, _written: Any) -> Text:
+        return _constant(str(self._scope.file))
+
+    def _file_folder(self, _written: Any) -> Text:
+        return _constant(str(self._scope.file.parent if self._scope.file else ''))
+
+    def _program(self, written: Any) -> Text:
+        return self.text(private(written, 'name'))
+
+    def _python(self, written: Any) -> Text:
+        source = self.text(private(written, 'expression'))
+        modules = [self.text(each).text for each in private(written, 'python_modules') or ()]
+        self._scope.fill(self._context)
+        result = str(self._evaluated(source.text, modules))
+        try:
+            return translate(source, result)
+        except UnlikeError:
+            self._remark(f'{source.text} was resolved to {result}')
+            return _constant(result)
+
+    def _evaluated(self, source: str, modules: Sequence[str]) -> Any:
+        import importlib
+
+        names: dict[str, Any] = {}
+        for module in modules:
+            loaded = importlib.import_module(module)
+            names |= vars(loaded) if module == 'math' else {}
+            names[module] = loaded
+        try:
+            # It is the user's launch file, which is Python and has run already.
+            return eval(source, {}, names)  # noqa: S307
+        except Exception as error:
+            message = f'the expression {source} cannot be evaluated: {error}'
+            raise LaunchError(message) from error
+
+    def _as_bool(self, written: Any) -> Text:
+        """Return what nav2's `LaunchConfigAsBool` makes of a configuration."""
+        value = self.text(private(written, 'config'))
+        text = str(value.text.strip().lower() in _TRUE)
+        if value.is_constant:
+            return _constant(text)
+        return one(f'({value.code} | lower in {list(_TRUE)})', text, 'python-bool')
+
+    def _not(self, written: Any) -> Text:
+        value = self.text(private(written, 'value'))
+        return self._truth(f'(not {_bracketed(value)})', not _truth(value), value)
+
+    def _both(self, written: Any) -> Text:
+        return self._combined((private(written, 'left'), private(written, 'right')), 'and')
+
+    def _either(self, written: Any) -> Text:
+        return self._combined((private(written, 'left'), private(written, 'right')), 'or')
+
+    def _all(self, written: Any) -> Text:
+        return self._combined(private(written, 'args'), 'and')
+
+    def _any(self, written: Any) -> Text:
+        return self._combined(private(written, 'args'), 'or')
+
+    def _combined(self, written: Sequence[Any], word: str) -> Text:
+        values = [self.text(each) for each in written]
+        test = all if word == 'and' else any
+        code = f'({f" {word} ".join(map(_bracketed, values))})'
+        return self._truth(code, test(map(_truth, values)), *values)
+
+    def _equal(self, written: Any) -> Text:
+        left, right = self.text(private(written, 'left')), self.text(private(written, 'right'))
+        is_boolean = any(
+            each.is_constant and each.text.lower() in ('true', 'false') for each in (left, right)
+        )
+        codes = [f'{each.code} | lower' if is_boolean else each.code for each in (left, right)]
+        lefts = [each.text.lower() if is_boolean else each.text for each in (left, right)]
+        return self._truth(f'({codes[0]} == {codes[1]})', lefts[0] == lefts[1], left, right)
+
+    def _unequal(self, written: Any) -> Text:
+        equal = self._equal(written)
+        if equal.is_constant:
+            return _constant('false' if equal.text == 'true' else 'true')
+        return one(f'(not {equal.code})', 'false' if equal.text == 'true' else 'true', 'bool')
+
+    def _truth(self, code: str, value: bool, *of: Text) -> Text:  # noqa: FBT001 - the value itself
+        text = 'true' if value else 'false'
+        if all(each.is_constant for each in of):
+            return _constant(text)
+        return one(code, text, 'bool')
+
+    def _one_of_two(self, written: Any) -> Text:
+        condition = self.text(private(written, 'condition'))
+        then = self.text(private(written, 'if_value'))
+        otherwise = self.text(private(written, 'else_value'))
+        if condition.is_constant:
+            return then if _truth(condition) else otherwise
+        return chosen(f'({condition.condition()})', then, otherwise, is_true=_truth(condition))
+
+    def command_words(self, written: Any) -> list[Text] | None:
+        """Return the words of a `Command`; `None` if that is not what is written."""
+        items = written if isinstance(written, list | tuple) else [written]
+        if len(items) != 1 or 'Command' not in class_names(items[0]):
+            return None
+        return split_words(self.text(private(items[0], 'command')))
+
+
+def _constant(text: str) -> Text:
+    """Return a text, with the share folders of packages in it as `find(…)`."""
+    plain = constant(text)
+    first = plain.parts[0] if plain.parts else ''
+    found = _SHARE.match(first) if isinstance(first, str) else None
+    if found is None or not isinstance(first, str):
+        return plain
+    folder, package = f'{found[1]}/share/{found[2]}', found[2]
+    if str(find_share(package)) != folder and not folder.startswith(f'{_ABSENT}/'):
+        return plain
+    scheme = 'file://' if first.startswith('file://') else ''
+    rest = first[found.end() :]
+    parts = (scheme, Code(f"find('{package}')", folder), rest, *plain.parts[1:])
+    return Text(tuple(part for part in parts if part))
+
+
+def read_file(path: str) -> Any:
+    """Return the data of a YAML file; `None` if it has none."""
+    try:
+        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except (OSError, ValueError, yaml.YAMLError):
+        return None
+
+
+def _truth(value: Text) -> bool:
+    text = value.text.strip().lower()
+    if text not in ('true', '1', 'false', '0'):
+        read = read_yaml(value.text)
+        if isinstance(read, bool):
+            return read
+        message = f"'{value.text}' is neither true nor false"
+        raise LaunchError(message)
+    return text in ('true', '1')
+
+
+def _bracketed(value: Text) -> str:
+    return f'({value.condition()})'
+
+
+truth_of = _truth
+
+# The method for each class of substitutions.
+_KINDS = {
+    'TextSubstitution': '_text',
+    'LaunchConfiguration': '_configuration',
+    'EnvironmentVariable': '_variable',
+    'FindPackageShare': '_share',
+    'FindPackagePrefix': '_prefix',
+    'ExecutableInPackage': '_executable_in_package',
+    'PathJoinSubstitution': '_path',
+    'ThisLaunchFile': '_file',
+    'ThisLaunchFileDir': '_file_folder',
+    'FindExecutable': '_program',
+    'PythonExpression': '_python',
+    'LaunchConfigAsBool': '_as_bool',
+    'NotSubstitution': '_not',
+    'AndSubstitution': '_both',
+    'OrSubstitution': '_either',
+    'AllSubstitution': '_all',
+    'AnySubstitution': '_any',
+    'EqualsSubstitution': '_equal',
+    'NotEqualsSubstitution': '_unequal',
+    'IfElseSubstitution': '_one_of_two',
+}

@@ -1,0 +1,170 @@
+"""What a launch file consists of → the text of a system, and the parameter files beside it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from composer.launch_files.parameters import NewFile
+from composer.launch_files.texts import Computed, Text
+from composer.yaml_text.writer import RCL, render_yaml
+
+if TYPE_CHECKING:
+    from composer.launch_files.results import Argument, Entry, Imported
+
+_SECTIONS = ('processes', 'containers')
+_NAME = re.compile(r'[^A-Za-z0-9_.-]+')
+
+
+@dataclass
+class SystemFile:
+    """The text of a system, and the files beside it by their paths relative to it."""
+
+    text: str = ''
+    files: dict[str, str] = field(default_factory=dict)
+
+
+def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
+    """Return an imported launch file as a system.
+
+    Args:
+        source: What was imported, for the first line.
+        stem: The name of the system, for the folder of its parameter files.
+    """
+    written = SystemFile()
+    lines = [f'# Imported from {source}.', 'version: 1']
+    lines += _arguments(imported.arguments.values())
+    common = _common_environment(imported.entries)
+    if common:
+        lines += ['', render_yaml({'environment': common}).rstrip()]
+    for section in _SECTIONS:
+        entries = [entry for entry in imported.entries if entry.section == section]
+        if entries:
+            lines += ['', f'{section}:']
+        for entry in entries:
+            data = _finished(imported, entry, common, written, stem)
+            lines += [f'  # {entry.origin}'] if entry.origin else []
+            lines += [f'  {line}' for line in render_yaml({entry.name: data}).splitlines()]
+    if not imported.entries:
+        lines += ['', 'nodes: {}']
+    if imported.remarks:
+        lines += ['', '# Not kept as it was:']
+        lines += [f'# {" ".join(remark.split())}' for remark in imported.remarks]
+    written.text = '\n'.join(lines) + '\n'
+    return written
+
+
+def _arguments(arguments: Any) -> list[str]:
+    if not arguments:
+        return []
+    lines = ['', 'args:']
+    for argument in arguments:
+        if argument.fixed:
+            lines.append(
+                '  # A function of the launch file depends on it: import again to change.'
+            )
+        data = render_yaml({argument.name: _declaration(argument)})
+        lines += [f'  {line}' for line in data.splitlines()]
+    return lines
+
+
+def _declaration(argument: Argument) -> dict[str, Any]:
+    data: dict[str, Any] = {'type': 'string'}
+    default: Any = None
+    if argument.given is not None:
+        default = argument.given
+    elif argument.default is not None:
+        default = argument.default.written()
+    if default is not None:
+        data['default'] = default
+    if argument.description:
+        data['description'] = ' '.join(argument.description.split())
+    if argument.fixed and default is not None and not isinstance(default, Computed):
+        data['choices'] = [default]
+    elif argument.choices:
+        data['choices'] = list(argument.choices)
+    return data
+
+
+def _common_environment(entries: list[Entry]) -> dict[str, Any]:
+    """Return the variables that are the same for all processes."""
+    if not entries:
+        return {}
+    first, *others = [entry.environment for entry in entries]
+    return {
+        name: value.written()
+        for name, value in first.items()
+        if value is not None and all(name in each and each[name] == value for each in others)
+    }
+
+
+def _finished(
+    imported: Imported, entry: Entry, common: dict[str, Any], written: SystemFile, stem: str
+) -> dict[str, Any]:
+    """Return the data of an entry as they are written."""
+    data: dict[str, Any] = {}
+    if entry.when:
+        data['when'] = Computed(f'{{{{ {entry.when} }}}}', entry.holds)
+    data |= entry.data
+    env = {
+        name: value.written()
+        for name, value in entry.environment.items()
+        if name not in common and isinstance(value, Text)
+    }
+    if env:
+        data['env'] = env | data.get('env', {})
+    for owner, label in _with_files(data, entry.name):
+        owner['parameter_files'] = [
+            _written_file(each, label, written, stem) for each in owner['parameter_files']
+        ]
+    waits = list(_waits(imported, entry))
+    if waits:
+        data['wait_for'] = waits[0] if len(waits) == 1 else waits
+    return data
+
+
+def _with_files(data: dict[str, Any], name: str) -> Any:
+    if 'parameter_files' in data:
+        yield data, name
+    for label, component in data.get('components', {}).items():
+        if 'parameter_files' in component:
+            yield component, label
+
+
+def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
+    if not isinstance(file, NewFile):
+        return file
+    data = file.data
+    if not any(
+        isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()
+    ):
+        data = {'/**': {'ros__parameters': data}}
+    text = render_yaml(data, RCL)
+    plain = _NAME.sub('_', label).strip('_') or 'node'
+    number, path = 2, f'{stem}.params/{plain}.yaml'
+    while path in written.files and written.files[path] != text:
+        path, number = f'{stem}.params/{plain}_{number}.yaml', number + 1
+    written.files[path] = text
+    return {'file': path, 'expressions': True} if _has_expressions(data) else path
+
+
+def _has_expressions(data: Any) -> bool:
+    if isinstance(data, dict):
+        return any(_has_expressions(each) for each in (*data.keys(), *data.values()))
+    if isinstance(data, list):
+        return any(map(_has_expressions, data))
+    return isinstance(data, Computed)
+
+
+def _waits(imported: Imported, entry: Entry) -> Any:
+    for wait in entry.waits:
+        target = next((each for each in imported.entries if each.action is wait.action), None)
+        if target is None:
+            imported.remarks.append(f"'{entry.name}' waits for what is not among the processes")
+        elif target.section == 'containers':
+            yield {'node': f'/{target.name}'}
+        elif wait.state == 'running':
+            yield {'process': target.name}
+        else:
+            yield {'process': target.name, 'state': wait.state}

@@ -1,0 +1,6 @@
+def configure(node):
+    node.logger.info('the motor turns')
+
+
+def locate(node):
+    return {}

@@ -1,0 +1,137 @@
+"""`composer capture`: foreign nodes become declarations, and nodes beside them are checked."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
+from tests.running import ROOT
+
+pytestmark = pytest.mark.ros
+
+# What the foreign camera and viewer lack: somebody who hears the one, and speaks to the other.
+BESIDE = """
+nodes:
+  speaker:
+    namespace: /left
+    publishers: {words: std_msgs/msg/String}
+    timers: {speak: {rate: 1, publish: words, message: {data: hello}}}
+  detector:
+    namespace: /left
+    subscriptions:
+      seen: {type: sensor_msgs/msg/Image, topic: camera/image, qos: sensor_data, publish: copy}
+    publishers: {copy: {type: sensor_msgs/msg/Image, external: true}}
+"""
+
+
+@pytest.fixture
+def run(domain_id, tmp_path, start_program):
+    """Return a function that starts foreign nodes, and returns what a command says of them."""
+
+    def capture(roles, *words):
+        if roles:
+            child = start_program(ROOT / 'tests' / 'foreign_nodes.py', *roles)
+            assert child.stdout.readline() == 'ready\n'
+        command = [sys.executable, '-m', 'composer', 'capture', *words]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+        )
+
+    return capture
+
+
+def check(path, text):
+    path.write_text(text)
+    findings = check_system(load_system(path), InterfaceCatalogue())
+    return [each for each in findings if each.rule != 'missing-program']
+
+
+def test_what_is_captured_is_checked_beside_nodes_of_a_system(run, tmp_path):
+    result = run(['camera', 'viewer'], '-o', 'captured.yaml')
+    assert (result.returncode, result.stdout, result.stderr) == (0, '', '')
+    text = (tmp_path / 'captured.yaml').read_text()
+    path = tmp_path / 'robot.yaml'
+    assert not check(path, text)
+    system = text + BESIDE
+    assert not check(path, system)
+    for old, new, rule in [
+        ('~/image:\n            type: sensor_msgs/msg/Image', None, 'conflicting-types'),
+        ('qos: sensor_data, publish', 'qos: 10, publish', 'incompatible-qos'),
+        ('topic: camera/image', 'topic: camera/imgae', 'no-publisher'),
+        ('{words: std_msgs', '{worsd: std_msgs', 'no-subscription'),
+        ('namespace: /left\n    nodes:\n      camera:', None, 'no-publisher'),
+        ('camera/enable: std_srvs', 'camera/enabel: std_srvs', 'no-server'),
+    ]:
+        assert old in system
+        wrong = system.replace(old, new or old.replace('Image', 'Imu').replace('/left', '/lefft'))
+        assert rule in [each.rule for each in check(path, wrong)], old
+
+    process = load_system(tmp_path / 'captured.yaml').spec.processes['camera']
+    (camera,) = process.nodes
+    assert camera.full_name == '/left/camera'
+    rate = camera.parameters['rate']
+    assert (rate.type, rate.value, rate.description) == ('double', 30.0, 'Images a second.')
+    assert (rate.minimum, rate.maximum, rate.step) == (1.0, 60.0, 0.5)
+    assert camera.parameters['frame'].read_only
+    assert camera.parameters['size'].value == [640, 480]
+    assert camera.parameters['text'].value == 'a: {{ b }}\n"c" # d'
+    assert camera.declares_all_parameters
+    assert camera.sections['publishers']['/robot_description'].qos.policies == {
+        'durability': 'transient_local'
+    }
+    assert set(camera.sections['services']) == {'~/enable'}
+    assert set(camera.sections['actions']) == {'move'}
+    assert 'rosout' not in text
+    assert '_action' not in text
+
+
+def test_a_nodl_document_of_a_node_says_the_same(run, tmp_path):
+    result = run(['camera'], 'camera', '--format', 'nodl', '-o', 'camera.nodl.yaml')
+    assert (result.returncode, result.stderr) == (0, '')
+    xml = run([], '/left/camera', '--format', 'nodl-xml', '-o', 'camera.nodl.xml')
+    assert (xml.returncode, xml.stderr) == (0, '')
+    path = tmp_path / 'robot.yaml'
+    named = "{command: ['true'], name: camera, namespace: /left, nodl: camera.nodl."
+    for suffix in ('yaml', 'xml'):
+        system = f'version: 1\nprocesses:\n  camera: {named}{suffix}}}\n{BESIDE}'
+        assert not check(
+            path,
+            system.replace('std_msgs/msg/String', '{type: std_msgs/msg/String, external: true}'),
+        )
+        wrong = system.replace(
+            'type: sensor_msgs/msg/Image, topic', 'type: std_msgs/msg/Int8, topic'
+        )
+        assert 'conflicting-types' in [each.rule for each in check(path, wrong)]
+
+
+def test_nodes_of_one_name_and_nodes_that_do_not_answer_are_told_apart(run, tmp_path):
+    result = run(['camera', 'right_camera', 'silent', 'hung'], '--timeout', '2', '-o', 'all.yaml')
+    assert result.returncode == 1
+    said = sorted(result.stderr.splitlines())
+    assert said == [
+        "warning: node '/hung': it did not answer within 2 s: its parameters are not known",
+        "warning: node '/silent': it has no parameter services: its parameters are not known",
+    ]
+    text = (tmp_path / 'all.yaml').read_text()
+    assert not check(tmp_path / 'all.yaml', text)
+    spec = load_system(tmp_path / 'all.yaml').spec
+    assert set(spec.processes) == {'left_camera', 'right_camera', 'silent', 'hung'}
+
+
+def test_a_node_that_is_not_there_is_an_error(run):
+    result = run(['viewer'], 'viewr')
+    assert result.returncode == 1
+    assert "there is no node 'viewr' on this ROS graph (ROS_DOMAIN_ID " in result.stderr
+    assert "did you mean 'viewer'?" in result.stderr
+
+
+def test_no_graph_is_an_error(run):
+    result = run([])
+    assert result.returncode == 1
+    assert 'there are no nodes on this ROS graph (ROS_DOMAIN_ID ' in result.stderr
+    assert 'Traceback' not in result.stderr

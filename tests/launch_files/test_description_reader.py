@@ -1,0 +1,192 @@
+"""Launch descriptions → systems, with stand-ins for the objects of `launch`."""
+
+import pytest
+import yaml
+
+from composer.language.pipeline import load_system
+from composer.launch_files.description_reader import DescriptionReader
+from composer.launch_files.place import Place
+from composer.launch_files.results import LaunchError
+from composer.launch_files.system_file import render_system
+from tests.launch_files import stand_ins as launch
+
+SIDE = launch.LaunchConfiguration('side')
+SIM = launch.LaunchConfiguration('sim')
+ARGUMENTS = (
+    launch.DeclareLaunchArgument('side', 'left', 'Which one.', ('left', 'right')),
+    launch.DeclareLaunchArgument('sim', 'false'),
+)
+
+
+def python(*parts):
+    return [each if not isinstance(each, str) else launch.TextSubstitution(each) for each in parts]
+
+
+def read(*entities, **given):
+    place = Place(launch.Loader(), given)
+    DescriptionReader(place).read([launch.LaunchDescription([*ARGUMENTS, *entities])])
+    return render_system(place.result, 'x.launch.py', 'x')
+
+
+def node(**keys):
+    return launch.Node('arm', 'drive', **keys)
+
+
+def resolved(tmp_path, system, *words):
+    """Return the processes of a system with these arguments, and no findings."""
+    path = tmp_path / 'system.yaml'
+    path.write_text(system.text)
+    for name, text in system.files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    loaded = load_system(path, words)
+    assert not loaded.diagnostics, [each.message for each in loaded.diagnostics]
+    return loaded.spec.processes
+
+
+@pytest.mark.parametrize(
+    ('entity', 'data'),
+    [
+        (node(name='left', namespace=SIDE), {'name': 'left', 'namespace': '{{ side }}'}),
+        (node(remappings=[('a', ['/', SIDE])]), {'remap': {'a': '/{{ side }}'}}),
+        (
+            node(parameters=[{'sim': (SIM,), 'frame': (SIDE, launch.TextSubstitution('_base'))}]),
+            {'parameters': {'sim': '{{ sim | from_yaml }}', 'frame': '{{ side }}_base'}},
+        ),
+        (
+            node(parameters=[{'text': (launch.TextSubstitution('1.5'),)}]),
+            {'parameters': {'text': 1.5}},
+        ),
+        (node(respawn=True, respawn_delay=2.0), {'restart': {'when': 'always', 'delay': 2.0}}),
+        (node(on_exit=launch.Shutdown()), {'on_exit': 'shutdown'}),
+        (node(ros_arguments=['--log-level', 'warn']), {'log_level': 'warn'}),
+        (node(arguments=['-x', SIDE]), {'arguments': ['-x', '{{ side }}']}),
+        (node(condition=launch.IfCondition(SIM)), {'when': '{{ sim | bool }}'}),
+        (node(condition=launch.UnlessCondition(SIM)), {'when': '{{ not (sim | bool) }}'}),
+        (
+            node(
+                condition=launch.IfCondition(
+                    launch.PythonExpression(python("'", SIDE, "' == 'left' and not ", 'False'))
+                )
+            ),
+            {'when': "{{ ((side == 'left') and (not false)) }}"},
+        ),
+        (launch.TimerAction(2.5, [node()]), {'delay': 2.5}),
+        (
+            launch.GroupAction([launch.PushRosNamespace(SIDE), node(namespace='arm')]),
+            {'namespace': '{{ side }}/arm'},
+        ),
+        (
+            launch.GroupAction(
+                [launch.SetRemap('a', 'b'), node(remappings=[('a', 'c'), ('d', 'e')])]
+            ),
+            {'remap': {'a': 'b', 'd': 'e'}},
+        ),
+        (
+            launch.GroupAction([launch.SetParameter({'x': 1}), node(parameters=[{'y': 2}])]),
+            {'parameters': {'x': 1, 'y': 2}},
+        ),
+        (
+            launch.GroupAction(
+                [launch.SetLaunchConfiguration('sim', SIDE), node(arguments=[SIM])],
+            ),
+            {'arguments': ['{{ side }}']},
+        ),
+        (
+            launch.GroupAction(
+                [
+                    launch.SetLaunchConfiguration(
+                        'side', 'top', condition=launch.IfCondition(SIM)
+                    ),
+                    node(arguments=[SIDE]),
+                ],
+            ),
+            {'arguments': ["{{ ('top' if sim | bool else side) }}"]},
+        ),
+        (node(arguments=[launch.Shouted('side')]), {'arguments': ['{{ side }}!']}),
+        (
+            launch.OpaqueFunction(
+                lambda context: [node(arguments=[context.launch_configurations['side']])]
+            ),
+            {'arguments': ['{{ side }}']},
+        ),
+    ],
+)
+def test_what_a_node_is_given(tmp_path, entity, data):
+    system = read(entity)
+    (process,) = yaml.safe_load(system.text)['processes'].values()
+    assert process == {'package': 'arm', 'executable': 'drive', **data}
+    resolved(tmp_path, system)
+
+
+def test_arguments_remain_arguments(tmp_path):
+    system = read(node(arguments=[SIDE]), sim='true')
+    assert yaml.safe_load(system.text)['args'] == {
+        'side': {
+            'type': 'string',
+            'default': 'left',
+            'description': 'Which one.',
+            'choices': ['left', 'right'],
+        },
+        'sim': {'type': 'string', 'default': 'true'},
+    }
+    (process,) = resolved(tmp_path, system, 'side:=right').values()
+    assert process.arguments == ('right',)
+
+
+def test_a_condition_holds_for_what_launch_takes_for_true(tmp_path):
+    system = read(node(name='fake', condition=launch.IfCondition(SIM)))
+    for text, count in (('True', 1), ('1', 1), ('false', 0), ('0', 0)):
+        assert len(resolved(tmp_path, system, f'sim:={text}')) == count
+
+
+def test_an_argument_that_decides_what_a_function_returns_cannot_change(tmp_path):
+    def decide(context):
+        is_left = context.launch_configurations['side'] == 'left'
+        return [node(name='left' if is_left else 'right')]
+
+    system = read(launch.OpaqueFunction(decide))
+    assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
+    assert '# line 1 of OpaqueFunction: OpaqueFunction was resolved' in system.text
+
+
+def test_what_begins_when_another_ends_waits_for_it(tmp_path):
+    first = node(name='first')
+    handler = launch.OnProcessExit(first, [node(name='second')])
+    system = read(launch.RegisterEventHandler(handler), first)
+    second = yaml.safe_load(system.text)['processes']['second']
+    assert second['wait_for'] == {'process': 'first', 'state': 'ended'}
+    resolved(tmp_path, system)
+
+
+def test_what_cannot_be_kept_is_a_comment_with_its_line():
+    system = read(launch.LogInfo(['Hello, ', SIDE]), node())
+    assert system.text.endswith(
+        '# Not kept as it was:\n# line 1 of LogInfo: LogInfo: Hello, left\n'
+    )
+
+
+def test_values_after_a_file_that_has_them_too_are_in_a_file_of_their_own(tmp_path):
+    (tmp_path / 'own.yaml').write_text('/**: {ros__parameters: {x: 1, y: 1}}\n')
+    system = read(
+        node(
+            name='a',
+            parameters=[
+                {'x': 0},
+                launch.ParameterFile(str(tmp_path / 'own.yaml')),
+                {'y': 2, 'z': 3},
+            ],
+        )
+    )
+    data = yaml.safe_load(system.text)['processes']['a']
+    assert data['parameters'] == {'x': 0}
+    assert data['parameter_files'] == [str(tmp_path / 'own.yaml'), 'x.params/a.yaml']
+    assert yaml.safe_load(system.files['x.params/a.yaml']) == {
+        '/**': {'ros__parameters': {'y': 2, 'z': 3}}
+    }
+
+
+def test_an_argument_without_a_value_is_asked_for():
+    with pytest.raises(LaunchError, match="requires the argument 'port'") as caught:
+        read(launch.DeclareLaunchArgument('port'))
+    assert caught.value.help == 'give it a value: port:=…'

@@ -1,0 +1,70 @@
+"""`wait_for: {node: x, state: active}`: of nodes of the system, and of others."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+
+from tests.running import ROOT
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+def tell(node):
+    node.logger.info('starts')
+"""
+PROGRAM = ROOT / 'tests/runtime/lifecycle/managed_program.py'
+
+
+def change(peer, node, transition):
+    assert peer.call(
+        ChangeState, f'{node}/change_state', transition=Transition(id=transition)
+    ).success
+
+
+@pytest.mark.parametrize('is_own', [True, False])
+def test_a_node_starts_when_another_one_is_active(compose, peer, is_own, start_program):
+    text = f"""
+        version: 1
+        nodes:
+          late:
+            wait_for: {{node: lidar, state: active}}
+            on_start: parts:tell
+          {'lidar: {lifecycle: true}' if is_own else 'other: {on_start: parts:tell}'}
+    """
+    if not is_own:
+        start_program(PROGRAM, 'lidar')
+    child = compose(text, CODE)
+    change(peer, 'lidar', Transition.TRANSITION_CONFIGURE)
+    child.wait_for_line("[late]: Waiting for node '/lidar' to be active")
+    assert peer.call(GetState, 'lidar/get_state').current_state.label == 'inactive'
+    assert not child.matching('[late]: starts')
+    change(peer, 'lidar', Transition.TRANSITION_ACTIVATE)
+    child.wait_for_line('[late]: starts')
+    child.wait_until_ready()
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ('lidar', 'reason'),
+    [
+        ('lidar: {lifecycle: true}', 'it is unconfigured'),
+        ('other: {on_start: parts:tell}', 'there is no such node'),
+    ],
+)
+def test_a_state_that_does_not_come_ends_the_start(compose, lidar, reason):
+    text = f"""
+        version: 1
+        nodes:
+          late:
+            wait_for: {{node: lidar, state: active, timeout: 0.5}}
+            on_start: parts:tell
+          {lidar}
+    """
+    child = compose(text, CODE)
+    assert child.wait() == 1
+    (line,) = child.matching('error: ')
+    assert line.startswith("error: node 'late' (system.yaml:5) waited 0.5 s for the node '/lidar'")
+    assert line.endswith(reason)

@@ -1,0 +1,117 @@
+"""Entities that behaviours create: made, guarded and removed as those that a file declares."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """\
+version: 1
+nodes:
+  rig:
+    parameters: {source: cam_0}
+    timers: {idle: {period: 100, behaviour: 'parts:idle'}}
+    on_start: parts:Rig.begin
+  other:
+    subscriptions:
+      fixed: {type: std_msgs/msg/String, behaviour: 'parts:hear'}
+"""
+CODE = """\
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import String
+
+
+class Rig:
+    def __init__(self, node):
+        self.cameras = [node.create_publisher(String, f'cam_{i}', 10) for i in range(2)]
+        node.create_subscription(String, node.parameters.source, self.hear)
+        node.create_subscription('std_msgs/msg/String', 'cam_1', hear, qos_profile_sensor_data)
+        self.fast = node.create_timer(0.05, self.tick)
+        self.slow = [node.create_timer(0.05, steps) for _ in range(2)]
+        node.create_publisher(String, 'fixed', {'durability': 'transient_local'})
+        node.create_service('std_srvs/srv/Trigger', 'ask', self.answer)
+        self.client = node.create_client('std_srvs/srv/Trigger', 'ask')
+        self.number = 0
+
+    def begin(self, node):
+        node.create_timer(0.05, self.ask, group='reentrant')
+        for wrong in (('std_msgs/msg/Strin', 'x'), (String, 'a b'), (String, 'x', -1)):
+            refused(node, *wrong)
+        refused(node, String, 'x', name='fixed')
+        refused(node, String, 'x', colour=3)
+
+    def answer(self, node, request):
+        return {'success': True, 'message': f'yes {self.number > 2}'}
+
+    def ask(self, node):
+        node.logger.info(f'answered {self.client.call().message}')
+
+    def tick(self, node):
+        self.number += 1
+        for each in self.cameras:
+            each.publish(f'tick {self.number}')
+        node.publish('fixed', 'x')
+        if self.number == 20:
+            node.destroy(self.fast)
+            node.destroy(self.fast)
+            node.logger.info('destroyed')
+
+    def hear(self, node, message):
+        if self.number == 2:
+            raise ValueError('two')
+        node.logger.info(f'rig heard {message.data}')
+
+
+def refused(node, *arguments, **options):
+    try:
+        node.create_publisher(*arguments, **options)
+    except Exception as error:
+        node.logger.info(f'refused: {error}')
+
+
+def steps(node):
+    try:
+        yield
+        node.logger.info('step')
+    finally:
+        node.logger.info('closed')
+
+
+def idle(node):
+    pass
+
+
+def hear(node, message):
+    node.logger.info(f'plain heard {message.data}')
+"""
+
+
+def test_what_a_behaviour_creates_works_as_what_the_file_declares(compose):
+    child = compose(SYSTEM, CODE, '--watch')
+    child.wait_until_ready()
+    assert len(child.matching('refused: ')) == 5, child.output
+    assert child.matching("refused: node 'rig' has a publisher 'fixed' already")
+    for line in (
+        '[rig]: rig heard tick 1',
+        "[rig]: subscription 'cam_0' (system.yaml:3) raised ValueError: two",
+        '[rig]: rig heard tick 20',
+        '[rig]: plain heard tick 20',
+        '[other]: plain heard x',
+        '[rig]: answered yes True',
+        '[rig]: destroyed',
+    ):
+        child.wait_for_line(line)
+    assert not child.matching('tick 21')
+    child.wait_for_line('[rig]: closed', times=2)
+    # An edit elsewhere leaves them, also of this node.
+    compose.write(SYSTEM.replace('period: 100', 'period: 99'), CODE)
+    child.wait_for_line('reloaded in')
+    answered = len(child.matching('answered'))
+    child.wait_for_line('answered', times=answered + 3)
+    # A node that is created again begins without them.
+    child.lines.clear()
+    compose.write(SYSTEM.replace('cam_0}', 'cam_1}\n    rosout: false'), CODE)
+    child.wait_for_line('±1 node')
+    child.wait_for_line('[rig]: rig heard tick 1')
+    assert child.stop() == 0
