@@ -57,6 +57,7 @@ class Deadly(Talker):
 
 
 CLASSES = {f'stand_in::{each.__name__}': each for each in (Talker, Slow, Broken, Deadly)}
+CLASSES['composition::Talker'] = Talker
 
 
 class Container(Node):
@@ -73,7 +74,7 @@ class Container(Node):
 
     def load(self, request, response):
         kind = CLASSES.get(request.plugin_name)
-        if request.package_name != 'stand_in':
+        if request.package_name != request.plugin_name.partition('::')[0]:
             response.error_message = 'Could not find requested resource in ament index'
         elif kind is None:
             response.error_message = 'Failed to find class with the requested plugin name.'

@@ -19,7 +19,7 @@ from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
-from composer.language.parsing.containers import unfold_containers
+from composer.language.parsing.container_parser import unfold_containers
 from composer.language.paths import resolve_path
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import replace_start_values

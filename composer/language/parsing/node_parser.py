@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import NODE_BEHAVIOURS
-from composer.language.parsing.conditions import parse_conditions
+from composer.language.parsing.condition_parser import parse_conditions
 from composer.language.parsing.entity_parser import parse_entities, parse_run_options
 from composer.language.parsing.entry_parser import Data, parse_behaviour
 from composer.language.specs import BehaviourSpec, LifecycleStart, NodeSpec

@@ -6,8 +6,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from composer.language.parsing.conditions import kind_of, parse_conditions
-from composer.language.parsing.containers import declare_component, parse_components
+from composer.language.parsing.condition_parser import kind_of, parse_conditions
+from composer.language.parsing.container_parser import declare_component, parse_components
 from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.parsing.entry_parser import behaviour_at, parse_behaviour
 from composer.language.specs import (

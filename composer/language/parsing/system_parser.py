@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.language.loaded_system import PARTS
-from composer.language.parsing.containers import (
+from composer.language.parsing.container_parser import (
     LOADING_DEFINITIONS,
     LOADING_PACKAGE,
     is_container,

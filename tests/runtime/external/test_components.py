@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from composer.interfaces.build.provision import import_packages, provide_packages
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
-from composer.language.parsing.containers import LOADING_DEFINITIONS, LOADING_PACKAGE
+from composer.language.parsing.container_parser import LOADING_DEFINITIONS, LOADING_PACKAGE
 
 pytestmark = pytest.mark.ros
 

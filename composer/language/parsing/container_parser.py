@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from composer.language.parsing.conditions import parse_conditions
+from composer.language.parsing.condition_parser import parse_conditions
 from composer.language.specs import ComponentSpec, DeclaredNodeSpec
 from composer.names import expand_namespace
 
