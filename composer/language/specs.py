@@ -264,6 +264,27 @@ EntitySpec: TypeAlias = ParameterSpec | TimerSpec | EndSpec
 
 
 @record
+class ParameterFileSpec:
+    """A parameter file in ROS's own format.
+
+    Attributes:
+        file: A path, or `package://name/path`.
+        root: The namespace that its names of nodes are put in; empty for none.
+        expressions: What its expressions have in scope, as a JSON object; `None` if the file is
+            used as it is.
+    """
+
+    file: str
+    root: str = ''
+    expressions: str | None = None
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether ROS reads something else than the file itself."""
+        return bool(self.root.strip('/')) or self.expressions is not None
+
+
+@record
 class ConditionSpec:
     """Something that must be there before a node or process starts.
 
@@ -370,7 +391,7 @@ class ComponentSpec:
     package: str
     plugin: str
     parameters: Mapping[str, Any]
-    parameter_files: tuple[str, ...]
+    parameter_files: tuple[ParameterFileSpec, ...]
     remap: tuple[tuple[str, str], ...]
     log_level: LogLevel | None
     intra_process: bool
@@ -424,7 +445,7 @@ class ProcessSpec:
     node_name: str | None
     namespace: str | None
     parameters: Mapping[str, Any]
-    parameter_files: tuple[str, ...]
+    parameter_files: tuple[ParameterFileSpec, ...]
     remap: tuple[tuple[str, str], ...]
     log_level: LogLevel | None
     env: Mapping[str, str]
@@ -525,7 +546,7 @@ class NodeSpec:
     on_error_state: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
     delay_sec: float
-    parameter_files: tuple[str, ...]
+    parameter_files: tuple[ParameterFileSpec, ...]
     path: DataPath
 
     @property

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.language.parameter_files import parse_parameter_files
 from composer.language.parsing.condition_parser import parse_conditions
 from composer.language.specs import ComponentSpec, DeclaredNodeSpec
 from composer.names import expand_namespace
@@ -111,7 +112,7 @@ def _parse_component(
         package=data['package'],
         plugin=data['plugin'],
         parameters=MappingProxyType(data.get('parameters', {})),
-        parameter_files=tuple(data.get('parameter_files', ())),
+        parameter_files=parse_parameter_files(data),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
         intra_process=data.get('intra_process', False),
