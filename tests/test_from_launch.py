@@ -24,7 +24,7 @@ import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 import rclpy
 rclpy.init()
-node = rclpy.create_node('program')
+node = __import__('rclpy.lifecycle').lifecycle.LifecycleNode('program')
 publisher = node.create_publisher(__import__('std_msgs.msg').msg.String, 'chatter', 10)
 try:
     rclpy.spin(node)
@@ -36,9 +36,10 @@ EXECUTABLES = {
     'rclcpp_components': 'component_container',
     'lifecycle': 'lifecycle_talker',
     'robot_state_publisher': 'robot_state_publisher',
+    'nav2_map_server': 'map_server',
 }
 # They call ros2, which is not among the wheels.
-NOT_RUN = ('Composable nodes', 'Lifecycle nodes')
+NOT_RUN = ('Composable nodes',)
 
 
 def read_examples():

@@ -29,6 +29,7 @@ Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
 LifecycleStart: TypeAlias = Literal['unconfigured', 'inactive', 'active']
 LifecycleState: TypeAlias = Literal['unconfigured', 'inactive', 'active', 'finalized']
+DrivenState: TypeAlias = Literal['inactive', 'active']
 WhileInactive: TypeAlias = Literal['drop', 'keep']
 ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
@@ -274,6 +275,27 @@ EntitySpec: TypeAlias = ParameterSpec | TimerSpec | EndSpec
 
 
 @record
+class ParameterFileSpec:
+    """A parameter file in ROS's own format.
+
+    Attributes:
+        file: A path, or `package://name/path`.
+        root: The namespace that its names of nodes are put in; empty for none.
+        expressions: What its expressions have in scope, as a JSON object; `None` if the file is
+            used as it is.
+    """
+
+    file: str
+    root: str = ''
+    expressions: str | None = None
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether ROS reads something else than the file itself."""
+        return bool(self.root.strip('/')) or self.expressions is not None
+
+
+@record
 class ConditionSpec:
     """Something that must be there before a node or process starts.
 
@@ -373,6 +395,7 @@ class ProcessSpec:
         namespace: The namespace of the nodes in it; `None` if the program has none.
         nodes: The nodes in it that the file names or declares.
         declares_all_ends: Whether these have all the ends that it has.
+        lifecycle: The state that these are brought to; `None` to leave them alone.
         cwd: The folder it runs in; `None` for that of Composer.
         restart: When it is started again.
         most_restarts: How many times; `None` for no end.
@@ -393,7 +416,7 @@ class ProcessSpec:
     node_name: str | None
     namespace: str | None
     parameters: Mapping[str, Any]
-    parameter_files: tuple[str, ...]
+    parameter_files: tuple[ParameterFileSpec, ...]
     remap: tuple[tuple[str, str], ...]
     log_level: LogLevel | None
     env: Mapping[str, str]
@@ -409,7 +432,13 @@ class ProcessSpec:
     on_demand: bool
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
+    lifecycle: DrivenState | None
     path: DataPath
+
+    @property
+    def named_nodes(self) -> tuple[str, ...]:
+        """The full name of the node that it is told to have, if it is."""
+        return (join_names(self.namespace or '/', self.node_name),) if self.node_name else ()
 
     @property
     def starts_late(self) -> bool:
@@ -488,7 +517,7 @@ class NodeSpec:
     on_error_state: BehaviourSpec | None
     wait_for: tuple[ConditionSpec, ...]
     delay_sec: float
-    parameter_files: tuple[str, ...]
+    parameter_files: tuple[ParameterFileSpec, ...]
     path: DataPath
 
     @property

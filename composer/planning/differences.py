@@ -386,7 +386,8 @@ def _modification(
     )
     reason = next(filter(None, reasons), '')
     keys = dict.fromkeys(each.top_key for each in changes)
-    late = [key for key in keys if key in _AT_ITS_START and not reason]
+    at_start = _AT_ITS_START if rules is not _PROCESSES else ('wait_for', 'delay')
+    late = [key for key in keys if key in at_start and not reason]
     return Operation(
         Action.RECREATE if reason else Action.CHANGE,
         rules.noun,

@@ -23,6 +23,7 @@ class ProcessRun:
         output_ended: Set when no process holds its output open any more.
         code: The exit code, or a signal's number, negative; `None` while it runs.
         answer: The reaper's answer to the request to start it.
+        has_failed: Whether it was ended because it did not do what it was to do.
         gone: Set when nothing of its process group is left.
     """
 
@@ -33,6 +34,7 @@ class ProcessRun:
     answer: queue.SimpleQueue[dict[str, Any]] = field(default_factory=queue.SimpleQueue)
     gone: threading.Event = field(default_factory=threading.Event)
     was_killed: bool = False
+    has_failed: bool = False
 
 
 class ExternalProcess:

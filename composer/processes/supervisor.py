@@ -47,6 +47,7 @@ class ProcessSupervisor:
 
     Attributes:
         by_name: The processes.
+        on_run: Called with each run of a process that has begun.
         on_exit: Called with a process and its exit code when it has ended for good.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
@@ -68,6 +69,7 @@ class ProcessSupervisor:
         self._ros_arguments = ros_arguments
         self._log_levels = log_levels
         self.is_alone = False
+        self.on_run: Callable[[ProcessRun], None] = lambda _run: None
         self.on_exit: Callable[[ExternalProcess, int], None] = lambda _process, _code: None
         self._has_started = threading.Event()
         self._numbers = itertools.count()
@@ -107,6 +109,13 @@ class ProcessSupervisor:
             return
         self._ask_to_end(run, tools)
         run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
+
+    def fail(self, run: ProcessRun) -> None:
+        """End a run as one that has failed, if something is to be done about that."""
+        spec, tools = run.process.spec, self._tools
+        if tools is not None and run.code is None and (spec.restart != 'never' or spec.on_exit):
+            run.has_failed = True
+            self._ask_to_end(run, tools)
 
     def tell_ends(self) -> None:
         """Log from now on how processes have ended: the system has started, or never will."""
@@ -180,10 +189,12 @@ class ProcessSupervisor:
         if kind == 'started':
             run.process.run = run
             run.answer.put(answer)
+            self.on_run(run)
         elif kind == 'failed':
             run.answer.put(answer)
         elif kind == 'ended':
-            run.code = answer['code']
+            # However it has ended then.
+            run.code = answer['code'] or (ExitCode.FAILED if run.has_failed else 0)
             watcher = threading.Thread(target=self._after_end, args=(run, run.code), daemon=True)
             self._watchers = [each for each in self._watchers if each.is_alive()]
             self._watchers.append(watcher)

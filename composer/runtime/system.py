@@ -21,6 +21,7 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
+from composer.runtime.lifecycle.driver import LifecycleDriver
 from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.messages.local_services import LocalServices
@@ -118,6 +119,10 @@ class System:
         self._starter = Starter(self._nodes, self._processes, self._handle)
         self._exits = ExitActions(self._processes, self._starter, self._handle)
         self._processes.on_exit = self._exits.act
+        self._driver = LifecycleDriver(
+            self._context, self._executor, self._stop_request, self._processes
+        )
+        self._processes.on_run = self._driver.begin
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = ControlNode(
@@ -370,6 +375,7 @@ class System:
         self._control.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
+        self._driver.close()
         self._executor.stop(_EXECUTOR_STOP_SEC)
         self._hang_watcher.stop()
         release(self._context)

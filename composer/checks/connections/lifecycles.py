@@ -35,6 +35,16 @@ def check_lifecycles(context: CheckContext) -> Iterator[Diagnostic]:
 
 def check_awaited_states(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that who waits for a state waits for a node that has one."""
+    for process in context.spec.processes.values():
+        is_known = process.node_name or any(each.is_named for each in process.nodes)
+        is_dropped = context.was_dropped((*process.path, 'nodes'))
+        if process.lifecycle and not (is_known or is_dropped):
+            yield context.at_key(
+                (*process.path, 'lifecycle'),
+                'missing-key',
+                f"'lifecycle' of process '{process.name}' needs the names of its nodes",
+                help="write 'name: …', or 'nodes: […]'",
+            )
     by_name = {node.full_name: node for node in context.spec.nodes.values()}
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:

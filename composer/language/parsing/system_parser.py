@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import marshal
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_ENTITIES = 4
+_BOND = 'bond'
+_PACKAGES = Path(__file__).parents[2] / 'interfaces' / 'packages'
 # The last version in which equal data are written alike, whoever else holds them.
 _MARSHAL_VERSION = 2
 
@@ -84,10 +87,14 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         before: See `parse_specs`.
     """
     executor = data.get('executor', {})
+    interfaces = data.get('interfaces', {})
+    if any(node.get('bond') for node in data.get('nodes', {}).values()):
+        # It is on no package index.
+        interfaces = {_BOND: str(_PACKAGES / _BOND)} | interfaces
     return SystemSpec(
         name=name,
         description=data.get('description', ''),
-        interfaces=MappingProxyType(data.get('interfaces', {})),
+        interfaces=MappingProxyType(interfaces),
         qos=parse_entries(data, (), 'qos', _parse_named_qos),
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),

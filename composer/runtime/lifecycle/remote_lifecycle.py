@@ -12,11 +12,18 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
 # An answer that has not come by then is lost: the node may have died.
 _LOST_SEC: Final = 2.0
+_POLL_SEC: Final = 0.02
+
+
+def _nothing() -> None:
+    """Do nothing."""
 
 
 class RemoteLifecycle:
@@ -40,18 +47,17 @@ class RemoteLifecycle:
 
     def look(self) -> str:
         """Return the state when it was last asked for, '' if not known; and ask for it again."""
-        pending = self._pending
-        if pending is not None and pending.done():
-            self._known, pending = pending.result().current_state.label, None
-        if pending is not None and monotonic() > self._asked + _LOST_SEC:
-            self._states.remove_pending_request(pending)
-            pending = None
-        if pending is None and self._states.service_is_ready():
-            self._asked = monotonic()
-            pending = self._states.call_async(GetState.Request())
-        elif not self._states.service_is_ready():
+        if not self._states.service_is_ready():
             self._known = ''
-        self._pending = pending
+            return ''
+        if self._pending is not None and self._pending.done():
+            self._known, self._pending = self._pending.result().current_state.label, None
+        if self._pending is not None and monotonic() > self._asked + _LOST_SEC:
+            self._states.remove_pending_request(self._pending)
+            self._pending = None
+        if self._pending is None:
+            self._asked = monotonic()
+            self._pending = self._states.call_async(GetState.Request())
         return self._known
 
     @property
@@ -59,24 +65,33 @@ class RemoteLifecycle:
         """Whether its services are."""
         return bool(self._states.service_is_ready() and self._changes.service_is_ready())
 
-    def ask_state(self, ended: threading.Event) -> Any:
+    def ask_state(self, has_ended: Callable[[], bool]) -> Any:
         """Return its `lifecycle_msgs/msg/State`; `None` if there is no answer.
 
         Args:
-            ended: If this is set nobody waits any more.
+            has_ended: Returns whether nobody waits any more.
         """
-        response = self._ask(self._states, GetState.Request(), ended, _LOST_SEC)
+        response = self._ask(self._states, GetState.Request(), has_ended, _LOST_SEC)
         return response and response.current_state
 
-    def change(self, transition: int, ended: threading.Event) -> bool | None:
+    def change(
+        self,
+        transition: int,
+        has_ended: Callable[[], bool],
+        still_waits: Callable[[], None] = _nothing,
+    ) -> bool | None:
         """Have it make a transition, however long that takes.
+
+        Args:
+            transition: Its identifier in `lifecycle_msgs/msg/Transition`.
+            still_waits: Called again and again until there is an answer.
 
         Returns:
             Whether it did; `None` if there is no answer, as it has gone.
         """
         request = ChangeState.Request()
         request.transition.id = transition
-        response = self._ask(self._changes, request, ended, None)
+        response = self._ask(self._changes, request, has_ended, None, still_waits)
         return response and bool(response.success)
 
     def destroy(self) -> None:
@@ -86,19 +101,23 @@ class RemoteLifecycle:
                 self._ros.destroy_client(client)
 
     def _ask(
-        self, client: Any, request: Any, ended: threading.Event, timeout_sec: float | None
+        self,
+        client: Any,
+        request: Any,
+        has_ended: Callable[[], bool],
+        timeout_sec: float | None,
+        still_waits: Callable[[], None] = _nothing,
     ) -> Any:
         future = client.call_async(request)
         answered = threading.Event()
         future.add_done_callback(lambda _future: answered.set())
         begun = monotonic()
-        while not (answered.wait(_POLL_SEC) or ended.is_set()):
+        while not answered.wait(_POLL_SEC):
             waited_sec = monotonic() - begun
-            is_gone = not client.service_is_ready() and waited_sec > _LOST_SEC
-            if is_gone or (timeout_sec is not None and waited_sec > timeout_sec):
+            is_gone = not client.service_is_ready()
+            is_late = timeout_sec is not None and waited_sec > timeout_sec
+            if has_ended() or is_gone or is_late:
                 client.remove_pending_request(future)
                 return None
-        return future.result() if future.done() else None
-
-
-_POLL_SEC = 0.02
+            still_waits()
+        return future.result()

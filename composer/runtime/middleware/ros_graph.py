@@ -130,10 +130,10 @@ class RosGraph:
         return []
 
 
-def create_graph_node(context: Context) -> RosNode:
+def create_graph_node(context: Context, name: str = _NODE_NAME) -> RosNode:
     """Return a node that can query the graph; those of the system may be restarted at any time."""
     return RosNode(
-        _NODE_NAME,
+        name,
         context=context,
         use_global_arguments=False,
         enable_rosout=False,

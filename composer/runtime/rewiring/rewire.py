@@ -173,7 +173,10 @@ class Rewiring:
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
             self._transaction.on_undo(process.change, process.spec)
+            before = process.spec.lifecycle
             process.change(self._new.spec.processes[name])
+            if process.run is not None and process.spec.lifecycle != before:
+                self._transaction.on_commit(self._processes.on_run, process.run)
         for full_name in removed:
             if full_name in nodes:
                 self._transaction.on_commit(self._restarter.remove, full_name)

@@ -42,6 +42,8 @@ class Managed(LifecycleNode):
         return self.end('on_cleanup')
 
 
+sys.stdout.write(f'pid {os.getpid()}\n')
+sys.stdout.flush()
 rclpy.init()
 node = Managed(sys.argv[1])
 executor = MultiThreadedExecutor()

@@ -257,6 +257,7 @@ VALUES = {
     'process.log_level': ['debug', 'loud', None],
     'process.env': [{'A': 'b'}, {'A': 1, 'B': True}, {'A=': 'b'}, None],
     'process.cwd': ['pack', 'absent', None],
+    'process.lifecycle': ['alive', None],
     'process.on_exit': [*_ON_EXIT, [{'start': 'no'}], 3, None],
     'exit_action.start': ['packaged', 'sleeper', 'nobody', None],
     'exit_action.behaviour': ['parts:ended', 'parts:ende', None],

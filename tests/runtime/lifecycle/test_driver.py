@@ -1,0 +1,82 @@
+"""`lifecycle: active` of an external process: its nodes are brought there, whenever it starts."""
+
+import os
+import signal
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from lifecycle_msgs.srv import GetState
+
+from tests.running import ROOT
+
+pytestmark = pytest.mark.ros
+
+PROGRAM = ROOT / 'tests/runtime/lifecycle/managed_program.py'
+CODE = """
+def tell(node):
+    node.logger.info('starts')
+"""
+
+
+def process(name, *outcomes, **keys):
+    command = [sys.executable, str(PROGRAM), name, *outcomes]
+    return {'command': command, 'name': name, 'lifecycle': 'active', **keys}
+
+
+def system(**processes):
+    return str({'version': 1, 'processes': processes})
+
+
+def state_of(peer, node):
+    return peer.call(GetState, f'{node}/get_state').current_state.label
+
+
+def test_nodes_are_driven_in_order_and_again_after_a_restart(compose, peer, wait_for):
+    text = system(
+        lidar=process('lidar', restart={'delay': 0}),
+        camera=process(
+            'camera', wait_for={'node': '/lidar', 'state': 'active'}, lifecycle='inactive'
+        ),
+    )
+    child = compose(text, CODE)
+    child.wait_for_line("process 'camera': node '/camera' is inactive")
+    assert child.output.index("node '/lidar' is active") < child.output.index(
+        '[camera] on_configure'
+    )
+    assert not child.matching('[camera] on_activate')
+    line = child.matching('pid ')[0]
+    os.kill(int(line.rpartition(' ')[2]), signal.SIGKILL)
+    child.wait_for_line("process 'lidar': node '/lidar' is active", times=2)
+    assert state_of(peer, 'lidar') == 'active'
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ('outcome', 'answer'),
+    [
+        ('on_configure=failure', 'refused to configure: it is unconfigured'),
+        ('on_activate=failure', 'refused to activate: it is inactive'),
+        ('on_activate=error', 'refused to activate: it is unconfigured'),
+    ],
+)
+def test_a_node_that_refuses_fails_its_process(compose, outcome, answer):
+    child = compose(system(lidar=process('lidar', outcome, on_exit='shutdown')), CODE)
+    child.wait_for_line(f"[ERROR] [composer]: process 'lidar': node '/lidar' {answer}")
+    assert child.wait() == 1
+
+
+def test_a_node_that_refuses_is_left_as_it_is_without_a_rule(compose, peer):
+    child = compose(system(lidar=process('lidar', 'on_activate=failure')), CODE)
+    child.wait_for_line("node '/lidar' refused to activate: it is inactive")
+    assert state_of(peer, 'lidar') == 'inactive'
+    assert child.stop() == 0
+
+
+def test_a_process_that_dies_in_a_transition_is_driven_again(compose):
+    lidar = process('lidar', 'on_configure=exit', restart={'delay': 0, 'max': 1})
+    child = compose(system(lidar=lidar), CODE)
+    child.wait_for_line('[lidar] on_configure', times=2)
+    assert child.wait() == 1
