@@ -238,12 +238,13 @@ class _Takers:
         self._names.add(str(user.full_name))
         if (
             user.node is None
-            or user.node.automatically_declare_parameters_from_overrides
+            or getattr(user.node, 'automatically_declare_parameters_from_overrides', False)
             or self._context.was_dropped((*user.node.path, 'parameters'))
         ):
             self._open.append(user)
             return
-        for name in (*user.node.parameters, *_overriding_qos(user.node)):
+        overriding = _overriding_qos(user.node) if isinstance(user.node, NodeSpec) else ()
+        for name in (*user.node.parameters, *overriding):
             self._declaring.setdefault(name, []).append(user)
 
     def list_declaring(self, name: str) -> list[_User]:
