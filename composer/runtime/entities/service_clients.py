@@ -67,7 +67,9 @@ class ServiceClient:
         """
         request = self._convert(payload)
         is_held = request is payload and getrefcount(payload) > _UNHELD
-        return self._requests.send(partial(self._send, request, is_held=is_held), timeout_sec)
+        may_block = timeout_sec is None and not self._node.system.stop.is_set
+        send = partial(self._send, request, is_held=is_held, may_block=may_block)
+        return self._requests.send(send, timeout_sec)
 
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
         """As `call`, without holding a thread while it waits."""
@@ -76,14 +78,14 @@ class ServiceClient:
         send = partial(self._send, request, is_held=is_held)
         return await self._requests.send_async(send, timeout_sec)
 
-    def _send(self, request: Any, *, is_held: bool) -> Future:
+    def _send(self, request: Any, *, is_held: bool, may_block: bool = False) -> Future:
         server = self._local.server
         if server is None:
             return self._client.call_async(request)
         if server.find_refusal is not None and (reason := server.find_refusal()):
             message = f"'{self._service}' answers no requests: {reason}"
             raise ServiceNotAvailableError(message)
-        return server.call(request, is_held=is_held)
+        return server.call(request, is_held=is_held, may_block=may_block)
 
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
