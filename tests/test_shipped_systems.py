@@ -18,9 +18,9 @@ from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import Image, LaserScan, Range
-from std_msgs.msg import Bool, Float64
+from std_msgs.msg import Bool, Float64, String
 
 pytestmark = pytest.mark.ros
 
@@ -137,7 +137,7 @@ from contextlib import suppress
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import Image
 
 rclpy.init()
@@ -192,6 +192,24 @@ def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for
     wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
     assert child.stop() == 0
     wait_for(lambda: not nodes_of(peer), 'the end of the program')
+
+
+def test_the_patrol_drives_a_program_whose_description_a_command_prints(
+    up, peer, wait_for, monkeypatch
+):
+    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
+    monkeypatch.setenv('PATH', os.pathsep.join(folders))
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    described = peer.listen(String, '/patrol_1/robot_description', latched)
+    distances = peer.listen(Float64, '/patrol_1/distance')
+    child = up('patrol')
+    wait_for(lambda: distances and distances[-1].data > 0.1, 'a distance')
+    wait_for(lambda: described, 'the description')
+
+    assert described[0].data == '<robot name="patrol_1"><link name="base_link"/></robot>\n'
+    nodes = {f'/patrol_1/{name}' for name in ('patrol', 'odometer', 'base')}
+    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    assert child.stop() == 0
 
 
 def numbered_scan(number):
