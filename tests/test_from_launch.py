@@ -36,6 +36,7 @@ EXECUTABLES = {
     'rclcpp_components': 'component_container',
     'lifecycle': 'lifecycle_talker',
     'robot_state_publisher': 'robot_state_publisher',
+    'nav2_map_server': 'map_server',
 }
 # They call ros2, which is not among the wheels.
 NOT_RUN = ('Composable nodes',)

@@ -50,6 +50,7 @@ SHARED_NAMES = {
     'environment.py',  # variables, and their checks
     'differences.py',  # between definitions, and between systems
     'names.py',  # the rules for names, and their checks
+    'parameter_files.py',  # as a system names them, and their checks
     'parameters.py',  # their checks, and their life in a node
     'plan.py',  # what an edit does, and the command that shows it
     'qos.py',  # profiles and policies, and their checks

@@ -11,11 +11,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.checks.connections.topology import full_name
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
+from composer.language.parameter_files import read_given_file, values_given
 from composer.language.paths import PathError, explain_absent, resolve_path
-from composer.language.specs import NodeSpec
+from composer.language.specs import NodeSpec, ProcessSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
@@ -26,7 +28,12 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import ParameterSpec, ProcessSpec, SystemSpec
+    from composer.language.specs import (
+        DeclaredNodeSpec,
+        ParameterFileSpec,
+        ParameterSpec,
+        SystemSpec,
+    )
     from composer.ros_parameters.file_reader import ParameterEntry, ParameterFile
     from composer.ros_parameters.overrides import MergedFiles
     from composer.yaml_text.positions import DataPath
@@ -37,18 +44,20 @@ class _User:
     """A node or process with the parameter files that it uses.
 
     Attributes:
-        full_name: `None` if nobody knows how its nodes are called.
+        full_name: That of one of its nodes; `None` if nobody knows how its nodes are called.
         files: Those that could be found, the first to be read first.
-        node: `None` if it is a process: nobody knows what that declares.
+        node: `None` if nobody knows what parameters it declares, as in a process.
         overrides: What its files give it, by the parameters' names.
         is_run: Whether it is part of the system, and not left out by its `when`.
+        may_have_others: Whether it may have nodes that the file does not name.
     """
 
     full_name: str | None
-    files: tuple[str, ...]
-    node: NodeSpec | None
+    files: tuple[ParameterFileSpec, ...]
+    node: NodeSpec | DeclaredNodeSpec | None
     overrides: Mapping[str, ParameterEntry]
     is_run: bool
+    may_have_others: bool
 
 
 def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
@@ -58,7 +67,19 @@ def check_parameter_files(context: CheckContext) -> Iterator[Diagnostic]:
     findings = [*library.findings]
     if context.system.unused is not None:
         users += _find_users(library, context.system.unused, is_run=False)
-    yield from findings
+    findings += _check_contents(context, library, users)
+    # Their values may be others when the system runs.
+    yield from (each for each in findings if _place_of(each) not in library.sampled)
+
+
+def _place_of(finding: Diagnostic) -> tuple[str, int, int] | None:
+    span = finding.span
+    return (span.source.name, span.line, span.column) if span else None
+
+
+def _check_contents(
+    context: CheckContext, library: _Library, users: list[_User]
+) -> Iterator[Diagnostic]:
     for path, file in library.files.items():
         of_file = [user for user in users if path in user.files]
         if all(user.full_name is not None for user in of_file):
@@ -73,31 +94,37 @@ class _Library:
     """The parameter files of a system, each read once."""
 
     def __init__(self, context: CheckContext) -> None:
-        self.files: dict[str, ParameterFile] = {}
-        self._merged: dict[tuple[str, ...], MergedFiles] = {}
+        self.files: dict[ParameterFileSpec, ParameterFile] = {}
+        self._merged: dict[tuple[ParameterFileSpec, ...], MergedFiles] = {}
         self.findings: list[Diagnostic] = []
+        # Where values in the files depend on samples.
+        self.sampled: set[tuple[str, int, int]] = set()
         self._context = context
         self._values_left = MAX_VALUES
 
-    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[str]:
+    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[ParameterFileSpec]:
         """Read the files of a node or process, and yield those that exist."""
-        for index, text in enumerate(owner.parameter_files):
+        for index, file in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
+            if (*at, 'file') in self._context.system.positions.values:
+                self.findings += self._check_root(file, (*at, 'root'))
+                at = (*at, 'file')
             try:
-                path = str(resolve_path(text, Path()))
+                path = str(resolve_path(file.file, Path()))
             except PathError as error:
                 self.findings.append(
                     self._context.at_value(at, 'uninstalled-package', str(error), help=error.help)
                 )
                 continue
-            if path not in self.files:
-                # Most systems have no parameter files.
-                from composer.ros_parameters.file_reader import read_parameter_file
-
-                self.files[path] = read_parameter_file(Path(path), self._values_left)
-                self._values_left -= min(self.files[path].values, self._values_left)
-                self.findings += [each for each in self.files[path].findings if each.span]
-            unreadable = [each for each in self.files[path].findings if each.span is None]
+            if file not in self.files:
+                samples = self._find_samples(file, (*owner.path, 'parameter_files', index))
+                self.files[file] = read = read_given_file(file, self._values_left, samples)
+                self._values_left -= min(read.values, self._values_left)
+                self.findings += [each for each in read.findings if each.span]
+                self.sampled |= {
+                    (each.source.name, each.line, each.column) for each in read.sampled
+                }
+            unreadable = [each for each in self.files[file].findings if each.span is None]
             self.findings += [
                 self._context.at_value(
                     at,
@@ -108,20 +135,32 @@ class _Library:
                 for each in unreadable
             ]
             if not unreadable:
-                yield path
+                yield file
 
     def _explain(self, path: Path, at: DataPath) -> str | None:
         if os.path.lexists(path):
             return None
         return explain_absent(path, self._context.system.positions.value(at))
 
-    def merge(self, paths: tuple[str, ...]) -> MergedFiles:
+    def _find_samples(self, file: ParameterFileSpec, path: DataPath) -> list[str]:
+        sampled = self._context.system.sampled
+        positions = self._context.system.positions
+        at = (*path, 'expressions')
+        names = values_given(file) or {}
+        return [name for name in names if positions.values.get((*at, name)) in sampled]
+
+    def _check_root(self, file: ParameterFileSpec, at: DataPath) -> Iterator[Diagnostic]:
+        if problem := find_namespace_problem(file.root) if file.root.strip('/') else None:
+            message = f"'{file.root}': {problem}"
+            yield self._context.at_value(at, 'bad-name', message)
+
+    def merge(self, files: tuple[ParameterFileSpec, ...]) -> MergedFiles:
         """Return what files say together; they have been read."""
-        if paths not in self._merged:
+        if files not in self._merged:
             from composer.ros_parameters.overrides import MergedFiles
 
-            self._merged[paths] = MergedFiles(self.files[path] for path in paths)
-        return self._merged[paths]
+            self._merged[files] = MergedFiles(self.files[file] for file in files)
+        return self._merged[files]
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
@@ -130,18 +169,30 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
         files = tuple(library.read(owner))
         if not files:
             continue
-        name = _full_name(owner)
-        overrides = library.merge(files).find_overrides(name) if name else {}
-        node = owner if isinstance(owner, NodeSpec) else None
-        yield _User(name, files, node, overrides, is_run)
+        nodes = _nodes_of(owner)
+        for name, node in nodes.items():
+            overrides = library.merge(files).find_overrides(name) if name else {}
+            may_have_others = isinstance(owner, ProcessSpec) and not _lists_nodes(owner)
+            yield _User(name, files, node, overrides, is_run, may_have_others)
 
 
-def _full_name(owner: NodeSpec | ProcessSpec) -> str | None:
+def _nodes_of(
+    owner: NodeSpec | ProcessSpec,
+) -> dict[str | None, NodeSpec | DeclaredNodeSpec | None]:
+    """Return the nodes of an owner by full names, with what they declare if that is known."""
     if isinstance(owner, NodeSpec):
-        return owner.full_name
-    if owner.node_name is None or owner.namespace is None:
-        return None
-    return join_names(owner.namespace, owner.node_name)
+        return {owner.full_name: owner}
+    nodes: dict[str | None, NodeSpec | DeclaredNodeSpec | None] = {}
+    if owner.node_name is not None and owner.namespace is not None:
+        nodes[join_names(owner.namespace, owner.node_name)] = None
+    for node in owner.nodes if _lists_nodes(owner) else ():
+        nodes[node.full_name] = node if node.declares_all_parameters else None
+    return nodes or {None: None}
+
+
+def _lists_nodes(process: ProcessSpec) -> bool:
+    """Return whether a process says which nodes it has."""
+    return any(node.path != process.path for node in process.nodes)
 
 
 def _may_miss_users(context: CheckContext) -> bool:
@@ -163,6 +214,14 @@ _DEPTH = 2
 _DECIDING = ('namespace', 'parameter_files')
 
 
+def _overriding_qos(node: NodeSpec) -> Iterator[str]:
+    """Yield the parameters by which the QoS of publishers and subscriptions is overridden."""
+    for kind, end in node.ends():
+        for policy in getattr(end, 'qos_overrides', ()):
+            topic = full_name(node, 'topic', str(getattr(end, 'topic', '')))
+            yield f'qos_overrides.{topic}.{kind.noun}.{policy}'
+
+
 class _Takers:
     """The users of a file that one of its names of nodes matches."""
 
@@ -177,10 +236,15 @@ class _Takers:
     def add(self, user: _User) -> None:
         self._users.append(user)
         self._names.add(str(user.full_name))
-        if user.node is None or self._context.was_dropped((*user.node.path, 'parameters')):
+        if (
+            user.node is None
+            or getattr(user.node, 'automatically_declare_parameters_from_overrides', False)
+            or self._context.was_dropped((*user.node.path, 'parameters'))
+        ):
             self._open.append(user)
             return
-        for name in user.node.parameters:
+        overriding = _overriding_qos(user.node) if isinstance(user.node, NodeSpec) else ()
+        for name in (*user.node.parameters, *overriding):
             self._declaring.setdefault(name, []).append(user)
 
     def list_declaring(self, name: str) -> list[_User]:
@@ -231,7 +295,7 @@ def _check_names(
     file: ParameterFile, users: list[_User], takers: dict[str, _Takers]
 ) -> Iterator[Diagnostic]:
     names = [user.full_name for user in users if user.full_name]
-    may_have_others = any(user.node is None for user in users)
+    may_have_others = any(user.may_have_others for user in users)
     index = PatternIndex(pattern for pattern, _ in file.patterns)
     unused = [name for name in names if not any(index.find(name))]
     for pattern, span in file.patterns:
@@ -260,7 +324,7 @@ def _is_misspelt(pattern: str, names: list[str], unused: list[str]) -> bool:
 
 
 def _check_entries(
-    path: str, file: ParameterFile, takers: dict[str, _Takers]
+    path: ParameterFileSpec, file: ParameterFile, takers: dict[str, _Takers]
 ) -> Iterator[Diagnostic]:
     for entry in file.entries:
         if entry.pattern not in takers:
@@ -273,7 +337,7 @@ def _check_entries(
 
 
 def _find_overridden(
-    path: str, entry: ParameterEntry, takers: Iterable[_User]
+    path: ParameterFileSpec, entry: ParameterEntry, takers: Iterable[_User]
 ) -> Diagnostic | None:
     """Return a finding if an unexpected value overrides this one for every node."""
     lost_to: ParameterEntry | None = None
@@ -293,10 +357,13 @@ def _find_overridden(
     )
 
 
-def _is_expected(user: _User, path: str, entry: ParameterEntry, winner: ParameterEntry) -> bool:
+def _is_expected(
+    user: _User, path: ParameterFileSpec, entry: ParameterEntry, winner: ParameterEntry
+) -> bool:
     """Return whether a value is meant to win, as one of a later file or a more special name."""
     later = user.files[user.files.index(path) + 1 :]
-    if winner.value_span.source.name in later:
+    # Their packages are installed: the files have been read.
+    if winner.value_span.source.name in {str(resolve_path(each.file, Path())) for each in later}:
         return True
     if winner.pattern == entry.pattern:
         return False

@@ -466,7 +466,15 @@ def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: P
     type=click.Path(path_type=Path),
     help='Write the system to this file, and its parameter files beside it. Default: print it.',
 )
-def import_command(file: Path, words: tuple[str, ...], output: Path | None) -> int:
+@click.option(
+    '--verify',
+    'verifies',
+    is_flag=True,
+    help='Also run both with stand-ins for their programs, and compare what each is given.',
+)
+def import_command(
+    file: Path, words: tuple[str, ...], output: Path | None, *, verifies: bool
+) -> int:
     """Turn the launch file FILE (.launch.py, .xml or .yaml) into a system.
 
     It is resolved by the installed launch and launch_ros, with these values for its arguments. All
@@ -475,7 +483,7 @@ def import_command(file: Path, words: tuple[str, ...], output: Path | None) -> i
     """
     from composer.cli.importing.import_launch import import_launch_file
 
-    return import_launch_file(file, words, output)
+    return import_launch_file(file, words, output, verifies=verifies)
 
 
 @cli.command('new')

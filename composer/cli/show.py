@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,16 +18,16 @@ from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
-from composer.language.paths import resolve_path
+from composer.language.parameter_files import names_used, read_given_file
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import replace_start_values
-from composer.ros_parameters.file_reader import read_parameter_file
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
 from composer.yaml_text.writer import Expression, render_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from composer.diagnostics import Diagnostic
     from composer.language.loaded_system import LoadedSystem
@@ -120,7 +119,7 @@ def describe_origin(system: LoadedSystem, path: DataPath) -> str:
 
 def final_values(node: NodeSpec) -> dict[str, tuple[str, Any]]:
     """Return the type and value of each parameter of a node that has a value, by name."""
-    files = [read_parameter_file(resolve_path(text, Path())) for text in node.parameter_files]
+    files = map(read_given_file, node.parameter_files)
     overrides = find_overrides(files, node.full_name)
     values = {_SIM_TIME: ('bool', True)} if node.use_sim_time else {}
     if _SIM_TIME in overrides:
@@ -152,6 +151,16 @@ def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
     return replace_start_values(absolute, lambda _, value: _with_absolute_file(value))
 
 
+def _given_absolute(file: str | dict[str, Any]) -> str | dict[str, Any]:
+    if isinstance(file, str):
+        return _absolute(file)
+    changed = dict(_with_absolute_file(file))
+    values = file.get('expressions')
+    if isinstance(values, dict):
+        changed['expressions'] = _without_values(names_used(file['file'], values))
+    return changed
+
+
 def _with_absolute_file(value: dict[str, Any]) -> dict[str, Any]:
     return value | {'file': _absolute(value['file'])} if 'file' in value else value
 
@@ -161,7 +170,7 @@ def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
     if 'cwd' in entry:
         changed['cwd'] = _absolute(entry['cwd'])
     if 'parameter_files' in entry:
-        changed['parameter_files'] = [_absolute(text) for text in entry['parameter_files']]
+        changed['parameter_files'] = [*map(_given_absolute, entry['parameter_files'])]
     if 'env' in entry:
         changed['env'] = _without_values(entry['env'])
     return entry | changed

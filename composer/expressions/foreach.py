@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -162,7 +163,8 @@ class _Expansion:
                 return
         if key != written:
             self._graft(path, written)
-        self._entries[key] = self._evaluate(evaluator, body, path, written)
+        entry = self._evaluate(evaluator, body, path, written)
+        self._entries[key] = _with_scope(entry, path, evaluator)
         if is_left_out:
             self._document.left_out.add(path)
 
@@ -303,3 +305,24 @@ def _sections_with_conditions(node: Any) -> tuple[str, ...]:
         for key, section in (node.items() if isinstance(node, dict) else ())
         if key in KIND_OF_SECTION and has_conditions(section)
     )
+
+
+def _with_scope(entry: Any, path: DataPath, evaluator: TemplateEvaluator) -> Any:
+    """Return an entry with what is in scope for the expressions in its parameter files."""
+    files = entry.get('parameter_files') if isinstance(entry, dict) else None
+    if not isinstance(files, list):
+        return entry
+    given = []
+    for index, each in enumerate(files):
+        at = (*path, 'parameter_files', index, 'expressions')
+        if isinstance(each, dict) and each.get('expressions') is True:
+            given.append(each | {'expressions': dict(evaluator.scope.values)})
+            # What is a sample has a place of its own, in which nothing is written.
+            here = replace(evaluator.positions.value(at), length=0)
+            evaluator.positions.values.update(
+                {(*at, name): here for name in evaluator.scope.samples}
+            )
+            evaluator.document.sampled += [here] if evaluator.scope.samples else []
+        else:
+            given.append(each)
+    return entry | {'parameter_files': given}

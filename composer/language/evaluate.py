@@ -68,7 +68,12 @@ def evaluate_expressions(system: LoadedSystem) -> None:
 
 
 def _has_expressions(positions: SourceMap) -> bool:
-    return any('{{' in line for source in positions.sources() for line in source.lines)
+    # `expressions: true` is about those of a parameter file.
+    return any(
+        '{{' in line or 'expressions' in line
+        for source in positions.sources()
+        for line in source.lines
+    )
 
 
 def _has_conditions(data: Mapping[str, Any]) -> bool:

@@ -100,8 +100,10 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
     if 'parameter_files' in entry:
         at = (*path, 'parameter_files')
         changed['parameter_files'] = [
-            _resolved(text, (*at, index), positions)
-            for index, text in enumerate(entry['parameter_files'])
+            _with_file(each, (*at, index), positions)
+            if isinstance(each, dict)
+            else _resolved(each, (*at, index), positions)
+            for index, each in enumerate(entry['parameter_files'])
         ]
     return entry | changed if changed else entry
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.qos import resolve_qos
-from composer.language.specs import BehaviourSpec, ConditionSpec, ExitActionSpec, QosSpec
+from composer.language.specs import (
+    BehaviourSpec,
+    ConditionSpec,
+    ExitActionSpec,
+    ParameterFileSpec,
+    QosSpec,
+)
 from composer.names import expand_name
 from composer.planning.plan import Change
 from composer.records import record
@@ -134,7 +141,17 @@ def _plain(value: Any, name: str = '') -> Any:
         return f'{value.kind} {value.name}{state} within {value.timeout_sec:g} s'
     if isinstance(value, ExitActionSpec):
         return _plain_action(value)
+    if isinstance(value, ParameterFileSpec):
+        return _plain_file(value)
     return value
+
+
+def _plain_file(file: ParameterFileSpec) -> Any:
+    if not file.is_changed:
+        return file.file
+    values = None if file.expressions is None else json.loads(file.expressions)
+    parts = {'file': file.file, 'root': file.root, 'expressions': values}
+    return {key: value for key, value in parts.items() if value not in (None, '')}
 
 
 def _plain_action(action: ExitActionSpec) -> Any:

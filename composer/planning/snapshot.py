@@ -5,20 +5,20 @@ from __future__ import annotations
 import ast
 import hashlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import system_bindings
-from composer.language.paths import resolve_path
+from composer.language.parameter_files import read_given_file
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.language.specs import NodeSpec, SystemSpec
+    from composer.language.specs import NodeSpec, ParameterFileSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
     from composer.ros_parameters.file_reader import ParameterEntry
     from composer.ros_parameters.overrides import MergedFiles
@@ -169,16 +169,13 @@ def _read_overrides(nodes: Sequence[NodeSpec]) -> dict[str, Mapping[str, Paramet
     if not any(node.parameter_files for node in nodes):
         return {}
     # Most systems have no parameter files.
-    from composer.ros_parameters.file_reader import read_parameter_file
     from composer.ros_parameters.overrides import MergedFiles
 
-    merged: dict[tuple[str, ...], MergedFiles] = {}
+    merged: dict[tuple[ParameterFileSpec, ...], MergedFiles] = {}
     overrides = {}
     for node in nodes:
         if files := node.parameter_files:
             if files not in merged:
-                merged[files] = MergedFiles(
-                    read_parameter_file(resolve_path(each, Path())) for each in files
-                )
+                merged[files] = MergedFiles(map(read_given_file, files))
             overrides[node.full_name] = merged[files].find_overrides(node.full_name)
     return overrides

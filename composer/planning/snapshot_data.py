@@ -31,7 +31,7 @@ _RECORDS: dict[str, Any] = {
     if isinstance(each, type) and is_dataclass(each)
 }
 # Relative to the folder that Composer was started in, which may be another one.
-_PATHS = frozenset(('cwd', 'parameter_files', 'interfaces'))
+_PATHS = frozenset(('cwd', 'file', 'interfaces'))
 
 
 def encode_snapshot(snapshot: Snapshot) -> dict[str, Any]:

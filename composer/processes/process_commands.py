@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.ament import list_executables
 from composer.errors import StartError
+from composer.language.parameter_files import render_given_file
 from composer.language.paths import PathError, resolve_path
 from composer.programs import find_program_problem
 from composer.ros_parameters.file_writer import render_parameters_for_all
@@ -15,7 +16,7 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from composer.language.specs import ProcessSpec
+    from composer.language.specs import ParameterFileSpec, ProcessSpec
 
 
 class CommandWriter:
@@ -53,11 +54,10 @@ class CommandWriter:
             return []
         arguments = ['--ros-args']
         if spec.parameters:
-            path = self._folder / f'{len(list(self._folder.iterdir()))}.yaml'
-            path.write_text(render_parameters_for_all(spec.parameters), encoding='utf-8')
+            path = self._write_file(render_parameters_for_all(spec.parameters))
             arguments += ['--params-file', str(path)]
-        for text in spec.parameter_files:
-            arguments += ['--params-file', str(_find_file(spec, text))]
+        for file in spec.parameter_files:
+            arguments += ['--params-file', str(self._give_file(spec, file))]
         if spec.log_level is not None:
             arguments += ['--log-level', spec.log_level]
         arguments += self._ros_arguments
@@ -70,6 +70,16 @@ class CommandWriter:
         for old, new in spec.remap:
             arguments += ['-r', f'{old}:={new}']
         return arguments
+
+    def _give_file(self, spec: ProcessSpec, file: ParameterFileSpec) -> Path:
+        """Return a parameter file as the process is to read it."""
+        path = _find_file(spec, file.file)
+        return self._write_file(render_given_file(file)) if file.is_changed else path
+
+    def _write_file(self, text: str) -> Path:
+        path = self._folder / f'{len(list(self._folder.iterdir()))}.yaml'
+        path.write_text(text, encoding='utf-8')
+        return path
 
 
 def find_folder(spec: ProcessSpec) -> str | None:

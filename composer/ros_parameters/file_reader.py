@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
-from composer.input_limits import MAX_FINDINGS, MAX_VALUES
+from composer.input_limits import MAX_FINDINGS, MAX_VALUES, read_file
 from composer.records import record
+from composer.ros_parameters.expressions_in_files import Treatment, render_trees, treat_trees
 from composer.ros_parameters.node_patterns import find_pattern_problem
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.ros_parameters.rcl_values import RULE, ValueReader, flatten_list
@@ -28,6 +29,7 @@ from composer.yaml_text.tree import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from composer.diagnostics import Span
@@ -71,43 +73,76 @@ class ParameterFile:
     Attributes:
         patterns: All names of nodes, also those without parameters.
         values: How many keys and values were read of it.
+        sampled: Where values depend on samples.
     """
 
     patterns: tuple[tuple[str, Span], ...] = ()
     entries: tuple[ParameterEntry, ...] = ()
     findings: tuple[Diagnostic, ...] = ()
     values: int = 0
+    sampled: tuple[Span, ...] = ()
 
 
-def read_parameter_file(path: Path, most_values: int = MAX_VALUES) -> ParameterFile:
+def read_parameter_file(
+    path: Path, most_values: int = MAX_VALUES, treatment: Treatment | None = None
+) -> ParameterFile:
     """Read a file.
 
     Args:
         most_values: How many keys and values it may have.
+        treatment: How it is changed before ROS reads it.
     """
     name = str(path)
     content = read_content(path, name)
     text = content if isinstance(content, Diagnostic) else decode_content(content, name)
     if isinstance(text, Diagnostic):
         return ParameterFile(findings=(text,))
-    return parse_parameter_file(text, name, most_values)
+    return parse_parameter_file(text, name, most_values, treatment)
 
 
-def parse_parameter_file(text: str, name: str, most_values: int = MAX_VALUES) -> ParameterFile:
+def render_treated_file(path: Path, treatment: Treatment) -> str:
+    """Return the text of a file without errors as ROS is to read it.
+
+    Raises:
+        UnreadableFileError: It cannot be read any more.
+    """
+    source, trees, _ = _compose(read_file(path).decode('utf-8-sig'), str(path), MAX_VALUES)
+    treated, *_ = treat_trees(trees, source, treatment)
+    return render_trees(treated)
+
+
+def parse_parameter_file(
+    text: str,
+    name: str,
+    most_values: int = MAX_VALUES,
+    treatment: Treatment | None = None,
+) -> ParameterFile:
     """Read the text of a file that is called `name` in findings."""
-    source = SourceFile(name, tuple(text.splitlines()))
     try:
-        trees, values = compose_trees(text, source, alias_rule=RULE, most_values=most_values)
+        source, trees, values = _compose(text, name, most_values)
     except CompositionError as error:
         return ParameterFile(findings=(_explain_typo(error.diagnostic),), values=error.values)
     reader = _Reader()
+    sampled: list[Span] = []
+    if treatment is not None or '$(' in text or '{{' in text:
+        trees, findings, sampled = treat_trees(trees, source, treatment or Treatment())
+        reader.findings += findings[: MAX_FINDINGS + 1]
     # ROS reads several documents as if they were one.
     for tree in trees:
         reader.read_nodes(tree, '')
     reader.check_double_names()
     return ParameterFile(
-        tuple(reader.patterns), tuple(reader.entries), tuple(reader.findings), values
+        tuple(reader.patterns),
+        tuple(reader.entries),
+        tuple(reader.findings),
+        values,
+        tuple(sampled),
     )
+
+
+def _compose(text: str, name: str, most_values: int) -> tuple[SourceFile, Sequence[TreeNode], int]:
+    source = SourceFile(name, tuple(text.splitlines()))
+    return source, *compose_trees(text, source, alias_rule=RULE, most_values=most_values)
 
 
 class _Reader:
@@ -276,7 +311,9 @@ class _Reader:
             return node.text.split('\0')[0]
         is_empty = isinstance(node, ScalarNode)
         what = 'and this one is empty' if is_empty else 'not a list or a mapping'
-        self._report(node.span, f'a key must be a string, {what}')
+        is_expression = '{{' in node.span.source.line(node.span.line)
+        advice = 'put an expression in quotes' if is_expression and not is_empty else None
+        self._report(node.span, f'a key must be a string, {what}', advice)
         return None
 
     def _refuse_value(self, node: TreeNode, key: str = '') -> None:

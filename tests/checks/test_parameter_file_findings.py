@@ -49,6 +49,74 @@ ARM = """
 """
 
 
+PROCESS = """
+processes:
+  nav:
+    command: [sleep, '1']
+    namespace: robot
+    parameter_files: [p.yaml]
+"""
+NAV = """
+    controller_server:
+      ros__parameters: {rate: 1.0}
+    /robot/local_costmap/local_costmap:
+      ros__parameters: {width: 3}
+    /robot/controler_server:
+      ros__parameters: {rate: 1.0}
+    """
+
+
+def test_a_section_is_held_against_the_nodes_that_a_process_says_it_has(check):
+    # Which nodes the program makes, nobody knows.
+    assert check('{}\n', more=PROCESS, p=NAV) == []
+    nodes = '    nodes: [controller_server, local_costmap/local_costmap]\n'
+
+    assert check('{}\n', more=PROCESS + nodes, p=NAV) == [
+        "p.yaml:1:1 unmatched-node-name: 'controller_server' matches no node that uses this "
+        "file, so ROS ignores it → did you mean '/robot/controller_server'?",
+        "p.yaml:5:1 unmatched-node-name: '/robot/controler_server' matches no node that uses "
+        "this file, so ROS ignores it → did you mean '/robot/controller_server'?",
+    ]
+    declared = '    nodes: {controller_server: {parameters: {rate: 2}}, controler_server: }\n'
+    assert check(
+        '{}\n', more=PROCESS + declared, p=NAV.replace('controller_s', '/robot/controller_s')
+    ) == [
+        "p.yaml:2:27 refused-parameter: parameter 'rate' of node '/robot/controller_server': "
+        'expected an integer, and ROS takes this for a double',
+        "p.yaml:3:1 unmatched-node-name: '/robot/local_costmap/local_costmap' matches no node "
+        'that uses this file, so ROS ignores it → it is used by: /robot/controler_server, /robot/controller_server',
+    ]
+
+
+def test_expressions_and_the_root_of_a_file_are_those_of_who_names_it(check):
+    nodes = """
+      "{{ side }}_arm":
+        foreach: {side: [left, right]}
+        parameters: {frame: base, speed: {default: 1.0, maximum: 2.0}, mode: {type: integer}}
+        parameter_files: [{file: p.yaml, expressions: true, root: "{{ root }}"}]
+        namespace: robot
+    """
+    text = """
+    "{{ side }}_arm":
+      ros__parameters: {frame: "{{ side }}_{{ suffix }}", speed: "{{ speed }}", mode: "{{ mode }}"}
+    """
+    before = 'args: {speed: 1.5, mode: {type: string}, root: robot}\nvars: {suffix: base}\n'
+    # What `mode` will be is not known.
+    assert check(nodes, p=text, before=before) == []
+    assert check(nodes, p=text, before=before.replace('speed: 1.5', 'speed: 3.5')) == [
+        "p.yaml:2:62 refused-parameter: parameter 'speed' of node '/robot/left_arm': "
+        '3.5 is above the maximum 2.0',
+        "p.yaml:2:62 refused-parameter: parameter 'speed' of node '/robot/right_arm': "
+        '3.5 is above the maximum 2.0',
+    ]
+    found = check(nodes, p=text, before=before.replace('root: robot', 'root: robt'))
+    assert [line.partition(':')[0] for line in found] == ['p.yaml'] * 2
+    assert "'/robt/left_arm' matches no node" in found[0]
+    assert check(nodes, p=text, before=before.replace('root: robot', 'root: a b')) != []
+    plain = check(nodes.replace('expressions: true, ', ''), p=text, before=before)
+    assert {line.split()[1] for line in plain} >= {'unevaluated-expression:'}
+
+
 def test_a_file_that_suits_is_left_alone(check):
     text = """
         /**:

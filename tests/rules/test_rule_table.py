@@ -31,7 +31,7 @@ SPEAKING = (
     'cli',
 )
 # Words of the same form that are no rules.
-NO_RULES = {'nodl-xml', 'x-expected', 'site-packages', 'dist-packages'}
+NO_RULES = {'find-pkg-share', 'nodl-xml', 'x-expected', 'site-packages', 'dist-packages'}
 # Names of which the code has one half, and a table the other.
 COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
     f'{word}-{kind.slug}' for word in ('unknown', 'unused') for kind in USED_KINDS

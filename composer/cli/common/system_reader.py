@@ -115,7 +115,7 @@ def list_files(context: CheckContext) -> set[Path]:
         *(each.parameter_files for each in spec.nodes.values()),
         *(each.parameter_files for each in spec.processes.values()),
     ]
-    for text in (text for texts in named for text in texts):
+    for text in (file.file for files in named for file in files):
         # A package that is not installed is for the checks to say.
         with suppress(PathError):
             files.add(resolve_path(text, Path()))

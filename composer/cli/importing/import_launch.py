@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -11,20 +13,22 @@ from composer.launch_files.importing import import_file
 from composer.launch_files.system_file import render_system
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    from collections.abc import Iterator, Sequence
 
     from composer.launch_files.system_file import SystemFile
 
 _ENDINGS = ('.py', '.xml', '.yaml', '.yml')
 
 
-def import_launch_file(path: Path, words: Sequence[str], output: Path | None) -> int:
+def import_launch_file(
+    path: Path, words: Sequence[str], output: Path | None, *, verifies: bool
+) -> int:
     """Import a launch file; return the exit code.
 
     Args:
         words: The arguments, `name:=value`.
         output: Where the system is written; `None` to print it.
+        verifies: Whether both are run and compared; without an output, nothing is printed then.
 
     Raises:
         UsageError: The arguments are not of that form, or it is no launch file.
@@ -38,15 +42,25 @@ def import_launch_file(path: Path, words: Sequence[str], output: Path | None) ->
         message = f"there is no file '{path}'"
         raise ComposerError(message)
     stem = output.stem if output else path.name.partition('.')[0]
-    system = render_system(import_file(path, given), path.name, stem)
+    imported = import_file(path, given)
+    system = render_system(imported, path.name, stem)
     if output is not None:
-        _write(system, output)
-    else:
+        for written in _write(system, output):
+            click.echo(f'wrote {written}', err=True)
+    elif not verifies:
         click.echo(system.text, nl=False)
         if system.files:
             names = ', '.join(system.files)
             click.echo(f'{names}: parameter files of the system; -o writes them, too', err=True)
-    return ExitCode.DONE
+    if not verifies:
+        return ExitCode.DONE
+    from composer.cli.importing.verification import verify
+
+    with tempfile.TemporaryDirectory(prefix='composer-import-') as folder:
+        copy = Path(folder) / f'{stem}.yaml'
+        if output is None:
+            list(_write(system, copy))
+        return verify(path, given, imported, output or copy)
 
 
 def _read_words(words: Sequence[str]) -> dict[str, str]:
@@ -60,7 +74,8 @@ def _read_words(words: Sequence[str]) -> dict[str, str]:
     return given
 
 
-def _write(system: SystemFile, output: Path) -> None:
+def _write(system: SystemFile, output: Path) -> Iterator[Path]:
+    """Write a system and its parameter files; yield their paths."""
     written = {output: system.text}
     written |= {output.parent / name: text for name, text in system.files.items()}
     for path, text in written.items():
@@ -70,4 +85,4 @@ def _write(system: SystemFile, output: Path) -> None:
         except OSError as error:
             message = f'cannot write {path}: {error.strerror}'
             raise ComposerError(message) from error
-        click.echo(f'wrote {path}', err=True)
+        yield path

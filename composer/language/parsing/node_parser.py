@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import NODE_BEHAVIOURS
+from composer.language.parameter_files import parse_parameter_files
 from composer.language.parsing.entity_parser import parse_entities, parse_run_options
 from composer.language.parsing.entry_parser import Data, parse_behaviour
 from composer.language.parsing.process_parser import parse_conditions
@@ -33,7 +34,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         lifecycle=_parse_lifecycle(data.get('lifecycle', False)),
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
-        parameter_files=tuple(data.get('parameter_files', ())),
+        parameter_files=parse_parameter_files(data),
         path=path,
         **{key: data[key] for key in _PLAIN_KEYS if key in data},
         **_parse_hooks(data, path),

@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.language.parameter_files import parse_parameter_files
 from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.parsing.entry_parser import behaviour_at, parse_behaviour
 from composer.language.specs import (
@@ -101,7 +102,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         node_name=data.get('name'),
         namespace=expand_namespace(data['namespace']) if 'namespace' in data else None,
         parameters=MappingProxyType(given_values(data.get('parameters', {}))),
-        parameter_files=tuple(data.get('parameter_files', ())),
+        parameter_files=parse_parameter_files(data),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
         env=MappingProxyType(

@@ -1,0 +1,163 @@
+"""What a process was given: its command line as ROS reads it, its environment and its folder."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from composer.names import expand_namespace, join_names
+from composer.ros_parameters.node_patterns import matches_pattern
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+_ROS_ARGS = '--ros-args'
+# What runs the program has its own values of these.
+_NOT_COMPARED = re.compile(
+    r'PYTHONUNBUFFERED|PWD|OLDPWD|SHLVL|_|LC_CTYPE|PATH|NOTIFY_SOCKET|COMPOSER_\w+'
+)
+
+
+@dataclass
+class Given:
+    """What a process was given.
+
+    Attributes:
+        arguments: Those that are not for ROS.
+        remaps: Rules, from and to; of two rules for one name, the first.
+        parameters: For its node, or by the patterns of nodes if its name is not given.
+        others: Further arguments for ROS.
+    """
+
+    program: str
+    arguments: list[str] = field(default_factory=list)
+    name: str | None = None
+    namespace: str | None = None
+    remaps: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
+    others: list[str] = field(default_factory=list)
+    environment: dict[str, str] = field(default_factory=dict)
+    folder: str = ''
+
+    @property
+    def label(self) -> str:
+        """How the process is called in a report."""
+        name = f' {join_names(self.namespace or "/", self.name)}' if self.name else ''
+        return f'{Path(self.program).name}{name}'
+
+    def lines(self) -> Iterator[str]:
+        """Yield all that was given, one thing a line, in an order of its own."""
+        yield f'program: {self.program}'
+        yield f'arguments: {self.arguments}'
+        yield f'name: {self.name}'
+        yield f'namespace: {self.namespace}'
+        yield from (f'remap: {old} -> {new}' for old, new in sorted(self.remaps.items()))
+        yield from (
+            f'parameter: {key} = {value!r}' for key, value in sorted(self.parameters.items())
+        )
+        yield from (f'ROS argument: {each}' for each in sorted(self.others))
+        yield from (f'environment: {key}={each}' for key, each in sorted(self.environment.items()))
+        yield f'folder: {self.folder}'
+
+
+def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given:
+    """Return what a stand-in has written down.
+
+    Args:
+        replaced: Texts in paths, and what they stand for.
+    """
+    argv = [_replace(each, replaced) for each in written['argv']]
+    given = Given(argv[0].rpartition('/')[2])
+    sources: list[Any] = []
+    inside = False
+    words = iter(zip(argv[1:], written['argv'][1:], strict=True))
+    for word, original in words:
+        if word == _ROS_ARGS:
+            inside = True
+        elif inside and word == '--':
+            inside = False
+        elif not inside:
+            given.arguments.append(word)
+        elif word in ('-r', '--remap'):
+            _add_remap(given, next(words, ('', ''))[0])
+        elif word in ('-p', '--param'):
+            name, _, value = next(words, ('', ''))[0].partition(':=')
+            sources.append({'/**': {'ros__parameters': {name: yaml.safe_load(value)}}})
+        elif word == '--params-file':
+            _, path = next(words, ('', original))
+            sources.append(_load(written['files'].get(path, ''), replaced))
+        elif word.startswith('--log-level'):
+            given.others.append(f'{word} {next(words, ("", ""))[0]}')
+        else:
+            given.others.append(word)
+    given.parameters = _merged(sources, given)
+    given.environment = {
+        key: _replace(value, replaced)
+        for key, value in written['env'].items()
+        if not _NOT_COMPARED.fullmatch(key)
+    }
+    given.folder = _replace(written['cwd'], replaced)
+    return given
+
+
+def _add_remap(given: Given, rule: str) -> None:
+    old, _, new = rule.partition(':=')
+    if old in ('__node', '__name'):
+        given.name = given.name or new
+    elif old == '__ns':
+        given.namespace = given.namespace or expand_namespace(new)
+    else:
+        given.remaps.setdefault(old, new)
+
+
+def _load(text: str, replaced: Mapping[str, str]) -> Any:
+    try:
+        data = yaml.safe_load(_replace(text, replaced))
+    except yaml.YAMLError:
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _merged(sources: list[Any], given: Given) -> dict[str, Any]:
+    """Return the values of parameters, the last of each, in rcl's order of nodes."""
+    by_node: dict[str, dict[str, Any]] = {}
+    for source in sources:
+        for node, values in _nodes_in(source, ''):
+            by_node.setdefault(node, {}).update(values)
+    if given.name is None:
+        flat = ((node, values) for node, values in by_node.items())
+        return {f'{node}: {key}': value for node, vals in flat for key, value in vals.items()}
+    full = join_names(given.namespace or '/', given.name)
+    merged: dict[str, Any] = {}
+    for node, values in by_node.items():
+        if matches_pattern(node, full):
+            merged |= values
+    return merged
+
+
+def _nodes_in(data: Any, prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    for key, value in data.items() if isinstance(data, dict) else ():
+        if key == 'ros__parameters':
+            yield prefix or '/', dict(_flat(value, ''))
+        else:
+            yield from _nodes_in(value, f'{prefix.rstrip("/")}/{str(key).strip("/")}')
+
+
+def _flat(data: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    if not isinstance(data, dict):
+        is_xml = isinstance(data, str) and data.lstrip().startswith('<')
+        # Read as YAML, as launch does, its lines become one.
+        yield prefix, ' '.join(data.split()) if is_xml else data
+        return
+    for key, value in data.items():
+        yield from _flat(value, f'{prefix}.{key}'.strip('.'))
+
+
+def _replace(text: str, replaced: Mapping[str, str]) -> str:
+    for old, new in replaced.items():
+        text = text.replace(old, new)
+    return text
