@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.checks.connections.topology import full_name
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
@@ -220,6 +221,14 @@ _DEPTH = 2
 _DECIDING = ('namespace', 'parameter_files')
 
 
+def _overriding_qos(node: NodeSpec) -> Iterator[str]:
+    """Yield the parameters by which the QoS of publishers and subscriptions is overridden."""
+    for kind, end in node.ends():
+        for policy in getattr(end, 'qos_overrides', ()):
+            topic = full_name(node, 'topic', str(getattr(end, 'topic', '')))
+            yield f'qos_overrides.{topic}.{kind.noun}.{policy}'
+
+
 class _Takers:
     """The users of a file that one of its names of nodes matches."""
 
@@ -234,10 +243,15 @@ class _Takers:
     def add(self, user: _User) -> None:
         self._users.append(user)
         self._names.add(str(user.full_name))
-        if user.node is None or self._context.was_dropped((*user.node.path, 'parameters')):
+        if (
+            user.node is None
+            or getattr(user.node, 'automatically_declare_parameters_from_overrides', False)
+            or self._context.was_dropped((*user.node.path, 'parameters'))
+        ):
             self._open.append(user)
             return
-        for name in user.node.parameters:
+        overriding = _overriding_qos(user.node) if isinstance(user.node, NodeSpec) else ()
+        for name in (*user.node.parameters, *overriding):
             self._declaring.setdefault(name, []).append(user)
 
     def list_declaring(self, name: str) -> list[_User]:

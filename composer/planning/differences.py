@@ -7,20 +7,21 @@ recreated. All else changes in place.
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.bindings import exit_bindings, node_bindings
 from composer.language.specs import ComponentSpec, NodeSpec, ParameterSpec, ProcessSpec
+from composer.names import expand_name, remap_name
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.diagnostics import Span
     from composer.entity_kinds import EntityKind
@@ -60,7 +61,10 @@ _PARAMETERS = _Rules(
     dict.fromkeys(('type', 'read_only'), 'ROS fixes this when the parameter is declared'),
 )
 _FIXED = {
-    **dict.fromkeys(('type', *_CHANNELS, 'qos'), 'ROS fixes this when it is created'),
+    **dict.fromkeys(
+        ('type', *_CHANNELS, 'qos', 'qos_overrides', 'raw', 'content_filter'),
+        'ROS fixes this when it is created',
+    ),
     **dict.fromkeys(('group', 'clock'), 'rclpy fixes this when it is created'),
 }
 _LOST = {
@@ -91,6 +95,7 @@ _NODES = _Rules(
             ),
             'ROS reads this when the node is created',
         ),
+        'parameter_files': 'its parameters are declared from them when it is created',
         'class': 'its instance is made with the node',
     },
 )
@@ -271,7 +276,11 @@ class _Comparison:
         if not (before or after):
             return
         for name in dict.fromkeys([*before, *after]):
-            further = () if rules is not _PARAMETERS else self._changed_override(name, old, new)
+            further: Iterable[Change] = ()
+            if rules is _PARAMETERS:
+                further = self._changed_override(name, old, new)
+            elif getattr(after.get(name), 'qos_overrides', ()):
+                further = self._changed_qos(kind, name, old, new)
             target = (new.full_name, kind.section, name)
             entity = (before.get(name), after.get(name))
             for operation in self._compare(rules, target, *entity, further, (old, new)):
@@ -295,6 +304,21 @@ class _Comparison:
                 )
                 if before != after:
                     yield Change(key, before, after, old_span, new_span)
+        if new.record.automatically_declare_parameters_from_overrides:
+            known = {*old.record.parameters, *new.record.parameters, *_GIVEN_BY_ROS}
+            yield from _changed_values(old, new, lambda name: name not in known)
+
+    def _changed_qos(
+        self, kind: EntityKind, name: str, old: NodeSpec, new: NodeSpec
+    ) -> Iterator[Change]:
+        """Yield what parameter files say else now of the QoS of a publisher or subscription."""
+        topic = getattr(new, kind.section)[name].topic
+        expanded = expand_name(topic, new.name, new.namespace)
+        full = remap_name(expanded, new.remap, new.name, new.namespace, 'rostopic')
+        start = f'qos_overrides.{full}.{kind.noun}.'
+        readings = Reading(self._old, old, old.path), Reading(self._new, new, new.path)
+        for change in _changed_values(*readings, lambda each: each.startswith(start)):
+            yield replace(change, key=f'qos.{change.key.rpartition(".")[2]}')
 
     def _changed_classes(self, old: Reading, new: Reading) -> Iterator[Change]:
         """Yield the classes of behaviours that have other code now."""
@@ -350,6 +374,23 @@ class _Comparison:
     @staticmethod
     def _reading(snapshot: Snapshot) -> Reading:
         return Reading(snapshot, snapshot.spec, ())
+
+
+def _changed_values(
+    old: Reading, new: Reading, is_wanted: Callable[[str], bool]
+) -> Iterator[Change]:
+    """Yield the parameters to which parameter files give another value now."""
+    before, after = (side.snapshot.overrides.get(side.record.full_name, {}) for side in (old, new))
+    for name in filter(is_wanted, dict.fromkeys([*before, *after])):
+        was, now = before.get(name), after.get(name)
+        if repr(was and was.value) != repr(now and now.value):
+            yield Change(
+                f'parameter_files.{name}',
+                was and was.value,
+                now and now.value,
+                was.value_span if was else None,
+                now.value_span if now else None,
+            )
 
 
 def _find_classes(reading: Reading) -> dict[str, Binding]:

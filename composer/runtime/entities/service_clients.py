@@ -16,12 +16,12 @@ from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.messages.payloads import converter_for
-from composer.runtime.messages.qos_profiles import create_qos_profile
+from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 
 if TYPE_CHECKING:
     from rclpy.task import Future
 
-    from composer.language.specs import ServiceClientSpec
+    from composer.language.specs import Introspection, ServiceClientSpec
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -46,6 +46,8 @@ class ServiceClient:
             node.ros, self._client, (self._service, service_class)
         )
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspection: Introspection = 'off'
+        self._introspect(spec.introspection)
         self._requests = Requests(
             node.waits,
             self._is_available,
@@ -95,6 +97,12 @@ class ServiceClient:
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspect(spec.introspection)
+
+    def _introspect(self, introspection: Introspection) -> None:
+        if introspection != self._introspection:
+            self._introspection = introspection
+            configure_introspection(self._node.ros, self._client, introspection)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
