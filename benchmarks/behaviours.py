@@ -58,23 +58,23 @@ def comply(_node: Node, request: SetBool.Request) -> dict[str, object]:
     return {'success': request.data}
 
 
-def call_often(node: Node, seconds: float) -> Iterator[None]:
+def call_often(node: Node, seconds: float, timeout: float | None) -> Iterator[None]:
     """Call a service over and over for `seconds`, tell how often, and stop the system."""
     begin = time.monotonic()
     count = 0
     while time.monotonic() - begin < seconds:
-        node.call('ask', {'data': True})
+        node.call('ask', {'data': True}, timeout)
         count += 1
     _tell_rate(node, count, begin)
     yield
 
 
-async def call_often_async(node: Node, seconds: float) -> None:
+async def call_often_async(node: Node, seconds: float, timeout: float | None) -> None:  # noqa: ASYNC109 - of each call
     """As `call_often`, without holding a thread."""
     begin = time.monotonic()
     count = 0
     while time.monotonic() - begin < seconds:
-        await node.call_async('ask', {'data': True})
+        await node.call_async('ask', {'data': True}, timeout)
         count += 1
     _tell_rate(node, count, begin)
 

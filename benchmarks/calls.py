@@ -10,6 +10,12 @@ from benchmarks.executors import start_spinning
 from benchmarks.programs import READY, composed, printed_figures
 from benchmarks.systems import callers, render_system
 
+# Whether a composed system calls by `node.call_async`, and the time-out of its calls.
+COMPOSED = {
+    'composer': (False, 5.0),
+    'composer_unlimited': (False, None),
+    'composer_async': (True, 5.0),
+}
 _WARM_UP_SEC = 1.0
 _SPARE_SEC = 30.0
 
@@ -18,11 +24,11 @@ def measure(side: str, _size: int, seconds: float) -> dict[str, float]:
     """Return calls per second.
 
     Args:
-        side: `node.call` or `node.call_async` of a composed system, `composer` or
-            `composer_async`; or the name of an executor that runs rclpy's `call_async`.
+        side: A row of `COMPOSED`; or the name of an executor that runs rclpy's `call_async`.
     """
-    if side.startswith('composer'):
-        with composed(render_system(callers(seconds, is_async=side != 'composer'))) as program:
+    if side in COMPOSED:
+        is_async, timeout = COMPOSED[side]
+        with composed(render_system(callers(seconds, timeout, is_async=is_async))) as program:
             program.wait_for_line(READY)
             return printed_figures(program, seconds + _SPARE_SEC)
     return _measure_rclpy(side, seconds)

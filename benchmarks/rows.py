@@ -109,7 +109,11 @@ def _calls() -> list[Row]:
         what = f"{what} calls/s to a local server, against rclpy's call_async on EventsExecutor"
         return Row(what, _side('calls', side, 0, 'rate'), other, times, '>=', 3)
 
-    return [row('node.call', 'composer'), row('node.call_async', 'composer_async')]
+    return [
+        row('node.call', 'composer'),
+        row('node.call without a time-out', 'composer_unlimited'),
+        row('node.call_async', 'composer_async'),
+    ]
 
 
 def _large_messages() -> list[Row]:

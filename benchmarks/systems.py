@@ -94,7 +94,7 @@ def rally(seconds: float) -> dict[str, Any]:
     }
 
 
-def callers(seconds: float, *, is_async: bool) -> dict[str, Any]:
+def callers(seconds: float, timeout: float | None, *, is_async: bool) -> dict[str, Any]:
     """Return two nodes: one calls the other, prints how many calls a second, and stops."""
     behaviour = f'benchmarks.behaviours:call_often{"_async" if is_async else ""}'
     service = 'std_srvs/srv/SetBool'
@@ -102,7 +102,11 @@ def callers(seconds: float, *, is_async: bool) -> dict[str, Any]:
         'calling': {
             'service_clients': {'ask': service},
             'timers': {
-                'call': {'period': 0.2, 'behaviour': behaviour, 'with': {'seconds': seconds}}
+                'call': {
+                    'period': 0.2,
+                    'behaviour': behaviour,
+                    'with': {'seconds': seconds, 'timeout': timeout},
+                }
             },
         },
         'serving': {

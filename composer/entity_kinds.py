@@ -189,7 +189,9 @@ TRANSITION_BEHAVIOURS = (
 NODE_BEHAVIOURS: tuple[BehaviourKey, ...] = (
     BehaviourKey('on_start', ('node',)),
     BehaviourKey('on_stop', ('node',)),
+    BehaviourKey('before_parameters_set', ('node', 'changes')),
     BehaviourKey('on_parameters', ('node', 'changes')),
+    BehaviourKey('after_parameters_set', ('node', 'changes')),
     *(BehaviourKey(key, ('node',)) for key in TRANSITION_BEHAVIOURS),
 )
 

@@ -11,12 +11,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.checks.connections.topology import full_name
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
 from composer.language.parameter_files import read_given_file, values_given
 from composer.language.paths import PathError, explain_absent, resolve_path
-from composer.language.specs import NodeSpec, ProcessSpec
+from composer.language.specs import ComponentSpec, NodeSpec, ProcessSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
@@ -101,7 +102,7 @@ class _Library:
         self._context = context
         self._values_left = MAX_VALUES
 
-    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[ParameterFileSpec]:
+    def read(self, owner: NodeSpec | ProcessSpec | ComponentSpec) -> Iterator[ParameterFileSpec]:
         """Read the files of a node or process, and yield those that exist."""
         for index, file in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
@@ -163,7 +164,11 @@ class _Library:
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
-    owners: list[NodeSpec | ProcessSpec] = [*system.nodes.values(), *system.processes.values()]
+    owners: list[NodeSpec | ProcessSpec | ComponentSpec] = [
+        *system.nodes.values(),
+        *system.processes.values(),
+        *system.components,
+    ]
     for owner in owners:
         files = tuple(library.read(owner))
         if not files:
@@ -176,11 +181,14 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
 
 
 def _nodes_of(
-    owner: NodeSpec | ProcessSpec,
+    owner: NodeSpec | ProcessSpec | ComponentSpec,
 ) -> dict[str | None, NodeSpec | DeclaredNodeSpec | None]:
     """Return the nodes of an owner by full names, with what they declare if that is known."""
     if isinstance(owner, NodeSpec):
         return {owner.full_name: owner}
+    if isinstance(owner, ComponentSpec) or owner.components:
+        # A container gives its own files to none of its components.
+        return {owner.full_name: None}
     nodes: dict[str | None, NodeSpec | DeclaredNodeSpec | None] = {}
     if owner.node_name is not None and owner.namespace is not None:
         nodes[join_names(owner.namespace, owner.node_name)] = None
@@ -213,6 +221,14 @@ _DEPTH = 2
 _DECIDING = ('namespace', 'parameter_files')
 
 
+def _overriding_qos(node: NodeSpec) -> Iterator[str]:
+    """Yield the parameters by which the QoS of publishers and subscriptions is overridden."""
+    for kind, end in node.ends():
+        for policy in getattr(end, 'qos_overrides', ()):
+            topic = full_name(node, 'topic', str(getattr(end, 'topic', '')))
+            yield f'qos_overrides.{topic}.{kind.noun}.{policy}'
+
+
 class _Takers:
     """The users of a file that one of its names of nodes matches."""
 
@@ -227,10 +243,15 @@ class _Takers:
     def add(self, user: _User) -> None:
         self._users.append(user)
         self._names.add(str(user.full_name))
-        if user.node is None or self._context.was_dropped((*user.node.path, 'parameters')):
+        if (
+            user.node is None
+            or getattr(user.node, 'automatically_declare_parameters_from_overrides', False)
+            or self._context.was_dropped((*user.node.path, 'parameters'))
+        ):
             self._open.append(user)
             return
-        for name in user.node.parameters:
+        overriding = _overriding_qos(user.node) if isinstance(user.node, NodeSpec) else ()
+        for name in (*user.node.parameters, *overriding):
             self._declaring.setdefault(name, []).append(user)
 
     def list_declaring(self, name: str) -> list[_User]:

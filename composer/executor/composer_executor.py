@@ -151,6 +151,15 @@ class ComposerExecutor(MultiThreadedExecutor):
         """
         return self._spinner.registry.open_inbox(node, entity, depth)
 
+    def execute_at_once(self, inbox: Inbox, item: Any) -> bool:
+        """Hand `item` to an entity and execute its callback in this thread, which waits for it.
+
+        Returns:
+            False if that must be left to others: this is no callback, the entity or its group is
+            busy, or it took long the last time. Then `item` was not handed over.
+        """
+        return not self.is_forked and self._spinner.execute_at_once(inbox, item)
+
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Have `observer` told of what comes to a subscription or a timer of `node`.
 

@@ -10,6 +10,7 @@ from composer.executor.deadlines import DelayedCall
 from composer.executor.entity_registry import EntityRegistry
 from composer.executor.scheduler import Session
 from composer.executor.sources.event_source import NOTHING, EventSource, ExecutorParts
+from composer.executor.sources.inbox import Inbox
 from composer.executor.tasks import (
     ExecutorTask,
     ImmediateCallback,
@@ -175,6 +176,23 @@ class EventLoop:
             self._finish_session(me, has_run=outcome is RAN or outcome is ENDED)
             return None, now
         return ended, now
+
+    def execute_at_once(self, inbox: Inbox, item: Any) -> bool:
+        """See `ComposerExecutor.execute_at_once`."""
+        source, scheduler = inbox.source, self._parts.scheduler
+        if source is None or source.slow or not self.workers.is_in_callback():
+            return False
+        if not scheduler.start_idle(source):
+            return False
+        begun = monotonic()
+        inbox.messages.append(item)
+        outcome = self._runner.execute(source)
+        source.slow = monotonic() - begun > TAKEOVER_SEC
+        if outcome is RAN or outcome is NOTHING:
+            scheduler.finish(source)
+        if not scheduler.is_empty():
+            self._parts.poller.wake()  # For what came meanwhile.
+        return True
 
     def _finish_session(self, me: Worker, *, has_run: bool) -> None:
         session, me.session = me.session, None

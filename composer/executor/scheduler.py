@@ -304,6 +304,24 @@ class Scheduler:
                     self._set_spinning()
             return work
 
+    def start_idle(self, source: QueuedSource) -> bool:
+        """Start `source` in a thread that would wait for it; `finish` must follow.
+
+        Returns:
+            False if it has something to take already, or nothing may begin for now.
+        """
+        with self.lock:
+            self._add_announced()
+            group = source.group
+            if source.queued or group.active or not (source.alive and self.is_spinning):
+                return False
+            if self._admitting or not (group.exclusive or group.reentrant):
+                return False
+            if group.exclusive:
+                group.active = source.queued = True
+            self.running += 1
+            return True
+
     def finish(self, source: QueuedSource | None, *, suspended: bool = False) -> None:
         """Note that what was started has run; `source` frees its group unless it is suspended."""
         with self.lock:

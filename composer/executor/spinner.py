@@ -80,6 +80,7 @@ class Spinner:
         runner = CallbackRunner(parts)
         self._loop = EventLoop(parts, self.registry, runner, self.report, self.notifier.notify)
         self.workers = self._loop.workers
+        self.execute_at_once = self._loop.execute_at_once
         self._executor = executor
         self._waiting_callbacks: set[object] = set()
         self._are_callbacks_free = False

@@ -219,7 +219,7 @@ def _follow(evaluator: Evaluator, module: ModuleSource, binding: Binding, wire: 
     given: Value = UNKNOWN
     if wire.given:
         given = Message(wire.given, is_read_only=wire.is_read_only)
-    if binding.key.key == 'on_parameters':
+    if binding.parameters[-1] == 'changes':
         given = PartOfNode('changes')
     positional = [NODE, given][: len(binding.parameters)]
     constants = [(name, _of_file(value, place)) for name, value in behaviour.arguments.items()]

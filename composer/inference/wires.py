@@ -53,7 +53,7 @@ def wire_of(binding: Binding, facts: NodeFacts) -> Wire:
         return f'{own}_{part}' if part else own
 
     return Wire(
-        given=type_of(key.given),
+        given=None if getattr(binding.entity, 'raw', False) else type_of(key.given),
         yielded=type_of(key.yielded),
         returned=type_of(key.returned),
         ended=type_of(key.returned),

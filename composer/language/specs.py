@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
 OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
 ClockName: TypeAlias = Literal['ros', 'steady', 'system']
+Introspection: TypeAlias = Literal['off', 'metadata', 'contents']
 Concurrency: TypeAlias = Literal['parallel', 'queue', 'reject', 'preempt']
 
 ConditionKind: TypeAlias = Literal['topic', 'service', 'action', 'node', 'process']
@@ -113,12 +114,14 @@ class PublisherSpec:
 
     Attributes:
         external: Whether its subscriptions are in no file.
+        qos_overrides: The policies that ROS parameters can override.
     """
 
     name: str
     type: str
     topic: str
     qos: QosSpec
+    qos_overrides: tuple[str, ...]
     local_delivery: bool
     external: bool
     path: DataPath
@@ -136,6 +139,9 @@ class SubscriptionSpec:
         while_inactive: What becomes of messages while the node has a lifecycle and is not active;
             `None` for what fits the durability.
         external: Whether its publishers are in no file.
+        qos_overrides: The policies that ROS parameters can override.
+        raw: Whether its behaviour gets serialised messages.
+        content_filter: The `expression` and the `parameters`; empty for all messages.
     """
 
     name: str
@@ -146,6 +152,9 @@ class SubscriptionSpec:
     publish: str | None
     group: str | None
     read_only: bool
+    qos_overrides: tuple[str, ...]
+    raw: bool
+    content_filter: Mapping[str, Any]
     while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
@@ -191,6 +200,7 @@ class ServiceSpec:
     behaviour: BehaviourSpec
     group: str | None
     while_inactive: WhileInactive | None
+    introspection: Introspection
     local_delivery: bool
     on_error: OnError
     warn_after_sec: float | None
@@ -209,6 +219,7 @@ class ServiceClientSpec:
     type: str
     service: str
     qos: QosSpec
+    introspection: Introspection
     local_delivery: bool
     external: bool
     path: DataPath
@@ -373,6 +384,44 @@ class DeclaredNodeSpec:
 
 
 @record
+class ComponentSpec:
+    """A node that a container loads.
+
+    Attributes:
+        namespace: In full, as in `/robot`.
+        package: The ROS package of the plugin.
+        plugin: The class, as in `image_proc::RectifyNode`.
+        remap: Rules, from and to; the first that matches wins.
+        intra_process: Whether messages within the container are handed over.
+        container: The name of the container.
+    """
+
+    name: str
+    namespace: str
+    description: str
+    package: str
+    plugin: str
+    parameters: Mapping[str, Any]
+    parameter_files: tuple[ParameterFileSpec, ...]
+    remap: tuple[tuple[str, str], ...]
+    log_level: LogLevel | None
+    intra_process: bool
+    wait_for: tuple[ConditionSpec, ...]
+    container: str
+    path: DataPath
+
+    @property
+    def key(self) -> str:
+        """Its key in the file: its name, or its full name."""
+        return str(self.path[-1])
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/rectify`."""
+        return join_names(self.namespace, self.name)
+
+
+@record
 class ProcessSpec:
     """A program that runs beside the nodes.
 
@@ -393,6 +442,8 @@ class ProcessSpec:
         stop_timeout_sec: After this it is killed; `None` for the system's own.
         delay_sec: Time between the moment when its conditions hold and its start.
         on_demand: Whether it only starts when the `on_exit` of another one starts it.
+        components: What is loaded into it, if it is a container.
+        external: Whether it is a container that runs already, and is never started.
     """
 
     name: str
@@ -422,7 +473,14 @@ class ProcessSpec:
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
     lifecycle: DrivenState | None
+    components: Mapping[str, ComponentSpec]
+    external: bool
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """The full name of its node, if it is a container."""
+        return join_names(self.namespace or '/', self.node_name or self.name)
 
     @property
     def named_nodes(self) -> tuple[str, ...]:
@@ -450,6 +508,9 @@ class NodeSpec:
     Attributes:
         namespace: In full, as in `/robot`.
         local_delivery: Of entities that do not say so, and are created while it runs.
+        allow_undeclared_parameters: Whether others can be set than are declared.
+        automatically_declare_parameters_from_overrides: Whether all are declared that parameter
+            files and the command line give it.
         parameter_services: Whether others can list, read and set its parameters.
         rosout: Whether what it logs goes to `/rosout`, too.
         type_description_service: Whether it answers which types it uses.
@@ -471,6 +532,8 @@ class NodeSpec:
     log_level: LogLevel | None = None
     use_sim_time: bool = False
     local_delivery: bool = True
+    allow_undeclared_parameters: bool = False
+    automatically_declare_parameters_from_overrides: bool = False
     parameter_services: bool = True
     rosout: bool = True
     type_description_service: bool = False
@@ -490,7 +553,9 @@ class NodeSpec:
     action_clients: Mapping[str, ActionClientSpec]
     on_start: BehaviourSpec | None
     on_stop: BehaviourSpec | None
+    before_parameters_set: BehaviourSpec | None
     on_parameters: BehaviourSpec | None
+    after_parameters_set: BehaviourSpec | None
     lifecycle: LifecycleStart | None
     on_configure: BehaviourSpec | None
     on_activate: BehaviourSpec | None
@@ -511,6 +576,14 @@ class NodeSpec:
     def key(self) -> str:
         """Its key in the file: its name, or its full name."""
         return str(self.path[-1])
+
+    @property
+    def has_other_parameters(self) -> bool:
+        """Whether it may have parameters that the file does not declare."""
+        return (
+            self.allow_undeclared_parameters
+            or self.automatically_declare_parameters_from_overrides
+        )
 
     @property
     def full_name(self) -> str:
@@ -575,6 +648,12 @@ class SystemSpec:
         yield from self.nodes.values()
         for process in self.processes.values():
             yield from process.nodes
+
+    @property
+    def components(self) -> Iterator[ComponentSpec]:
+        """All components of its containers."""
+        for process in self.processes.values():
+            yield from process.components.values()
 
     @property
     def without_parameter_services(self) -> frozenset[str]:

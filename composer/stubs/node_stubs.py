@@ -90,6 +90,7 @@ class _Writer:
         for name, of_type in types.items():
             if is_writable(name) and name not in _OF_MAPPINGS and not name.startswith('__'):
                 yield from self._property(name, of_type)
+        yield f'    def __call__(self, prefix: str) -> dict[str, {anything}]: ...'
         yield from self._overloaded(
             f'    def __getitem__(self, name: {self._literal(name)}, /) -> {of_type}: ...'
             for name, of_type in types.items()

@@ -130,7 +130,7 @@ def changed_names(function: FunctionNode) -> set[str]:
 
 def message_given(binding: Binding) -> str | None:
     """Return the full name of the message that a behaviour is called with."""
-    return _part_of(binding, binding.key.given)
+    return None if getattr(binding.entity, 'raw', False) else _part_of(binding, binding.key.given)
 
 
 def payload_of(node: NodeSpec, binding: Binding, part: str | None) -> str | None:

@@ -179,6 +179,8 @@ def _check_remote_parameters(
             target = _node_of_name(context, node, each.node)
             if target is None:
                 yield from _explain_unknown_node(context, node, binding, each)
+            elif target.before_parameters_set is not None:
+                continue  # Nobody knows what it makes of it.
             elif parameter := target.parameters.get(each.name):
                 yield from _explain_refusal(context, binding, each, parameter)
             elif each.name not in OF_EVERY_NODE and not _may_have_others(context, target):
@@ -254,4 +256,4 @@ def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec 
 
 
 def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return any(each.reaches_ros for each in context.readings(node))
+    return node.has_other_parameters or any(each.reaches_ros for each in context.readings(node))

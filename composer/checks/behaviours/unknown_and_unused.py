@@ -82,6 +82,7 @@ def _check_names(
     for name, node in context.spec.nodes.items():
         # A behaviour may declare parameters with rclpy.
         is_open = any(reading.reaches_ros for _, reading in uses[name])
+        is_open |= node.has_other_parameters
         created = {(each.kind, each.name) for _, read in uses[name] for each in read.created}
         used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
@@ -219,7 +220,8 @@ def _open_kinds(node: NodeSpec, uses: list[Reading], *, are_read: bool) -> froze
     kinds = frozenset(kind for each in uses for kind in each.open_kinds)
     # A behaviour may react to changes only, and a node without behaviours has its parameters for
     # others.
-    is_for_others = are_read or node.on_parameters is not None or not uses
+    hears = node.before_parameters_set or node.on_parameters or node.after_parameters_set
+    is_for_others = bool(are_read or hears or not uses)
     return kinds | {'parameter'} if is_for_others else kinds
 
 

@@ -221,6 +221,10 @@ class Calls(Part):
                 if made is not None:
                     return made
                 return self._evaluator.library.call(function.name, arguments, place)
+            case PartOfNode(name='parameters'):
+                # Those with a prefix.
+                self._evaluator.run.reading.open_kinds.add('parameter')
+                return UNKNOWN
             case Message() | Constant() | Scalar() | Generated() | Mapping() | PartOfNode():
                 self._refuse(function, place)
         self._evaluator.run.moves += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from composer.language.parsing.entry_parser import (
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
     from composer.language.specs import OnError
     from composer.yaml_text.positions import DataPath
+
+
+# Those of `QoSOverridingOptions.with_default_policies` of rclpy.
+_USUAL_OVERRIDES = ('history', 'depth', 'reliability')
 
 
 def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
@@ -95,6 +100,7 @@ def _parse_publisher(node: Data, name: str, data: str | Data, path: DataPath) ->
         type=data['type'],
         topic=data.get('topic', name),
         qos=parse_entity_qos(data, path),
+        qos_overrides=_parse_overrides(data.get('qos_overrides', False)),
         local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
         path=path,
@@ -107,6 +113,9 @@ def _parse_subscription(node: Data, name: str, data: Data, path: DataPath) -> Su
         type=data['type'],
         topic=data.get('topic', name),
         qos=parse_entity_qos(data, path),
+        qos_overrides=_parse_overrides(data.get('qos_overrides', False)),
+        raw=data.get('raw', False),
+        content_filter=MappingProxyType(data.get('content_filter', {})),
         behaviour=parse_behaviour(data, path),
         publish=data.get('publish'),
         group=data.get('group'),
@@ -141,6 +150,7 @@ def _parse_service(node: Data, name: str, data: Data, path: DataPath) -> Service
         behaviour=behaviour_at(data, path),
         group=data.get('group'),
         while_inactive=data.get('while_inactive'),
+        introspection=data.get('introspection', 'off'),
         local_delivery=_allows_local_delivery(data, node),
         path=path,
         **parse_run_options(data, node),
@@ -156,6 +166,7 @@ def _parse_service_client(
         type=data['type'],
         service=data.get('service', name),
         qos=parse_entity_qos(data, path, is_service=True),
+        introspection=data.get('introspection', 'off'),
         local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
         path=path,
@@ -190,6 +201,12 @@ def _parse_action_client(
         external=data.get('external', False),
         path=path,
     )
+
+
+def _parse_overrides(data: Any) -> tuple[str, ...]:
+    if isinstance(data, bool):
+        return _USUAL_OVERRIDES if data else ()
+    return tuple(data)
 
 
 def _full(data: str | Data) -> Data:

@@ -65,7 +65,7 @@ def create_entities(nodes: Sequence[LiveNode]) -> None:
         with _failing_for(node):
             # Last, for its class to find all that it may use.
             if node.parameters is not None:
-                node.parameters.ask(node.spec.on_parameters)
+                node.parameters.ask(node.spec)
 
 
 def create_entity(node: LiveNode, section: str, spec: Any) -> LiveEntity:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import contextmanager
 from threading import get_ident
 from typing import TYPE_CHECKING, Any
@@ -21,12 +22,14 @@ from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
 
-    from composer.language.specs import BehaviourSpec, ParameterSpec
+    from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.ros_node import ComposedRosNode
 
+# The keys of a node whose behaviours hear of changes.
+PARAMETER_HOOKS = ('before_parameters_set', 'on_parameters', 'after_parameters_set')
 _FLOAT_MAX = 1.7976931348623157e308
 
 
@@ -45,6 +48,8 @@ class NodeParameters:
     def __init__(self, node: LiveNode) -> None:
         self._node = node
         self._asking: Callable[[list[Parameter]], SetParametersResult] | None = None
+        self._before: Callable[[list[Parameter]], list[Parameter]] | None = None
+        self._after: Callable[[list[Parameter]], None] | None = None
         self.specs: dict[str, ParameterSpec] = {}
         self.set_live: set[str] = set()
         self._refusing = lambda changes: _refuse_unless_chosen(self.specs, changes)
@@ -92,20 +97,66 @@ class NodeParameters:
             message = f"parameter '{spec.name}' of '{self._node.spec.key}': {result.reason}"
             raise StartError(message)
 
-    def ask(self, behaviour: BehaviourSpec | None) -> None:
-        """Ask this behaviour about changes from now on; `None` for nobody."""
-        ros = self._node.ros
+    def ask(self, spec: NodeSpec) -> None:
+        """Call the behaviours of this node about changes from now on."""
+        node, ros = self._node, self._node.ros
         if self._asking is not None:
             ros.remove_on_set_parameters_callback(self._asking)
             self._asking = None
-            self._node.drop_limits('on_parameters')
-        if behaviour is not None:
+        if self._before is not None:
+            ros.remove_pre_set_parameters_callback(self._before)
+            self._before = None
+        if self._after is not None:
+            ros.remove_post_set_parameters_callback(self._after)
+            self._after = None
+        for key in PARAMETER_HOOKS:
+            node.drop_limits(key)
+        if spec.on_parameters is not None:
             # rclpy calls the callback first that was added last, and a behaviour is not asked
             # about what is refused anyway.
             ros.remove_on_set_parameters_callback(self._refusing)
-            self._asking = _create_callback(self._node, behaviour)
+            self._asking = _create_callback(node, spec.on_parameters)
             ros.add_on_set_parameters_callback(self._asking)
             ros.add_on_set_parameters_callback(self._refusing)
+        if spec.before_parameters_set is not None:
+            self._before = self._changing(spec.before_parameters_set)
+            ros.add_pre_set_parameters_callback(self._before)
+        if spec.after_parameters_set is not None:
+            self._after = _telling(node, spec.after_parameters_set)
+            ros.add_post_set_parameters_callback(self._after)
+
+    def _changing(self, spec: BehaviourSpec) -> Callable[[list[Parameter]], list[Parameter]]:
+        """Return what lets `before_parameters_set` change changes."""
+        node = self._node
+        call = node.call(
+            Owner('before_parameters_set'), spec.path, node.bind(spec), deliver=return_result
+        )
+
+        def change(changes: list[Parameter]) -> list[Parameter]:
+            wanted = node.run_to_end(call, _as_changes(changes))
+            if wanted is None:
+                return changes
+            # rclpy refuses an empty list.
+            if wanted is FAILED or not isinstance(wanted, Mapping):
+                return []
+            given = {each.name: each for each in changes}
+            return [
+                given[name]
+                if name in given and given[name].value is value
+                else self._parameter(name, value)
+                for name, value in wanted.items()
+            ]
+
+        return change
+
+    def _parameter(self, name: str, value: Any) -> Parameter:
+        """Return a parameter with a value of Python; an integer may be that of a double."""
+        spec = self.specs.get(name)
+        if spec is None or value is None:
+            return Parameter(name, value=value)
+        if spec.type == 'double' and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        return Parameter(name, value=value)
 
     @contextmanager
     def _as_own(self) -> Iterator[None]:
@@ -166,6 +217,9 @@ def _origin(ros: ComposedRosNode, name: str) -> str:
 def _declare(ros: ComposedRosNode, spec: ParameterSpec) -> None:
     kind = type_of(spec)
     descriptor = create_descriptor(spec)
+    if ros.has_parameter(spec.name):
+        # It was declared from an override, without what the file says of it.
+        ros.undeclare_parameter(spec.name)
     entry = ros.from_files.get(spec.name)
     if entry is not None and entry.value == [] and not kind.name.endswith('_ARRAY'):
         message = f"parameter '{spec.name}' from {entry.value_span}: {kind.name} is no list"
@@ -202,6 +256,20 @@ def _refuse_unless_chosen(
     return SetParametersResult(successful=True)
 
 
+def _as_changes(changes: Iterable[Parameter]) -> dict[str, Any]:
+    return {change.name: change.value for change in changes}
+
+
+def _telling(node: LiveNode, spec: BehaviourSpec) -> Callable[[list[Parameter]], None]:
+    """Return what tells `after_parameters_set` of changes."""
+    call = node.call(Owner('after_parameters_set'), spec.path, node.bind(spec))
+
+    def tell(changes: list[Parameter]) -> None:
+        node.run_to_end(call, _as_changes(changes))
+
+    return tell
+
+
 def _create_callback(
     node: LiveNode, spec: BehaviourSpec
 ) -> Callable[[list[Parameter]], SetParametersResult]:
@@ -211,7 +279,7 @@ def _create_callback(
 
     def ask(changes: list[Parameter]) -> SetParametersResult:
         # rclpy wants the answer when this returns, so a coroutine is waited for.
-        reason = node.run_to_end(call, {change.name: change.value for change in changes})
+        reason = node.run_to_end(call, _as_changes(changes))
         if reason is FAILED:
             reason = 'on_parameters raised an error'
         return SetParametersResult(successful=reason is None, reason=str(reason or ''))

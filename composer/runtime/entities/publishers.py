@@ -9,7 +9,6 @@ from composer.interfaces.classes import import_interface
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.ownership import UNHELD_ARGUMENT
 from composer.runtime.messages.payloads import converter_for
-from composer.runtime.messages.qos_profiles import create_qos_profile
 
 if TYPE_CHECKING:
     from composer.language.specs import PublisherSpec
@@ -37,7 +36,7 @@ class Publisher:
 
     def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
         message_class = import_interface(spec.type)
-        profile = create_qos_profile(spec.qos, node.system.profiles)
+        profile = node.qos_profile(spec, publishes=True)
         self._node = node
         self._spec = spec
         self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
@@ -88,5 +87,6 @@ class Publisher:
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.endpoints.remove(self._endpoint)
+        self._node.drop_overrides(self._spec, publishes=True)
         self._node.system.topics.remove_publisher(self._local)
         self._node.ros.destroy_publisher(self._ros)

@@ -16,12 +16,12 @@ from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
 from composer.runtime.behaviours.waits import WaitNotice
 from composer.runtime.messages.payloads import converter_for
-from composer.runtime.messages.qos_profiles import create_qos_profile
+from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 
 if TYPE_CHECKING:
     from rclpy.task import Future
 
-    from composer.language.specs import ServiceClientSpec
+    from composer.language.specs import Introspection, ServiceClientSpec
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -46,6 +46,8 @@ class ServiceClient:
             node.ros, self._client, (self._service, service_class)
         )
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspection: Introspection = 'off'
+        self._introspect(spec.introspection)
         self._requests = Requests(
             node.waits,
             self._is_available,
@@ -65,7 +67,9 @@ class ServiceClient:
         """
         request = self._convert(payload)
         is_held = request is payload and getrefcount(payload) > _UNHELD
-        return self._requests.send(partial(self._send, request, is_held=is_held), timeout_sec)
+        may_block = timeout_sec is None and not self._node.system.stop.is_set
+        send = partial(self._send, request, is_held=is_held, may_block=may_block)
+        return self._requests.send(send, timeout_sec)
 
     async def call_async(self, payload: Payload, timeout_sec: float | None) -> Any:
         """As `call`, without holding a thread while it waits."""
@@ -74,14 +78,14 @@ class ServiceClient:
         send = partial(self._send, request, is_held=is_held)
         return await self._requests.send_async(send, timeout_sec)
 
-    def _send(self, request: Any, *, is_held: bool) -> Future:
+    def _send(self, request: Any, *, is_held: bool, may_block: bool = False) -> Future:
         server = self._local.server
         if server is None:
             return self._client.call_async(request)
         if server.find_refusal is not None and (reason := server.find_refusal()):
             message = f"'{self._service}' answers no requests: {reason}"
             raise ServiceNotAvailableError(message)
-        return server.call(request, is_held=is_held)
+        return server.call(request, is_held=is_held, may_block=may_block)
 
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
@@ -93,6 +97,12 @@ class ServiceClient:
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspect(spec.introspection)
+
+    def _introspect(self, introspection: Introspection) -> None:
+        if introspection != self._introspection:
+            self._introspection = introspection
+            configure_introspection(self._node.ros, self._client, introspection)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""

@@ -9,14 +9,14 @@ from composer.runtime.behaviours.calls import FAILED
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.messages.delivery_policies import queue_depth
 from composer.runtime.messages.payloads import converter_for
-from composer.runtime.messages.qos_profiles import create_qos_profile
+from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 from composer.runtime.nodes.callback_groups import LifecycleGate
 from composer.runtime.system_executor import NoResponseError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.language.specs import ServiceSpec
+    from composer.language.specs import Introspection, ServiceSpec
     from composer.runtime.nodes.live_node import LiveNode
 
 
@@ -37,13 +37,21 @@ class Service:
             node.ros, self._ros, key, queue_depth(self._ros.qos_profile)
         )
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspection: Introspection = 'off'
+        self._introspect(spec.introspection)
         self._rest(spec)
 
     def change(self, spec: ServiceSpec) -> None:
         """See `LiveEntity`."""
         self._ros.callback = _create_callback(self._node, spec)
         self._local.allow(is_allowed=spec.local_delivery)
+        self._introspect(spec.introspection)
         self._rest(spec)
+
+    def _introspect(self, introspection: Introspection) -> None:
+        if introspection != self._introspection:
+            self._introspection = introspection
+            configure_introspection(self._node.ros, self._ros, introspection)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""

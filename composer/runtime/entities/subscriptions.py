@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import DurabilityPolicy
 
+from composer.errors import StartError
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import return_result
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.health.unmatched import TopicEndpoint
-from composer.runtime.messages.qos_profiles import create_qos_profile
 from composer.runtime.messages.read_only import protector_for
 from composer.runtime.nodes.callback_groups import LifecycleGate
 
@@ -27,9 +28,9 @@ class Subscription:
     """A subscription."""
 
     def __init__(self, node: LiveNode, spec: SubscriptionSpec) -> None:
-        self._node = node
+        self._node, self._spec = node, spec
         self._owner = Owner('subscription', spec.name)
-        profile = create_qos_profile(spec.qos, node.system.profiles)
+        profile = node.qos_profile(spec, publishes=False)
         self._endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.placing(spec))
         self._ros = node.ros.create_subscription(
             import_interface(spec.type),
@@ -38,11 +39,13 @@ class Subscription:
             profile,
             callback_group=node.group(spec.group),
             event_callbacks=self._endpoint.subscription_events(),
+            raw=spec.raw,
+            **_filter_options(spec),
         )
         node.endpoints.append(self._endpoint)
         self._rest(spec)
         self._local = node.system.topics.add_subscription(
-            node.ros, self._ros, read_only=spec.read_only
+            node.ros, self._ros, read_only=spec.read_only, reason=_why_sent(spec)
         )
         node.count_missed(self._owner, self._ros, self._local.inbox)
 
@@ -56,6 +59,7 @@ class Subscription:
     def destroy(self) -> None:
         """See `LiveEntity`."""
         self._node.endpoints.remove(self._endpoint)
+        self._node.drop_overrides(self._spec, publishes=False)
         self._node.system.topics.remove_subscription(self._local)
         self._node.ros.destroy_subscription(self._ros)
 
@@ -78,7 +82,9 @@ class Subscription:
             deliver=node.publish_to(spec.publish),
             may_begin=node.gate.allows_events,
         )
-        protect = protector_for(import_interface(spec.type)) if spec.read_only else None
+        protect = (
+            protector_for(import_interface(spec.type)) if spec.read_only and not spec.raw else None
+        )
         run = call.run if protect is None else _protecting(protect, call)
         return run if node.lifecycle is None else _resting(node.gate, run, call)
 
@@ -93,6 +99,30 @@ def _resting(gate: Gate, run: Callable[..., Any], call: BehaviourCall) -> Callab
         return None if gate.rests else await run(message)
 
     return receive_async if call.is_async else receive
+
+
+def _why_sent(spec: SubscriptionSpec) -> str:
+    """Return why its messages must come from the middleware; empty if they need not."""
+    return 'raw' if spec.raw else 'content_filter' if spec.content_filter else ''
+
+
+def _filter_options(spec: SubscriptionSpec) -> dict[str, Any]:
+    """Return the arguments of rclpy for a content filter.
+
+    Raises:
+        StartError: This rclpy has none.
+    """
+    if not spec.content_filter:
+        return {}
+    try:
+        # Of rclpy 9; mypy knows one of both.
+        module = importlib.import_module('rclpy.subscription_content_filter_options')
+    except ImportError as error:
+        message = f"the content_filter of subscription '{spec.name}' needs a newer ROS 2"
+        raise StartError(message, help='rclpy has it since ROS 2 Kilted') from error
+    parameters = [str(each) for each in spec.content_filter.get('parameters', ())]
+    options = module.ContentFilterOptions(spec.content_filter['expression'], parameters)
+    return {'content_filter_options': options}
 
 
 def _protecting(protect: Callable[[Any], None], call: BehaviourCall) -> Callable[[Any], Any]:

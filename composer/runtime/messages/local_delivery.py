@@ -236,10 +236,14 @@ class LocalTopics:
             publisher.connect(self._topic(publisher.ros).subscriptions)
 
     def add_subscription(
-        self, node: Any, ros: RosSubscription, *, read_only: bool = False
+        self, node: Any, ros: RosSubscription, *, read_only: bool = False, reason: str = ''
     ) -> LocalSubscription:
-        """Take in a subscription of the rclpy node `node`."""
-        reason = why_sent(ros.qos_profile)
+        """Take in a subscription of the rclpy node `node`.
+
+        Args:
+            reason: Why only the middleware can deliver to it; empty if that is not so.
+        """
+        reason = reason or why_sent(ros.qos_profile)
         depth = queue_depth(ros.qos_profile)
         inbox = None if reason else self._executor.open_inbox(node, ros, depth)
         subscription = LocalSubscription(node, ros, inbox, reason, read_only=read_only)

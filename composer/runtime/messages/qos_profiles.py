@@ -5,23 +5,31 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration, Infinite
+from rclpy.publisher import Publisher
 from rclpy.qos import (
     DeadlineBestAvailable,
     DurabilityPolicy,
     HistoryPolicy,
     LivelinessLeaseDurationeBestAvailable,
     LivelinessPolicy,
+    QoSPolicyKind,
     QoSProfile,
     ReliabilityPolicy,
+    qos_profile_system_default,
 )
+from rclpy.qos_overriding_options import QoSOverridingOptions, _declare_qos_parameters
+from rclpy.service_introspection import ServiceIntrospectionState
+from rclpy.subscription import Subscription
 
 from composer.language.qos import DURATIONS, INFINITE, NANOSECONDS, resolve_qos
 from composer.language.qos_conflicts import CONFLICTS, MATCHED_DURATIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
-    from composer.language.specs import QosSpec
+    from rclpy.node import Node
+
+    from composer.language.specs import Introspection, QosSpec
 
 _POLICIES = {
     'history': HistoryPolicy,
@@ -56,6 +64,26 @@ def read_policies(profile: QoSProfile) -> dict[str, Any]:
         if 0 < duration_ns < _LONGEST_NS:
             policies[name] = duration_ns / NANOSECONDS
     return policies
+
+
+def configure_introspection(ros: Node, end: Any, introspection: Introspection) -> None:
+    """Let the middleware publish what it sees of each call of a service or client."""
+    state = getattr(ServiceIntrospectionState, introspection.upper())
+    end.configure_introspection(ros.get_clock(), qos_profile_system_default, state)
+
+
+def apply_qos_overrides(
+    ros: Node, topic: str, profile: QoSProfile, policies: Collection[str], *, publishes: bool
+) -> None:
+    """Let ROS parameters override policies of a profile, as rclpy does: they are declared.
+
+    Args:
+        topic: The full name of the topic.
+    """
+    kinds = [QoSPolicyKind[name.upper()] for name in policies]
+    options = QoSOverridingOptions(kinds)
+    entity = Publisher if publishes else Subscription
+    _declare_qos_parameters(entity, ros, topic, profile, options)
 
 
 def is_qos_profile(value: object) -> bool:

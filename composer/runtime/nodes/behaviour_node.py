@@ -76,6 +76,11 @@ class Parameters(Mapping[str, Any]):
             raise AttributeError(name)
         return self[name]
 
+    def __call__(self, prefix: str) -> dict[str, Any]:
+        """Return the values of the parameters `prefix.…`, by the rest of their names."""
+        start = f'{prefix}.'
+        return {name.removeprefix(start): self[name] for name in self if name.startswith(start)}
+
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the declared parameters."""
         return iter(self._ros.list_parameters([], 0).names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from composer.language.specs import BehaviourSpec, OnError, ParameterSpec
+    from composer.language.specs import NodeSpec, OnError, ParameterSpec
 
 
 class Suspended(Protocol):
@@ -49,8 +49,8 @@ class NodeParameters(Protocol):
     def set(self, spec: ParameterSpec, value: Any) -> None:
         """Set a parameter to a value of the files."""
 
-    def ask(self, behaviour: BehaviourSpec | None) -> None:
-        """Ask this behaviour about changes from now on."""
+    def ask(self, spec: NodeSpec) -> None:
+        """Call the behaviours of this node about changes from now on."""
 
 
 class NodeLifecycle(Protocol):

@@ -86,7 +86,8 @@ class ComposedRosNode(Node):
         given = find_names_given(ros_arguments, spec.full_name)
         self.from_files = {name: entries[name] for name in entries if name not in given}
         self._late_events: _LatePublisher | None = None
-        has_parameters = bool(spec.parameters) or spec.on_parameters is not None
+        hooks = spec.before_parameters_set, spec.on_parameters, spec.after_parameters_set
+        has_parameters = bool(spec.parameters) or spec.has_other_parameters or any(hooks)
         self._events_are_late = not has_parameters
         self._lacks_services = spec.parameter_services and not has_parameters
         # Global arguments hold for every node of the process, where a __node rule would give all
@@ -101,6 +102,10 @@ class ComposedRosNode(Node):
             enable_rosout=spec.rosout,
             start_parameter_services=spec.parameter_services and has_parameters,
             enable_logger_service=spec.logger_services,
+            allow_undeclared_parameters=spec.allow_undeclared_parameters,
+            automatically_declare_parameters_from_overrides=(
+                spec.automatically_declare_parameters_from_overrides
+            ),
         )
         for name in (_SIM_TIME, _TYPE_DESCRIPTION):
             if name not in self.from_files and name not in given:

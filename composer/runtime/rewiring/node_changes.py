@@ -12,6 +12,7 @@ from rclpy.parameter import Parameter
 from composer.errors import StartError
 from composer.planning.plan import COMING, Action
 from composer.runtime.entities.creators import create_entity
+from composer.runtime.entities.parameters import PARAMETER_HOOKS
 from composer.runtime.logs import set_level
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -143,9 +144,9 @@ class NodeChange:
             requests = node.system.log_levels
             transaction.on_undo(set_level, before, requests)
             set_level(spec, requests)
-        if keys & {'on_parameters', 'on_error', 'warn_after'} and node.parameters:
-            transaction.on_undo(node.parameters.ask, before.on_parameters)
-            node.parameters.ask(spec.on_parameters)
+        if keys & {*PARAMETER_HOOKS, 'on_error', 'warn_after'} and node.parameters:
+            transaction.on_undo(node.parameters.ask, before)
+            node.parameters.ask(spec)
         if keys & {'on_error', 'warn_after'}:
             # Their behaviours have no such keys of their own.
             for name, client_spec in spec.action_clients.items():

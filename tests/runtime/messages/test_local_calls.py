@@ -25,12 +25,16 @@ import composer
 
 kept, held, callers, ways = [], [], [], []
 began, goes_on = threading.Event(), threading.Event()
+LIMIT = 5.0
 
 def tell(node, what, *values):
     node.logger.info('seen: ' + json.dumps([what, *values]))
 
 def note_way():
-    ways.append('sent' if any(each._pending_requests for each in callers[0].ros.clients) else 'handed')
+    time.sleep(0.02)  # rclpy notes a request after it has sent it.
+    is_sent = any(each._pending_requests for each in callers[0].ros.clients)
+    is_here = threading.get_ident() == callers[1]
+    ways.append('sent' if is_sent else 'here' if is_here else 'handed')
 
 def answer(node, request):
     return {'success': True}
@@ -69,15 +73,15 @@ def failure(call):
         return f'{type(error).__name__}: {error}'
 
 def play(node):
-    callers.append(node)
-    response = node.call('echo', {'float32_value': 0.1, 'string_value': 'x'})
+    callers[:] = [node, threading.get_ident()]
+    response = node.call('echo', {'float32_value': 0.1, 'string_value': 'x'}, LIMIT)
     tell(node, 'values', response.float32_value, response.string_value)
     keep_apart(node)
-    tell(node, 'relay', node.call('relay', {'string_value': 'y'}).string_value)
+    tell(node, 'relay', node.call('relay', {'string_value': 'y'}, LIMIT).string_value)
     tell(node, 'fails', failure(lambda: node.call('fail', timeout=0.4)))
     tell(node, 'is late', failure(lambda: node.call('hold', timeout=0.3)))
     goes_on.set()
-    tell(node, 'goes on', node.call('hold', {'int32_value': 1}).int32_value, held)
+    tell(node, 'goes on', node.call('hold', {'int32_value': 1}, LIMIT).int32_value, held)
     overflow(node)
     introspect(node)
     pursue(node)
@@ -89,12 +93,12 @@ def keep_apart(node):
     mine = Arrays.Request()
     for _ in range(2):
         mine.int32_values[0] = 5
-        response = node.call('keep', mine)
+        response = node.call('keep', mine, LIMIT)
         tell(node, 'mine', int(mine.int32_values[0]), mine.string_values[0], mine.basic_types_values[0].int32_value)
         response.int32_values[1] = 100
         kept[1].int32_values[2] = 200
         tell(node, 'apart', response.int32_values.tolist(), kept[1].int32_values.tolist())
-    node.call('keep', Arrays.Request())
+    node.call('keep', Arrays.Request(), LIMIT)
     tell(node, 'let go', kept[0].int32_values.tolist(), kept[0].string_values)
 
 def overflow(node):
@@ -121,7 +125,7 @@ def introspect(node):
     client = next(each for each in node.ros.clients if each.srv_name.endswith('echo'))
     for state in (ServiceIntrospectionState.METADATA, ServiceIntrospectionState.OFF):
         client.configure_introspection(node.ros.get_clock(), QoSProfile(depth=10), state)
-        tell(node, 'introspected', node.call('echo', {'string_value': 'z'}).string_value)
+        tell(node, 'introspected', node.call('echo', {'string_value': 'z'}, LIMIT).string_value)
 
 def may_begin(node, goal):
     return goal.order < 100
@@ -195,9 +199,9 @@ def render(local):
     """
 
 
-def play(compose, peer, local):
+def play(compose, peer, local, limit=5.0):
     """Return what the client saw, and which way its calls went."""
-    child = compose(render(local), CODE)
+    child = compose(render(local), CODE.replace('LIMIT = 5.0', f'LIMIT = {limit}'))
     child.wait_until_ready()
     # A client outside is served meanwhile.
     assert peer.call(Trigger, 'out').success
@@ -215,3 +219,8 @@ def test_calls_and_goals_are_the_same_handed_over_or_sent(compose, peer):
     assert handed == sent
     # The last but one is introspected.
     assert ways == ['handed'] * (len(ways) - 2) + ['sent', 'handed']
+
+    unlimited, ways = play(compose, peer, local='true', limit=None)
+    assert unlimited == sent
+    # The second is of a coroutine.
+    assert ways[:3] == ['here', 'handed', 'sent']

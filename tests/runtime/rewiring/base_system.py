@@ -66,14 +66,18 @@ class Kept:
         return 'k'
 
 
+def adjust(node, changes):
+    node.logger.debug(f"changed {sorted(changes)}")
+
+
 def hear(node, message, prefix=''):
     note(node, 'hear', prefix=prefix)
-    return f'{prefix}{message.data}'
+    return f'{prefix}{getattr(message, "data", "raw")}'
 
 
 async def hear_later(node, message):
     note(node, 'hear_later')
-    return message.data
+    return getattr(message, 'data', 'raw')
 
 
 def answer(node, request, text='yes'):

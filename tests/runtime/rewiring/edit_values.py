@@ -16,6 +16,8 @@ _ON_ERROR = ['log', 'restart', 'shutdown', 'ignore', None]
 _WARN_AFTER = [0.5, 2.0, NULL, 0, None]
 _EXTERNAL = [True, '{{ 1 < 2 }}', 'yes', None]
 _TYPES = ['std_msgs/msg/String', 'std_msgs/msg/Header', 'nowhere/msg/Wrong', 'String']
+_INTROSPECTION = ['metadata', 'contents', 'off', 'all', None]
+_OVERRIDES = [True, ['depth', 'deadline'], ['dept'], None]
 _TOPIC = ['out', 'far', '/away', '~/own', 'bad name', None]
 _QOS = [None, 5, 'near', 'sensor_data', 'nearest', {'depth': 7}, {'dept': 1}]
 _TRIGGERS = ['std_srvs/srv/Trigger', 'std_srvs/srv/Empty', 'std_srvs/srv/Trager']
@@ -124,6 +126,7 @@ VALUES = {
     'node.publishers': [{'out': 'std_msgs/msg/String'}, {'out': 'String'}, {}, None],
     'publisher.foreach': _FOREACH,
     'publisher.when': _WHEN,
+    'publisher.qos_overrides': _OVERRIDES,
     'publisher.type': _TYPES,
     'publisher.topic': _TOPIC,
     'publisher.qos': _QOS,
@@ -137,6 +140,8 @@ VALUES = {
     ],
     'subscription.foreach': _FOREACH,
     'subscription.when': _WHEN,
+    'subscription.qos_overrides': _OVERRIDES,
+    'subscription.raw': [True, False, 'bytes', None],
     'subscription.type': _TYPES,
     'subscription.topic': _TOPIC,
     'subscription.qos': _QOS,
@@ -174,6 +179,7 @@ VALUES = {
     ],
     'service.foreach': _FOREACH,
     'service.when': _WHEN,
+    'service.introspection': _INTROSPECTION,
     'service.type': _TRIGGERS,
     'service.service': ['/ask', '/tell', '~/ask', 'a b', None],
     'service.qos': [{'depth': 7}, {'depth': 0}, None],
@@ -186,6 +192,7 @@ VALUES = {
     'node.service_clients': [{'ask': 'std_srvs/srv/Trigger'}, {'ask': 1}, {}, None],
     'service_client.foreach': _FOREACH,
     'service_client.when': _WHEN,
+    'service_client.introspection': _INTROSPECTION,
     'service_client.type': _TRIGGERS,
     'service_client.service': ['/ask', '/tell', None],
     'service_client.qos': [{'depth': 7}, {'depth': 0}, None],
@@ -225,6 +232,10 @@ VALUES = {
     'node.lifecycle': [True, {'start': 'active'}, {'start': 'inactive'}, {'strt': 1}, 'yes', None],
     'lifecycle.start': ['active', 'inactive', 'unconfigured', 'finalized', None],
     'node.bond': [False, 'yes', None],
+    'node.before_parameters_set': ['parts:adjust', 'parts:adjst', None],
+    'node.after_parameters_set': ['parts:adjust', 'parts:adjst', None],
+    'node.allow_undeclared_parameters': _BOOL,
+    'node.automatically_declare_parameters_from_overrides': _BOOL,
     'node.on_parameters': [
         *('parts:decide', 'parts:decide_later', 'parts:decde'),
         {'behaviour': 'parts:decide', 'with': {'most': 30.0}},
@@ -262,4 +273,22 @@ VALUES = {
     'process.delay': _DELAY,
 }
 # Keys that no edit gives a value, and why.
-LEFT_OUT: dict[str, str] = {}
+_OF_CONTAINERS = (
+    *('foreach', 'when', 'description', 'external', 'package', 'executable', 'command'),
+    *('arguments', 'name', 'namespace', 'parameters', 'parameter_files', 'remap', 'log_level'),
+    *('env', 'cwd', 'restart', 'on_exit', 'stop', 'wait_for', 'delay', 'components'),
+)
+_OF_COMPONENTS = (
+    *('foreach', 'when', 'description', 'package', 'plugin', 'namespace', 'parameters'),
+    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for'),
+)
+_APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
+LEFT_OUT: dict[str, str] = {
+    **dict.fromkeys(
+        ('subscription.content_filter', 'content_filter.expression', 'content_filter.parameters'),
+        'only newer versions of rclpy have it',
+    ),
+    'system.containers': _APART,
+    **{f'container.{key}': _APART for key in _OF_CONTAINERS},
+    **{f'component.{key}': _APART for key in _OF_COMPONENTS},
+}

@@ -198,10 +198,13 @@ class LibraryCalls(Part):
         if owner is None or name is None or value is None:
             return NONE
         del place
-        for each in alternatives(name.value):
+        names = alternatives(name.value)
+        # Which value belongs to which name is not known.
+        stored = value.value if len(names) == 1 else UNKNOWN
+        for each in names:
             if isinstance(each, Constant) and isinstance(each.value, str):
                 where = name_place(name, each)
-                self._evaluator.attributes.store(owner.value, each.value, value.value, where)
+                self._evaluator.attributes.store(owner.value, each.value, stored, where)
             elif owner.value == PartOfNode('state'):
                 self._evaluator.run.reading.is_state_open = True
         return NONE
@@ -218,7 +221,11 @@ class LibraryCalls(Part):
             contained = self._evaluator.attributes.contained(ast.In(), name.value, owner.value)
             self._evaluator.attributes.note_containment(name.value, owner.value, name.place)
             return contained or UNKNOWN
+        if isinstance(owner.value, Scalar | Constant) and isinstance(name.value.value, str):
+            return constant(hasattr(owner.value.kind, name.value.value))
         if isinstance(owner.value, Message):
+            if name.value.value == 'get_fields_and_field_types':
+                return constant(value=True)
             description = self._evaluator.run.types.describe(owner.value.type)
             if description is not None and not str(name.value.value).startswith('_'):
                 has = description.field(str(name.value.value)) is not None
