@@ -26,7 +26,9 @@ class _Loader(yaml.SafeLoader):
     """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
 
 
-_Loader.add_constructor('tag:yaml.org,2002:python/tuple', _Loader.construct_yaml_seq)
+_Loader.add_constructor(
+    'tag:yaml.org,2002:python/tuple', lambda loader, node: loader.construct_sequence(node)
+)
 
 
 @dataclass
