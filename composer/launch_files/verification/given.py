@@ -26,9 +26,11 @@ class _Loader(yaml.SafeLoader):
     """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
 
 
-_Loader.add_constructor(
-    'tag:yaml.org,2002:python/tuple', lambda loader, node: loader.construct_sequence(node)
-)
+def _read_tuple(loader: _Loader, node: Any) -> list[Any]:
+    return loader.construct_sequence(node, deep=True)
+
+
+_Loader.add_constructor('tag:yaml.org,2002:python/tuple', _read_tuple)
 
 
 @dataclass
