@@ -193,7 +193,7 @@ def _referred(each):
 _NOT_FOLLOWED = ('_node', '_live_node', '_goal_handles', '_result_futures', '_queue')
 _HOLDERS = {
     *('Publisher', 'Subscription', 'Timer', 'Service', 'ServiceClient', 'ActionServer'),
-    *('ActionClient', '_Ticker', '_Execution', '_Behaviours', 'BehaviourCall'),
+    *('ActionClient', '_Ticker', '_Execution', 'EventBehaviours', 'BehaviourCall'),
 }
 
 
