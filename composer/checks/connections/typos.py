@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import (
+        ComponentSpec,
         ConditionSpec,
         NodeSpec,
         ProcessSpec,
@@ -161,7 +162,7 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     return present
 
 
-def _full_name(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
+def _full_name(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
     kind = condition.kind
     if kind == 'node' or kind == 'process':  # noqa: PLR1714 - the type checker follows this
         return expand_name(condition.name, waiter.name, waiter.namespace or '/')
