@@ -50,8 +50,9 @@ class Bond:
     def end(self):
         self._say(is_active=False)
         self._has_died = True
-        # rclpy's executors may raise where another thread destroys what they wait for.
         self._timer.cancel()
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_subscription(self._subscription)
 
     def _beat(self):
         if not self._has_died:
