@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # Folders of a prefix with a file for each package, and for each package with interfaces.
 PACKAGE_INDEX = 'share/ament_index/resource_index/packages'
 INTERFACE_INDEX = 'share/ament_index/resource_index/rosidl_interfaces'
+COMPONENT_INDEX = 'share/ament_index/resource_index/rclcpp_components'
 # Packages whose names are close to those of others, and are meant nevertheless.
 _ALIKE = frozenset(
     ('can_msgs', 'gps_msgs', 'map_msgs', 'mav_msgs', 'nav2_msgs', 'pcl_msgs', 'tf_msgs')
@@ -114,6 +115,20 @@ def list_executables(package: str) -> list[Path]:
     if folder is None or not folder.is_dir():
         return []
     return sorted(path for path in folder.iterdir() if path.is_file() and os.access(path, os.X_OK))
+
+
+def list_components(package: str) -> list[str]:
+    """Return the classes that a package has for containers, as in `image_proc::RectifyNode`.
+
+    Source: `get_component_resources` in rclcpp_components (`src/component_manager.cpp`).
+    """
+    prefix = find_package(package, ament_prefixes(), COMPONENT_INDEX)
+    if prefix is None:
+        return []
+    with suppress(OSError):
+        text = (prefix / COMPONENT_INDEX / package).read_text(encoding='utf-8')
+        return [line.partition(';')[0] for line in text.splitlines() if line]
+    return []
 
 
 @cache

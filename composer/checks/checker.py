@@ -20,6 +20,7 @@ from composer.checks.connections.deadlocks import check_deadlocks
 from composer.checks.connections.lifecycles import check_awaited_states, check_lifecycles
 from composer.checks.connections.loops import check_loops
 from composer.checks.connections.qos import check_deadlines, check_qos_pairs
+from composer.checks.connections.remap_rules import check_remap_rules
 from composer.checks.connections.typos import check_typos
 from composer.checks.connections.unconnected import check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
@@ -98,6 +99,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_loops,
     check_deadlocks,
     check_blocked_groups,
+    check_remap_rules,
     check_typos,
 )
 # One more than is shown, as a sign that there are more.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import ProcessSpec
+    from composer.language.specs import ComponentSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-name'
@@ -110,8 +110,10 @@ def _find_outer_namespace(context: CheckContext, path: DataPath) -> Iterator[Rel
 
 def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that no two nodes have the same full name."""
-    first: dict[str, NodeSpec] = {}
-    for node in context.spec.nodes.values():
+    first: dict[str, NodeSpec | ComponentSpec] = {}
+    spec = context.spec
+    nodes: list[NodeSpec | ComponentSpec] = [*spec.nodes.values(), *spec.components]
+    for node in nodes:
         other = first.setdefault(node.full_name, node)
         if other is not node and not _are_misplaced(context, node, other):
             yield context.at_key(
@@ -123,7 +125,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
             )
 
 
-def _are_misplaced(context: CheckContext, *nodes: NodeSpec) -> bool:
+def _are_misplaced(context: CheckContext, *nodes: NodeSpec | ComponentSpec) -> bool:
     """Return whether the namespace of a node is unknown because of an error."""
     owners = (('defaults',), *(node.path for node in nodes))
     return any(context.was_dropped((*owner, 'namespace')) for owner in owners)
@@ -189,7 +191,9 @@ def _find_full_name_problem(
     return problem and f"in full it is '{longest}', and {problem}"
 
 
-def check_rules(context: CheckContext, node: NodeSpec | ProcessSpec) -> Iterator[Diagnostic]:
+def check_rules(
+    context: CheckContext, node: NodeSpec | ProcessSpec | ComponentSpec
+) -> Iterator[Diagnostic]:
     """Check the remapping rules of a node, or of the nodes in a process."""
     for source, target in node.remap:
         path = (*node.path, 'remap', source)

@@ -17,7 +17,7 @@ from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
 from composer.language.parameter_files import read_given_file, values_given
 from composer.language.paths import PathError, explain_absent, resolve_path
-from composer.language.specs import NodeSpec, ProcessSpec
+from composer.language.specs import ComponentSpec, NodeSpec, ProcessSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
@@ -102,7 +102,7 @@ class _Library:
         self._context = context
         self._values_left = MAX_VALUES
 
-    def read(self, owner: NodeSpec | ProcessSpec) -> Iterator[ParameterFileSpec]:
+    def read(self, owner: NodeSpec | ProcessSpec | ComponentSpec) -> Iterator[ParameterFileSpec]:
         """Read the files of a node or process, and yield those that exist."""
         for index, file in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
@@ -164,7 +164,11 @@ class _Library:
 
 
 def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Iterator[_User]:
-    owners: list[NodeSpec | ProcessSpec] = [*system.nodes.values(), *system.processes.values()]
+    owners: list[NodeSpec | ProcessSpec | ComponentSpec] = [
+        *system.nodes.values(),
+        *system.processes.values(),
+        *system.components,
+    ]
     for owner in owners:
         files = tuple(library.read(owner))
         if not files:
@@ -177,11 +181,14 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
 
 
 def _nodes_of(
-    owner: NodeSpec | ProcessSpec,
+    owner: NodeSpec | ProcessSpec | ComponentSpec,
 ) -> dict[str | None, NodeSpec | DeclaredNodeSpec | None]:
     """Return the nodes of an owner by full names, with what they declare if that is known."""
     if isinstance(owner, NodeSpec):
         return {owner.full_name: owner}
+    if isinstance(owner, ComponentSpec) or owner.components:
+        # A container gives its own files to none of its components.
+        return {owner.full_name: None}
     nodes: dict[str | None, NodeSpec | DeclaredNodeSpec | None] = {}
     if owner.node_name is not None and owner.namespace is not None:
         nodes[join_names(owner.namespace, owner.node_name)] = None

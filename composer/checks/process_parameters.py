@@ -34,6 +34,9 @@ _NO_NULL = 'there is no value, and ROS has no null'
 
 def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that ROS takes the names and values."""
+    for component in context.spec.components:
+        path = (*component.path, 'parameters')
+        yield from _check_mapping(context, component.parameters, path, '', {})
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
         seen: dict[str, DataPath] = {}

@@ -7,7 +7,12 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.ament import explain_missing_package, list_executables, list_packages
+from composer.ament import (
+    explain_missing_package,
+    list_components,
+    list_executables,
+    list_packages,
+)
 from composer.checks.names import IS_EMPTY, check_rules
 from composer.input_limits import explain_missing
 from composer.language.paths import PathError, explain_absent, is_in_package, resolve_path
@@ -47,6 +52,7 @@ def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
     """
     for process in context.spec.processes.values():
         yield from _check_executable(context, process)
+        yield from _check_components(context, process)
         yield from _check_folder(context, process)
         yield from _check_program(context, process)
         yield from _check_script(context, process)
@@ -67,6 +73,36 @@ def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterato
         message = f"'{process.namespace}': {problem}"
         yield context.at_value((*path, 'namespace'), 'bad-name', message)
     yield from check_rules(context, process)
+    for component in process.components.values():
+        if problem := find_namespace_problem(component.namespace):
+            message = f"'{component.namespace}': {problem}"
+            yield context.at_value((*component.path, 'namespace'), 'bad-name', message)
+        yield from check_rules(context, component)
+
+
+def _check_components(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:
+    """Check that the packages of components are installed, and have their plugins.
+
+    Of a container that is no executable of a package, nobody knows what it can load.
+    """
+    packages = list_packages() if process.package in list_packages() else []
+    for component in process.components.values() if packages else ():
+        if component.package not in packages:
+            yield context.at_value(
+                (*component.path, 'package'),
+                'missing-package',
+                f"no package '{component.package}' is installed",
+                help=explain_missing_package(component.package, packages),
+            )
+            continue
+        plugins = list_components(component.package)
+        if component.plugin not in plugins:
+            yield context.at_value(
+                (*component.path, 'plugin'),
+                'unknown-executable',
+                f"'{component.package}' has no component '{component.plugin}'",
+                help=suggest(component.plugin, plugins, 'it has', 'it has none'),
+            )
 
 
 def _check_executable(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:

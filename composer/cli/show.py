@@ -19,6 +19,7 @@ from composer.errors import ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.parameter_files import names_used, read_given_file
+from composer.language.parsing.container_parser import unfold_containers
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import replace_start_values
 from composer.ros_parameters.file_writer import render_parameter_file
@@ -105,13 +106,15 @@ def final_data(system: LoadedSystem) -> dict[str, Any]:
         and not key.startswith('x-')
         and (value != {} or key == 'nodes')
     }
-    return _with_absolute_paths(data)
+    return unfold_containers(_with_absolute_paths(data))
 
 
 def describe_origin(system: LoadedSystem, path: DataPath) -> str:
     """Return where a value was written, and where the values in its expressions come from."""
     if not path:
         return ''
+    if path[0] == 'containers':
+        path = ('processes', *path[1:])
     place = system.positions.value(path).place
     note = system.notes.get(path)
     return f'{place}, {note}' if note else place
@@ -171,6 +174,9 @@ def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
         changed['cwd'] = _absolute(entry['cwd'])
     if 'parameter_files' in entry:
         changed['parameter_files'] = [*map(_given_absolute, entry['parameter_files'])]
+    if 'components' in entry:
+        components = entry['components'].items()
+        changed['components'] = {name: _entry_with_absolute(each) for name, each in components}
     if 'env' in entry:
         changed['env'] = _without_values(entry['env'])
     return entry | changed

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-# The sections whose entries may be repeated; so may the entities of nodes.
-SECTIONS = ('nodes', 'include', 'processes')
+# The sections whose entries may be repeated; so may the entities of nodes, and components.
+SECTIONS = ('nodes', 'include', 'processes', 'containers')
 
 # The words that an expression does not read as names.
 _RESERVED = frozenset(

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _FOREACH = 'foreach'
 _WHEN = 'when'
+# The sections whose entries have entries of their own.
+_WITH_ENTRIES = (('nodes',), ('containers',))
 # The value of a variable without a list of values.
 _SAMPLE = 1
 
@@ -172,7 +174,7 @@ class _Expansion:
         self, evaluator: TemplateEvaluator, body: Any, path: DataPath, written: str
     ) -> Any:
         """Return an entry with its expressions evaluated, and its entities repeated."""
-        repeated = _sections_with_conditions(body) if self._at == ('nodes',) else ()
+        repeated = _sections_with_conditions(body) if self._at in _WITH_ENTRIES else ()
         if not repeated:
             return evaluator.evaluate(body, path)
         rest = {key: value for key, value in body.items() if key not in repeated}
@@ -299,11 +301,15 @@ def _help_for_duplicate(written: str, variables: Collection[str]) -> str:
 
 
 def _sections_with_conditions(node: Any) -> tuple[str, ...]:
-    """Return the sections of a node with entities that are repeated, or may be left out."""
+    """Return the sections of an entry with entries that are repeated, or may be left out.
+
+    Components may name parameter files, too.
+    """
     return tuple(
         key
         for key, section in (node.items() if isinstance(node, dict) else ())
-        if key in KIND_OF_SECTION and has_conditions(section)
+        if (key in KIND_OF_SECTION and has_conditions(section))
+        or (key == 'components' and isinstance(section, dict))
     )
 
 

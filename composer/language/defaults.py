@@ -59,8 +59,15 @@ class _DefaultsWriter:
     def in_process(self, name: str, process: dict[str, Any]) -> dict[str, Any]:
         if not takes_ros_arguments(process):
             return with_waits(process, {}, self._defaults.get('namespace', ''))
-        at = ('processes', name)
+        return self._in_program(('processes', name), process)
+
+    def _in_program(self, at: DataPath, process: dict[str, Any]) -> dict[str, Any]:
         full = with_defaults(process, self._defaults)
+        if 'components' in full:
+            full['components'] = {
+                key: self._in_program((*at, 'components', key), component)
+                for key, component in full['components'].items()
+            }
         if 'log_level' in full and 'log_level' not in process:
             self._graft((*at, 'log_level'), 'log_level')
         if (

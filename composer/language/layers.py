@@ -200,11 +200,13 @@ _NOUNS = {
     'nodes': 'node',
     'include': 'include',
     'processes': 'process',
+    'containers': 'container',
 }
 _SECTIONS = {
     (2, 'nodes'): ('nodes',),
     (2, 'include'): ('include',),
     (2, 'processes'): ('processes',),
+    (2, 'containers'): ('containers',),
     (4, 'nodes'): tuple(_NOUNS),
 }
 _NODE = 2

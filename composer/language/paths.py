@@ -97,6 +97,11 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
             name: node and _with_paths(node, (*path, 'nodes', name), positions)
             for name, node in entry['nodes'].items()
         }
+    if 'components' in entry:
+        changed['components'] = {
+            name: _with_paths(each, (*path, 'components', name), positions)
+            for name, each in entry['components'].items()
+        }
     if 'parameter_files' in entry:
         at = (*path, 'parameter_files')
         changed['parameter_files'] = [

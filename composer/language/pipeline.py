@@ -21,6 +21,7 @@ from composer.language.includes.includer import Includer
 from composer.language.layers import merge_documents
 from composer.language.loaded_system import LoadedSystem
 from composer.language.nodl.named_documents import read_nodl_documents
+from composer.language.parsing.container_parser import fold_containers
 from composer.language.parsing.system_parser import parse_specs
 from composer.language.paths import resolve_paths
 from composer.language.set_option import apply_set_values
@@ -152,6 +153,7 @@ def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
     if system.data is None:
         return
     check_structure(system)
+    fold_containers(system)
     resolve_paths(system)
     read_nodl_documents(system)
     apply_defaults(system)

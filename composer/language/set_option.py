@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 # Sections whose keys are names that the file gives; all other keys are those of the schema.
-_NAMED = frozenset(('args', 'include', 'interfaces', 'nodes', 'processes', 'qos', 'vars'))
+_NAMED = frozenset(
+    ('args', 'containers', 'include', 'interfaces', 'nodes', 'processes', 'qos', 'vars')
+)
 
 
 @record

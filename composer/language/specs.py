@@ -384,6 +384,44 @@ class DeclaredNodeSpec:
 
 
 @record
+class ComponentSpec:
+    """A node that a container loads.
+
+    Attributes:
+        namespace: In full, as in `/robot`.
+        package: The ROS package of the plugin.
+        plugin: The class, as in `image_proc::RectifyNode`.
+        remap: Rules, from and to; the first that matches wins.
+        intra_process: Whether messages within the container are handed over.
+        container: The name of the container.
+    """
+
+    name: str
+    namespace: str
+    description: str
+    package: str
+    plugin: str
+    parameters: Mapping[str, Any]
+    parameter_files: tuple[ParameterFileSpec, ...]
+    remap: tuple[tuple[str, str], ...]
+    log_level: LogLevel | None
+    intra_process: bool
+    wait_for: tuple[ConditionSpec, ...]
+    container: str
+    path: DataPath
+
+    @property
+    def key(self) -> str:
+        """Its key in the file: its name, or its full name."""
+        return str(self.path[-1])
+
+    @property
+    def full_name(self) -> str:
+        """Its name in its namespace, as in `/robot/rectify`."""
+        return join_names(self.namespace, self.name)
+
+
+@record
 class ProcessSpec:
     """A program that runs beside the nodes.
 
@@ -404,6 +442,8 @@ class ProcessSpec:
         stop_timeout_sec: After this it is killed; `None` for the system's own.
         delay_sec: Time between the moment when its conditions hold and its start.
         on_demand: Whether it only starts when the `on_exit` of another one starts it.
+        components: What is loaded into it, if it is a container.
+        external: Whether it is a container that runs already, and is never started.
     """
 
     name: str
@@ -433,7 +473,14 @@ class ProcessSpec:
     nodes: tuple[DeclaredNodeSpec, ...]
     declares_all_ends: bool
     lifecycle: DrivenState | None
+    components: Mapping[str, ComponentSpec]
+    external: bool
     path: DataPath
+
+    @property
+    def full_name(self) -> str:
+        """The full name of its node, if it is a container."""
+        return join_names(self.namespace or '/', self.node_name or self.name)
 
     @property
     def named_nodes(self) -> tuple[str, ...]:
@@ -601,6 +648,12 @@ class SystemSpec:
         yield from self.nodes.values()
         for process in self.processes.values():
             yield from process.nodes
+
+    @property
+    def components(self) -> Iterator[ComponentSpec]:
+        """All components of its containers."""
+        for process in self.processes.values():
+            yield from process.components.values()
 
     @property
     def without_parameter_services(self) -> frozenset[str]:

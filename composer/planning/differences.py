@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.bindings import exit_bindings, node_bindings
-from composer.language.specs import NodeSpec, ParameterSpec, ProcessSpec
+from composer.language.specs import ComponentSpec, NodeSpec, ParameterSpec, ProcessSpec
 from composer.names import expand_name, remap_name
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
-    *('path', 'name', 'namespace', 'external', 'parameter_files', 'state'),
+    *('path', 'name', 'namespace', 'external', 'parameter_files', 'state', 'components'),
     *('nodes', 'declares_all_ends'),
     *(kind.section for kind in ENTITY_KINDS),
 }
 # These are part of a node, and what a process is started with.
-_ARGUMENTS = {'namespace', 'parameters', 'parameter_files'}
+_ARGUMENTS = {'namespace', 'parameters', 'parameter_files', 'external'}
 _CHANNELS = [kind.channel for kind in ENTITY_KINDS if kind.channel]
 
 
@@ -111,7 +111,18 @@ _PROCESSES = _Rules(
         ),
         'a process takes this when it starts',
     )
-    | {'on_demand': 'it starts at another time'},
+    | {'on_demand': 'it starts at another time', 'external': 'it runs elsewhere, or here'},
+)
+_COMPONENTS = _Rules(
+    'component',
+    'its state',
+    dict.fromkeys(
+        (
+            *('namespace', 'package', 'plugin', 'parameters', 'parameter_files', 'remap'),
+            *('log_level', 'intra_process'),
+        ),
+        'a component takes this when it is loaded',
+    ),
 )
 _SYSTEM = _Rules(
     'system',
@@ -159,13 +170,43 @@ class _Comparison:
             process = (old.processes.get(name), new.processes.get(name))
             further = [*self._changed_code(*process)]
             # One whose data are the same was not read again.
-            if process[0] is process[1] and not further:
-                continue
-            yield from self._compare(_PROCESSES, ('', 'processes', name), *process, further)
+            if process[0] is not process[1] or further:
+                own = [*self._compare(_PROCESSES, ('', 'processes', name), *process, further)]
+                yield from own
+                if any(each.action is not Action.CHANGE for each in own):
+                    continue
+            yield from self._compare_components(*process)
         before = {node.full_name: node for node in old.nodes.values()}
         after = {node.full_name: node for node in new.nodes.values()}
         for full_name in dict.fromkeys([*before, *after]):
             yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
+
+    def _compare_components(
+        self, old: ProcessSpec | None, new: ProcessSpec | None
+    ) -> Iterator[Operation]:
+        """Yield what is done to the components of a container that stays."""
+        if old is None or new is None:
+            return
+        for key in dict.fromkeys([*old.components, *new.components]):
+            before, after = old.components.get(key), new.components.get(key)
+            further: list[Change] = []
+            if before is not None and after is not None:
+                further += self._changed_values(before, after)
+                if before is after and not further:
+                    continue
+            target = (new.name, 'components', key)
+            yield from self._compare(_COMPONENTS, target, before, after, further)
+
+    def _changed_values(self, old: ComponentSpec, new: ComponentSpec) -> Iterator[Change]:
+        """Yield the parameters of a component that have another value in parameter files."""
+        before = self._old.overrides.get(old.full_name, {})
+        after = self._new.overrides.get(new.full_name, {})
+        for name in dict.fromkeys([*before, *after]):
+            first, last = before.get(name), after.get(name)
+            old_value, old_span = (first.value, first.value_span) if first else (None, None)
+            new_value, new_span = (last.value, last.value_span) if last else (None, None)
+            if repr(old_value) != repr(new_value):
+                yield Change(f'parameters.{name}', old_value, new_value, old_span, new_span)
 
     def _changed_code(self, old: ProcessSpec | None, new: ProcessSpec | None) -> Iterator[Change]:
         """Yield the behaviours of a process whose source differs."""
@@ -367,7 +408,7 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     """Return the fields of a class of records that are compared."""
     # ROS knows the description of a parameter; nobody asks for the others.
     skipped = _NOT_COMPARED if kind is ParameterSpec else {*_NOT_COMPARED, 'description'}
-    if kind is ProcessSpec:
+    if kind in (ProcessSpec, ComponentSpec):
         skipped -= _ARGUMENTS
     if kind is NodeSpec:
         # Its entities say it, too.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.language.specs import NodeSpec, ParameterFileSpec, SystemSpec
+    from composer.language.specs import ComponentSpec, NodeSpec, ParameterFileSpec, SystemSpec
     from composer.python_source.module_finder import ModuleFinder
     from composer.ros_parameters.file_reader import ParameterEntry
     from composer.ros_parameters.overrides import MergedFiles
@@ -83,7 +83,7 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         {name: sources.digest(name) for name in reachable},
         {name: sources.text(name) for name in reachable},
         definitions,
-        _read_overrides(nodes),
+        _read_overrides([*nodes, *spec.components]),
         tuple(map(str, prefixes)),
         frozenset(_find_generators(context)),
     )
@@ -165,7 +165,9 @@ def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
         yield from ('.'.join([*parts, alias.name]) for alias in node.names)
 
 
-def _read_overrides(nodes: Sequence[NodeSpec]) -> dict[str, Mapping[str, ParameterEntry]]:
+def _read_overrides(
+    nodes: Sequence[NodeSpec | ComponentSpec],
+) -> dict[str, Mapping[str, ParameterEntry]]:
     if not any(node.parameter_files for node in nodes):
         return {}
     # Most systems have no parameter files.

@@ -63,7 +63,7 @@ def _render_operation(operation: Operation, *, colour: bool) -> str:
 def _describe(operation: Operation) -> Iterator[str]:
     full_name, section, _ = operation.target
     # Several nodes in different namespaces may have one name.
-    node = full_name if full_name.count('/') > 1 else full_name[1:]
+    node = full_name if full_name.count('/') > 1 else full_name.removeprefix('/')
     subject = f"{operation.noun} '{node if section == 'nodes' else operation.name}'"
     if node and section != 'nodes':
         subject += f" of '{node}'"

@@ -66,7 +66,7 @@ class ExternalProcess:
     @property
     def is_over(self) -> bool:
         """Whether nothing is to come of it: it has ended for good, or is not asked for."""
-        is_unasked = self.spec.on_demand and self.run is None
+        is_unasked = (self.spec.on_demand or self.spec.external) and self.run is None
         return (self.is_done or is_unasked) and not self.is_acting
 
     @property

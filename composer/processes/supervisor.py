@@ -49,6 +49,7 @@ class ProcessSupervisor:
         by_name: The processes.
         on_run: Called with each run of a process that has begun.
         on_exit: Called with a process and its exit code when it has ended for good.
+        on_restart: Called with a process that was started again.
         timeout_sec: How long a process may take to end, unless the file says otherwise for it.
         is_alone: Whether the system has no nodes.
     """
@@ -71,6 +72,7 @@ class ProcessSupervisor:
         self.is_alone = False
         self.on_run: Callable[[ProcessRun], None] = lambda _run: None
         self.on_exit: Callable[[ExternalProcess, int], None] = lambda _process, _code: None
+        self.on_restart: Callable[[ExternalProcess], None] = lambda _process: None
         self._has_started = threading.Event()
         self._numbers = itertools.count()
         self._runs: dict[int, ProcessRun] = {}
@@ -85,7 +87,7 @@ class ProcessSupervisor:
         Raises:
             StartError: Its program does not exist, or cannot be run.
         """
-        if process.is_leaving:
+        if process.is_leaving or process.spec.external:
             return
         process.is_done = False
         try:
@@ -253,6 +255,8 @@ class ProcessSupervisor:
             self.start(process)
         except StartError as error:
             self.end_for_good(process, ExitCode.FAILED, str(error))
+            return
+        self.on_restart(process)
 
     def end_for_good(self, process: ExternalProcess, code: int, end: str) -> None:
         """Log how a process has ended, and do what is due then.

@@ -24,9 +24,10 @@ from composer.runtime.wait_for import WaitingStarter, list_waiters
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-    from composer.language.specs import BehaviourSpec, NodeSpec
+    from composer.language.specs import BehaviourSpec, ComponentSpec, NodeSpec
     from composer.processes.external_process import ExternalProcess
     from composer.processes.supervisor import ProcessSupervisor
+    from composer.runtime.external.components import Components
     from composer.runtime.nodes.live_entity import NodeLifecycle
     from composer.runtime.nodes.system_handle import SystemHandle
 
@@ -38,12 +39,20 @@ class Starter:
 
     Args:
         nodes: Takes each node that is created, by its full name.
+
+    Attributes:
+        components: Loads the components of containers.
     """
 
     def __init__(
-        self, nodes: dict[str, LiveNode], processes: ProcessSupervisor, system: SystemHandle
+        self,
+        nodes: dict[str, LiveNode],
+        processes: ProcessSupervisor,
+        components: Components,
+        system: SystemHandle,
     ) -> None:
         self._nodes = nodes
+        self.components = components
         self._processes = processes
         self._system = system
 
@@ -58,9 +67,15 @@ class Starter:
         return nodes
 
     def start(
-        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+        self,
+        nodes: Collection[LiveNode],
+        processes: Collection[ExternalProcess],
+        components: Iterable[tuple[ExternalProcess, ComponentSpec]] = (),
     ) -> list[LiveNode]:
         """Start processes and nodes; return the nodes that are still to be opened.
+
+        Args:
+            components: Those to load into containers that run.
 
         Raises:
             StartError: One could not start.
@@ -75,6 +90,8 @@ class Starter:
             self.run_on_start(node)
         own = [each for each in processes if not each.spec.on_demand]
         waiters = list_waiters(nodes, own, self._start_late, self._processes.start)
+        waiters += self.components.waiters(processes)
+        waiters += [self.components.waiter(*each) for each in components]
         if not waiters or stop.is_set:
             return prompt
         self.open(prompt)
@@ -92,11 +109,18 @@ class Starter:
             self._waiting_starter().start_all(waiters, self._system.stop)
         else:
             self._processes.start(process)
+        self.components.reload(process)
 
     def start_more(
-        self, nodes: Collection[LiveNode], processes: Collection[ExternalProcess]
+        self,
+        nodes: Collection[LiveNode],
+        processes: Collection[ExternalProcess],
+        components: Iterable[tuple[ExternalProcess, ComponentSpec]] = (),
     ) -> None:
         """Start nodes and processes beside those that run.
+
+        Args:
+            components: See `start`.
 
         Raises:
             StartError: One could not start.
@@ -104,7 +128,7 @@ class Starter:
         for node in nodes:
             self._system.executor.add_node(node.ros)
             node.serve_at_once()
-        self.open(self.start(nodes, processes))
+        self.open(self.start(nodes, processes, components))
         for node in nodes:
             node.ros.start_parameter_services()
 

@@ -15,6 +15,7 @@ from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
 from composer.runtime.entities.creators import create_entity
+from composer.runtime.external.components import Components
 from composer.runtime.external.exit_actions import ExitActions
 from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
+    from composer.processes.external_process import ExternalProcess
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.control.control_services import Commands
     from composer.runtime.health.deliveries import Deliveries
@@ -115,8 +117,10 @@ class System:
         )
         self._processes.is_alone = not spec.nodes
         self._stop_request.kill_processes = self._processes.kill_all
+        self._components = Components(self._handle)
+        self._processes.on_restart = self._components.reload
         self.state.find_lifecycles = self._find_lifecycles
-        self._starter = Starter(self._nodes, self._processes, self._handle)
+        self._starter = Starter(self._nodes, self._processes, self._components, self._handle)
         self._exits = ExitActions(self._processes, self._starter, self._handle)
         self._processes.on_exit = self._exits.act
         self._driver = LifecycleDriver(
@@ -196,7 +200,11 @@ class System:
             raise
         if self.stop_requested:
             return
-        parts = _describe_parts(self._nodes, self._processes.by_name)
+        parts = _describe_parts(
+            self._nodes,
+            self.list_components(),
+            [each for each in self._processes.by_name.values() if not each.spec.external],
+        )
         # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
         system_logger.info(
@@ -295,6 +303,10 @@ class System:
         """Return the full names of its nodes."""
         return list(self._nodes)
 
+    def list_components(self) -> list[str]:
+        """Return the full names of the components that are loaded into its containers."""
+        return self._components.list_names()
+
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
@@ -304,8 +316,15 @@ class System:
         return {node.full_name: node.lifecycle.state for node in nodes if node.lifecycle}
 
     def restart_node(self, full_name: str) -> Outcome:
-        """Build a node anew: its entities, parameters and state are as at the start again."""
-        failure = self._restarter.restart(full_name)
+        """Build a node anew: its entities, parameters and state are as at the start again.
+
+        A component is unloaded and loaded.
+        """
+        if full_name in self._nodes:
+            failure = self._restarter.restart(full_name)
+        else:
+            with self._restarter.lock:
+                failure = self._components.restart(full_name)
         return Outcome(not failure, failure or f"node '{full_name}' was restarted")
 
     def stop(self) -> tuple[int, bool]:
@@ -336,6 +355,7 @@ class System:
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), timeout_sec)
         ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
+        self._components.stop()
         # Processes end after the nodes: an `on_stop` may need them.
         none_killed = self._processes.stop()
         ended &= self._exits.report_hanging()
@@ -389,8 +409,15 @@ class System:
             self._control.release_name()
 
 
-def _describe_parts(nodes: Collection[str], processes: Collection[str]) -> str:
-    """Return `2 nodes and 1 process`; what there is none of is left out."""
-    counts = ((len(nodes), 'node', 'nodes'), (len(processes), 'process', 'processes'))
+def _describe_parts(
+    nodes: Collection[str], components: Collection[str], processes: Collection[ExternalProcess]
+) -> str:
+    """Return `2 nodes, 3 components and 1 process`; what there is none of is left out."""
+    counts = (
+        (len(nodes), 'node', 'nodes'),
+        (len(components), 'component', 'components'),
+        (len(processes), 'process', 'processes'),
+    )
     parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
-    return ' and '.join(parts) or '0 nodes'
+    *first, last = parts or ['0 nodes']
+    return f'{", ".join(first)} and {last}' if first else last

@@ -38,6 +38,7 @@ _OUTER_SECTIONS = {
     'nodes': 'node',
     'include': 'include',
     'processes': 'process',
+    'containers': 'container',
 }
 _DEPTH_OF_ENTRIES = 3
 _DEPTH_OF_ENTITIES = 5

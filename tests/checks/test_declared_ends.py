@@ -137,6 +137,25 @@ def test_what_a_program_publishes_need_not_be_heard_but_what_it_hears_is_missed(
     assert not check(CAMERA + BASE.replace('{cmd_vel', elsewhere))
 
 
+@pytest.mark.parametrize(
+    ('rule', 'meant'),
+    [
+        ('image: picture', None),
+        ('~/image: picture', "did you mean '/image'?"),
+        ('imgae: picture', "did you mean 'image'?"),
+        ('/tf: tf', None),
+        ('rosservice://set_camera_info: info', None),
+    ],
+)
+def test_a_rule_of_a_process_for_what_it_does_not_have_is_reported(rule, meant):
+    named = CAMERA.replace('  publishers:', f'  name: camera\n  remap: {{{rule}}}\n  publishers:')
+    found = [each for each in check(named + BASE) if each.rule == 'likely-misspelling']
+    assert [each.help for each in found] == ([meant] if meant else [])
+    nameless = named.replace('  name: camera\n', '')
+    found = [each for each in check(nameless + BASE) if each.rule == 'likely-misspelling']
+    assert len(found) == (meant is not None and '~' not in rule)
+
+
 PARAMETERS = """\
 robot:
   command: ['true']

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from composer.inference.reading import CreatedEntity
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import (
+        ComponentSpec,
         DeclaredNodeSpec,
         EndSpec,
         ProcessSpec,
@@ -277,7 +278,9 @@ def _is_no_name(*names: str) -> bool:
 
 
 def full_name(
-    node: NodeSpec | DeclaredNodeSpec | ProcessSpec, kind: ChannelKind, name: str
+    node: NodeSpec | DeclaredNodeSpec | ProcessSpec | ComponentSpec,
+    kind: ChannelKind,
+    name: str,
 ) -> str:
     """Return the full name of a topic, service or action of a node or process."""
     namespace = node.namespace or '/'

@@ -1,8 +1,7 @@
 """Typos in names that no declaration has to match.
 
-What is waited for may come from programs that no file declares, a remapping rule may be for what a
-behaviour makes with rclpy itself, and a callback group may have any name: only a name that is all
-but that of something in the system is likely to mean it.
+What is waited for may come from programs that no file declares, and a callback group may have any
+name: only a name that is all but that of something in the system is likely to mean it.
 """
 
 from __future__ import annotations
@@ -10,26 +9,23 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from composer.ament import remaps_actions
-from composer.checks.connections.topology import TOPICS_OF_ROS, full_name
+from composer.checks.connections.topology import full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.language.specs import REENTRANT
-from composer.names import expand_name, find_topic_name_problem, with_article
-from composer.spelling import count_edits, did_you_mean, find_nearest
+from composer.names import expand_name, with_article
+from composer.spelling import count_edits, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic, Span
+    from composer.diagnostics import Diagnostic
     from composer.language.specs import (
-        ActionClientSpec,
-        ActionSpec,
+        ComponentSpec,
         ConditionSpec,
         NodeSpec,
         ProcessSpec,
     )
-    from composer.yaml_text.positions import DataPath
 
 _RULE = 'likely-misspelling'
 _SEPARATORS = re.compile(r'[/_]')
@@ -46,7 +42,6 @@ _MOST_COMPARED = 2_000
 def check_typos(context: CheckContext) -> Iterator[Diagnostic]:
     """Check names that match nothing in the system for likely typos."""
     yield from _check_conditions(context)
-    yield from _check_rules(context)
     yield from _check_groups(context)
 
 
@@ -122,9 +117,9 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
         names = present[condition.kind]
         if name in names or len(names) > _MOST_COMPARED:
             continue
-        near = find_typo(name, names) or _at_the_top(condition.name, names)
+        near = find_typo(name, names) or at_the_top(condition.name, names)
         if near:
-            meant = _as_written(condition.name, near, waiter.namespace or '/')
+            meant = as_written(condition.name, near, waiter.namespace or '/')
             yield context.at_value(
                 condition.path,
                 _RULE,
@@ -133,7 +128,7 @@ def _check_conditions(context: CheckContext) -> Iterator[Diagnostic]:
             )
 
 
-def _at_the_top(name: str, names: set[str]) -> str | None:
+def at_the_top(name: str, names: set[str]) -> str | None:
     """Return the name without a namespace that one inside a namespace was meant to be."""
     return f'/{name}' if f'/{name}' in names else None
 
@@ -167,131 +162,18 @@ def _present(context: CheckContext) -> dict[str, set[str]]:
     return present
 
 
-def _full_name(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
+def _full_name(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
     kind = condition.kind
     if kind == 'node' or kind == 'process':  # noqa: PLR1714 - the type checker follows this
         return expand_name(condition.name, waiter.name, waiter.namespace or '/')
     return full_name(waiter, kind, condition.name)
 
 
-def _as_written(name: str, full: str, namespace: str) -> str:
+def as_written(name: str, full: str, namespace: str) -> str:
     """Return a full name in the form in which a name is written."""
     inside = namespace.rstrip('/') + '/'
     is_relative = name[:1] not in ('/', '~') and full.startswith(inside)
     return full.removeprefix(inside) if is_relative else full
-
-
-def _check_rules(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check remapping rules: one of an include applies to all that is in it."""
-    positions = context.system.positions
-    matching = _rules_of_processes(context)
-    # As `composer show` writes a rule of an include: into each of its nodes.
-    matching_rules: set[tuple[str, str]] = set()
-    found: dict[Span, tuple[tuple[str, str], Diagnostic]] = {}
-    for node in _all_nodes(context):
-        if not node.remap:
-            continue
-        names, actions = _names_of(node), _actions_of(node)
-        is_known = not _may_have_more(context, node)
-        for rule in node.remap:
-            source = rule[0]
-            path = (*node.path, 'remap', source)
-            span = positions.key(path)
-            bare = source.rpartition('://')[2]
-            if not _is_rule(source):
-                continue  # which is a finding of its own
-            name = expand_name(bare, node.name, node.namespace)
-            if name in names or (name in actions and remaps_actions() is not False):
-                matching.add(span)
-                matching_rules.add(rule)
-            elif name in actions:
-                found[span] = rule, _explain_action(context, path, actions[name], name)
-            elif find_typo(name, names) or (is_known and not _is_of_ros(context, name)):
-                help_text = did_you_mean(_find_meant(bare, name, names, node.namespace))
-                found[span] = rule, _explain_rule(context, path, node, name, help_text)
-            else:
-                matching.add(span)
-    for span, (rule, finding) in found.items():
-        if span not in matching and rule not in matching_rules:
-            yield finding
-
-
-def _find_meant(bare: str, name: str, names: set[str], namespace: str) -> str | None:
-    """Return the name that a rule may mean, as the rule would write it."""
-    if near := find_typo(name, names):
-        return _as_written(bare, near, namespace)
-    written = [_as_written(bare, each, namespace) for each in names]
-    return _at_the_top(bare, names) or find_nearest(bare, written)
-
-
-def _is_rule(source: str) -> bool:
-    """Return whether a rule is one of a topic or service, and says which."""
-    scheme, _, bare = source.rpartition('://')
-    is_scheme = scheme in ('', 'rostopic', 'rosservice')
-    return is_scheme and not (source.startswith('__') or find_topic_name_problem(bare))
-
-
-def _rules_of_processes(context: CheckContext) -> set[Span]:
-    """Return the places of the rules of processes: nobody knows what these have."""
-    return {
-        context.system.positions.key((*process.path, 'remap', source))
-        for process in context.spec.processes.values()
-        for source, _ in process.remap
-    }
-
-
-def _all_nodes(context: CheckContext) -> Iterator[NodeSpec]:
-    """Yield the nodes, also those that are left out this time."""
-    yield from context.spec.nodes.values()
-    if context.system.unused is not None:
-        yield from context.system.unused.nodes.values()
-
-
-def _may_have_more(context: CheckContext, node: NodeSpec) -> bool:
-    """Return whether a node may have topics and services that the file does not show."""
-    return node.path in context.incomplete or any(
-        each.reaches_ros or each.created for each in context.readings(node)
-    )
-
-
-def _is_of_ros(context: CheckContext, name: str) -> bool:
-    """Return whether a rule is for what nodes have from ROS, or often get just in case."""
-    is_usual = name.rpartition('/')[2] in ('tf', 'tf_static')
-    return is_usual or name in TOPICS_OF_ROS or name in context.topology.ros_services
-
-
-def _explain_rule(
-    context: CheckContext, path: DataPath, node: NodeSpec, name: str, help_text: str | None
-) -> Diagnostic:
-    message = f"node '{node.name}' has nothing called '{name}', and ROS ignores the rule"
-    return context.at_key(path, 'likely-misspelling', message, help=help_text)
-
-
-def _explain_action(
-    context: CheckContext, path: DataPath, entity: ActionSpec | ActionClientSpec, name: str
-) -> Diagnostic:
-    return context.at_key(
-        path,
-        'ignored-remap',
-        f"this ROS remaps no actions, such as '{name}', and ignores the rule",
-        help=f"give '{entity.name}' its name with 'action:' instead",
-    )
-
-
-def _names_of(node: NodeSpec) -> set[str]:
-    """Return the full names of the topics and services of a node."""
-    ends = ((kind, end) for kind, end in node.ends() if kind.channel != 'action')
-    names = (str(getattr(end, str(kind.channel))) for kind, end in ends)
-    return {expand_name(name, node.name, node.namespace) for name in names}
-
-
-def _actions_of(node: NodeSpec) -> dict[str, ActionSpec | ActionClientSpec]:
-    """Return the actions of a node by their full names."""
-    ends: list[ActionSpec | ActionClientSpec] = [
-        *node.actions.values(),
-        *node.action_clients.values(),
-    ]
-    return {expand_name(end.action, node.name, node.namespace): end for end in ends}
 
 
 def _check_groups(context: CheckContext) -> Iterator[Diagnostic]:

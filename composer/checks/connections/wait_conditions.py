@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import ChannelKind
     from composer.language.specs import (
+        ComponentSpec,
         ConditionSpec,
         DeclaredNodeSpec,
         NodeSpec,
@@ -50,6 +51,11 @@ def _check_process(context: CheckContext, name: str, path: DataPath) -> Iterator
     spec = context.spec
     lost = context.was_dropped(('processes',)) or context.was_dropped(('processes', name))
     if name in spec.processes or lost:
+        if name in spec.processes and spec.processes[name].external:
+            container = spec.processes[name].full_name
+            message = f"'{name}' runs elsewhere, and nothing is known of its process"
+            use = f'write {{node: {container}}} to wait for it'
+            yield context.at_value(path, 'unknown-process', message, help=use)
         return
     advice = suggest(name, spec.processes, 'there are')
     if name in spec.nodes:
@@ -75,13 +81,13 @@ def _check_end(context: CheckContext, condition: ConditionSpec) -> Iterator[Diag
         )
 
 
-def waiters(spec: SystemSpec) -> Iterable[NodeSpec | ProcessSpec]:
-    """Return all nodes and processes; each may wait for something."""
-    return (*spec.nodes.values(), *spec.processes.values())
+def waiters(spec: SystemSpec) -> Iterable[NodeSpec | ProcessSpec | ComponentSpec]:
+    """Return all nodes, processes and components; each may wait for something."""
+    return (*spec.nodes.values(), *spec.processes.values(), *spec.components)
 
 
 def _check_name(
-    context: CheckContext, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
+    context: CheckContext, waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec
 ) -> Iterator[Diagnostic]:
     """Check that the name of a condition is one that ROS allows."""
     kind, name = condition.kind, condition.name
@@ -103,19 +109,7 @@ def _check_name(
 
 def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
     """Yield one finding for each cycle of nodes and processes that wait for each other."""
-    providers = _Providers(context)
-    edges = {
-        waiter.path: [
-            (condition.path, path)
-            for condition in waiter.wait_for
-            for path in providers.of(waiter, condition)
-        ]
-        for waiter in waiters(context.spec)
-    }
-    for name, places in _find_starters(context.spec).items():
-        # Of several, any one will do.
-        if len(places) == 1 and (process := context.spec.processes.get(name)):
-            edges[process.path].append(places[0])
+    edges = _find_waits(context)
     done: set[tuple[str | int, ...]] = set()
     for start, first in edges.items():
         trail: list[tuple[str | int, ...]] = []
@@ -147,6 +141,26 @@ def _find_cycles(context: CheckContext) -> Iterator[Diagnostic]:
                 yield context.at_value(place, 'wait-cycle', message, related=related, help=advice)
             elif target not in done:
                 pending.append((target, iter(edges.get(target, ()))))
+
+
+def _find_waits(context: CheckContext) -> dict[DataPath, list[tuple[DataPath, DataPath]]]:
+    """Return what starts after what: for each waiter, where that is said, and for whom."""
+    providers = _Providers(context)
+    edges = {
+        waiter.path: [
+            (condition.path, path)
+            for condition in waiter.wait_for
+            for path in providers.of(waiter, condition)
+        ]
+        for waiter in waiters(context.spec)
+    }
+    for name, places in _find_starters(context.spec).items():
+        # Of several, any one will do.
+        if len(places) == 1 and (process := context.spec.processes.get(name)):
+            edges[process.path].append(places[0])
+    for component in context.spec.components:
+        edges[component.path].append((component.path, component.path[:2]))
+    return edges
 
 
 def _find_starters(spec: SystemSpec) -> dict[str, list[tuple[DataPath, DataPath]]]:
@@ -209,13 +223,15 @@ class _Providers:
         for process in context.spec.processes.values():
             for declared in process.nodes:
                 if declared.is_named:
-                    self._nodes.setdefault(declared.full_name, process.path)
+                    is_component = declared.path[-2:-1] == ('components',)
+                    path = declared.path if is_component else process.path
+                    self._nodes.setdefault(declared.full_name, path)
                 for kind, end in declared.ends():
                     if kind.provides and kind.channel:
                         self._add(declared, kind.channel, end.channel, process.path)
 
     def of(
-        self, waiter: NodeSpec | ProcessSpec, condition: ConditionSpec
+        self, waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec
     ) -> list[tuple[str | int, ...]]:
         """Return the path of the only provider of a condition; nothing if there are several."""
         kind = condition.kind

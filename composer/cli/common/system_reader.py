@@ -114,6 +114,7 @@ def list_files(context: CheckContext) -> set[Path]:
     named = [
         *(each.parameter_files for each in spec.nodes.values()),
         *(each.parameter_files for each in spec.processes.values()),
+        *(each.parameter_files for each in spec.components),
     ]
     for text in (file.file for files in named for file in files):
         # A package that is not installed is for the checks to say.

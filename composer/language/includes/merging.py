@@ -156,8 +156,14 @@ class IncludeMerger:
             note_namespace(
                 self._whole, (*path, 'namespace'), (*inclusion.entry.at, 'namespace'), inner
             )
-        if namespace and not str(path[-1]).startswith('/'):
+        is_in_key = path[0] == 'nodes' and str(path[-1]).startswith('/')
+        if namespace and not is_in_key:
             plain = {'namespace': namespace} | plain
+        if 'components' in plain:
+            plain['components'] = {
+                key: self._with_outer(inclusion, (*path, 'components', key), each)
+                for key, each in plain['components'].items()
+            }
         if inclusion.entry.remap:
             # The first rule that fits wins: those from outside do, as in ROS launch.
             plain['remap'] = {

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import NODE_BEHAVIOURS
 from composer.language.parameter_files import parse_parameter_files
+from composer.language.parsing.condition_parser import parse_conditions
 from composer.language.parsing.entity_parser import parse_entities, parse_run_options
 from composer.language.parsing.entry_parser import Data, parse_behaviour
-from composer.language.parsing.process_parser import parse_conditions
 from composer.language.specs import BehaviourSpec, LifecycleStart, NodeSpec
 from composer.names import expand_namespace
 

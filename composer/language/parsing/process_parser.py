@@ -1,4 +1,4 @@
-"""Processes and `wait_for` as data that satisfy the schema → specs."""
+"""Processes as data that satisfy the schema → specs."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.language.parameter_files import parse_parameter_files
+from composer.language.parsing.condition_parser import kind_of, parse_conditions
+from composer.language.parsing.container_parser import declare_component, parse_components
 from composer.language.parsing.declared_ends import given_values, parse_declared_nodes
 from composer.language.parsing.entry_parser import behaviour_at, parse_behaviour
 from composer.language.specs import (
     DEFAULT_LAUNCH_STOP_SEC,
     DEFAULT_RESTART_DELAY_SEC,
-    DEFAULT_WAIT_SEC,
-    ConditionSpec,
     ExitActionSpec,
     ProcessSpec,
 )
@@ -23,7 +23,6 @@ from composer.yaml_text.scalars import format_scalar
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from composer.language.specs import ConditionKind
     from composer.yaml_text.positions import DataPath
 
 # What only a program of ROS is given; executables of packages are such programs.
@@ -36,7 +35,6 @@ _ROS_KEYS = (
     'remap',
     'log_level',
 )
-_CONDITION_KINDS: tuple[ConditionKind, ...] = ('topic', 'service', 'action', 'node', 'process')
 
 
 def takes_ros_arguments(data: dict[str, Any]) -> bool:
@@ -67,7 +65,7 @@ def with_waits(
     """
 
     def renamed(condition: dict[str, Any]) -> dict[str, Any]:
-        kind = _kind_of(condition)
+        kind = kind_of(condition)
         name = condition[kind]
         if kind == 'process':
             return condition | {kind: processes.get(name, name)}
@@ -79,6 +77,10 @@ def with_waits(
             return action
         return action | {'start': processes.get(action['start'], action['start'])}
 
+    if 'components' in entry:
+        components = entry['components'].items()
+        waiting = {key: with_waits(each, processes, namespace) for key, each in components}
+        entry = entry | {'components': waiting}
     for key, change in (('wait_for', renamed), ('on_exit', restarted)):
         if written := entry.get(key):
             is_list = isinstance(written, list)
@@ -91,6 +93,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
     restart = data.get('restart', {'when': 'never'})
     stop = data.get('stop', {})
     nodes, declares_all_ends = parse_declared_nodes(name, data, path)
+    components = parse_components(name, data, path)
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
@@ -118,9 +121,11 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
         on_demand=False,
-        nodes=nodes,
-        declares_all_ends=declares_all_ends,
+        nodes=(*nodes, *map(declare_component, components.values())),
+        declares_all_ends=declares_all_ends and not components,
         lifecycle=data.get('lifecycle'),
+        components=components,
+        external=data.get('external', False),
         path=path,
     )
 
@@ -153,22 +158,3 @@ def _stop_timeout_sec(data: dict[str, Any]) -> float | None:
     default = DEFAULT_LAUNCH_STOP_SEC if 'launch' in data else None
     written = data.get('stop', {}).get('timeout', default)
     return None if written is None else float(written)
-
-
-def parse_conditions(data: dict[str, Any], path: DataPath) -> tuple[ConditionSpec, ...]:
-    """Return what a node or process waits for."""
-    written = data.get('wait_for', [])
-    at = (*path, 'wait_for')
-    if isinstance(written, dict):
-        return (_parse_condition(written, at),)
-    return tuple(_parse_condition(each, (*at, index)) for index, each in enumerate(written))
-
-
-def _parse_condition(data: dict[str, Any], path: DataPath) -> ConditionSpec:
-    kind = _kind_of(data)
-    timeout_sec = float(data.get('timeout', DEFAULT_WAIT_SEC))
-    return ConditionSpec(kind, data[kind], timeout_sec, data.get('state'), (*path, kind))
-
-
-def _kind_of(condition: dict[str, Any]) -> ConditionKind:
-    return next(each for each in _CONDITION_KINDS if each in condition)

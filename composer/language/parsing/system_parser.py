@@ -9,6 +9,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from composer.language.loaded_system import PARTS
+from composer.language.parsing.container_parser import (
+    LOADING_DEFINITIONS,
+    LOADING_PACKAGE,
+    is_container,
+)
 from composer.language.parsing.entry_parser import Data, Spec, parse_entries, parse_qos
 from composer.language.parsing.node_parser import parse_node
 from composer.language.parsing.process_parser import parse_process
@@ -69,13 +74,14 @@ def _leave_out_entities(
 ) -> None:
     """Take entities that are left out of their nodes; with them, these nodes are unused."""
     for path in system.left_out:
-        if len(path) != _DEPTH_OF_ENTITIES or path[1] not in used['nodes']:
+        owners = used.get(str(path[0]), {})
+        if len(path) != _DEPTH_OF_ENTITIES or path[1] not in owners:
             continue
-        _, name, section, entity = path
-        unused['nodes'].setdefault(name, used['nodes'][name])
-        if entity in (rest := used['nodes'][name].get(section, {})):
+        outer, name, section, entity = path
+        unused[str(outer)].setdefault(name, owners[name])
+        if entity in (rest := owners[name].get(section, {})):
             without = {key: rest[key] for key in rest if key != entity}
-            used['nodes'][name] = {**used['nodes'][name], section: without}
+            owners[name] = {**owners[name], section: without}
 
 
 def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> SystemSpec:
@@ -88,6 +94,8 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
     """
     executor = data.get('executor', {})
     interfaces = data.get('interfaces', {})
+    if any(map(is_container, data.get('processes', {}).values())):
+        interfaces = {LOADING_PACKAGE: str(LOADING_DEFINITIONS)} | interfaces
     if any(node.get('bond') for node in data.get('nodes', {}).values()):
         # It is on no package index.
         interfaces = {_BOND: str(_PACKAGES / _BOND)} | interfaces

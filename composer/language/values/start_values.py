@@ -178,6 +178,11 @@ def _in_entry(
         )
         if any(new[name] is not values[name] for name in values):
             changed[key] = new
+    if 'components' in entry:
+        at, components = (*path, 'components'), entry['components']
+        new = {name: _in_entry(each, (*at, name), replace) for name, each in components.items()}
+        if any(new[name] is not components[name] for name in components):
+            changed['components'] = new
     return entry | changed if changed else entry
 
 
@@ -215,7 +220,7 @@ def fill_start_values(
             rest = {key: each for key, each in written.items() if key not in SOURCE_KEYS}
             value = _allowed_sample(rest, value) if is_sample else value
             return {'type': source.type, **rest, 'default': value}
-        if path[2:3] != ('parameters',) and isinstance(value, list | dict):
+        if 'parameters' not in path[2:5:2] and isinstance(value, list | dict):
             message = f'{source.span}: {source.name}: expected a text, got {value!r}'
             raise StartError(message)
         return value
@@ -224,7 +229,9 @@ def fill_start_values(
 
 
 def _describe(path: DataPath) -> str:
-    noun = 'parameter' if 'parameters' in path[2:3] else 'variable'
+    noun = 'parameter' if 'parameters' in path[2:5:2] else 'variable'
+    if path[2:3] == ('components',):
+        return f"parameter '{'.'.join(map(str, path[5:]))}' of component '{path[3]}'"
     owner = f' of {_OWNERS[str(path[0])]} {path[1]!r}' if path[0] in _OWNERS else ''
     names = path[3:] if owner else path[1:]
     return f"{noun} '{'.'.join(map(str, names))}'{owner}"

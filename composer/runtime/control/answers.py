@@ -26,16 +26,21 @@ _NS_PER_SEC = 1e9
 
 
 def status_answer(
-    state: SystemState, nodes: Sequence[str], diagnostics: DiagnosticsPublisher | None
+    state: SystemState,
+    nodes: Sequence[str],
+    components: Sequence[str],
+    diagnostics: DiagnosticsPublisher | None,
 ) -> Outcome:
     """Return what a system says of itself.
 
     Args:
         nodes: Their full names.
+        components: The full names of those that are loaded into containers.
         diagnostics: What measures the health of the entities; `None` if nothing does.
     """
     health = None if diagnostics is None else _summarize(diagnostics)
-    return _answer({**state.document(), 'nodes': list(nodes), 'health': health})
+    names = {'nodes': list(nodes), 'components': list(components)}
+    return _answer({**state.document(), **names, 'health': health})
 
 
 def top_answer(

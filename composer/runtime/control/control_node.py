@@ -7,6 +7,7 @@ when the system is up, or takes long to come up, and so delays no start.
 from __future__ import annotations
 
 import threading
+from importlib.util import find_spec
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from rclpy.parameter import Parameter
 from composer.errors import ExitCode, StartError
 from composer.runtime.control import protocol
 from composer.runtime.control.answers import status_answer, top_answer
+from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
@@ -66,6 +68,7 @@ class ControlNode:
         self._diagnostics: DiagnosticsPublisher | None = None
         self._services: ControlServices | None = None
         self._node: RosNode | None = None
+        self._listing: ComponentListing | None = None
         self._executor: SystemExecutor | None = None
         self._claim: NameClaim | None = None
         # Held while the node and what it has are created or destroyed.
@@ -118,6 +121,8 @@ class ControlNode:
             self._executor.stop(_STOP_SEC)
             if self._services is not None:
                 sleep(max(0.0, self._services.answered + _ANSWER_SEC - monotonic()))
+        if self._listing is not None:
+            self._listing.node.destroy_node()
         if self._node is not None:
             self._node.destroy_node()
 
@@ -198,6 +203,10 @@ class ControlNode:
         Rivals(self._node, services.queries, state.who(), state.begun, self._give_way)
         self._executor = SystemExecutor(self._context, None, log=self._log)
         self._executor.add_node(self._node)
+        # Its interface package is installed with ROS 2, or built for a system with containers.
+        if find_spec('composition_interfaces') is not None:
+            self._listing = ComponentListing(self._context, state.name, self._system.list_nodes)
+            self._executor.add_node(self._listing.node)
         self._executor.start()
 
     def _log(self, text: str) -> None:
@@ -206,7 +215,10 @@ class ControlNode:
             system_logger.error(text)
 
     def _status(self) -> Outcome:
-        return status_answer(self._system.state, self._system.list_nodes(), self._diagnostics)
+        system = self._system
+        return status_answer(
+            system.state, system.list_nodes(), system.list_components(), self._diagnostics
+        )
 
     def _top(self) -> Outcome:
         return top_answer(self._system.state, self._diagnostics, self._system.find_deliveries())

@@ -38,6 +38,9 @@ class ControlledSystem(Protocol):
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
 
+    def list_components(self) -> list[str]:
+        """Return the full names of the components that are loaded into its containers."""
+
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
 
@@ -131,7 +134,7 @@ class ControlServices:
         return Outcome(succeeded=False, text='the system is still starting')
 
     def _restart(self, name: str) -> Outcome:
-        if name not in self._system.list_nodes():
+        if name not in (*self._system.list_nodes(), *self._system.list_components()):
             return Outcome(succeeded=False, text=f"the system has no node '{name}'")
         return self._system.restart_node(name)
 

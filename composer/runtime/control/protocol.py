@@ -36,6 +36,11 @@ def node_name(system: str) -> str:
     return f'{_PREFIX}{re.sub("[^A-Za-z0-9_]+", "_", system)}'[:_LONGEST_NAME]
 
 
+def container_name(system: str) -> str:
+    """Return the name of the node of a system that answers as a container does."""
+    return node_name(system).lstrip('_')
+
+
 def find_control_node(service: str) -> str | None:
     """Return the full name of the control node whose status service this is; `None` if none's."""
     if _STATUS_SERVICE.fullmatch(service) is None:

@@ -1,1 +1,1 @@
-"""What a running system does beside its external processes: actions when they end."""
+"""External processes of a running system: actions when they end, components in containers."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections import Counter
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,8 @@ _TYPES = {
     for scalar in ('bool', 'integer', 'double', 'string')
     for name in (scalar, f'{scalar}_array')
 } | {ParameterType.PARAMETER_BYTE_ARRAY: 'byte_array'}
+# `ros2 launch` has a node of its own; those of other tools begin with an underscore.
+_OF_TOOLS = re.compile(r'_|launch_ros_\d+$')
 # DDS says infinite with the largest number of seconds that it has.
 _INFINITE_SEC = 2**31 - 1
 # Longer texts, as descriptions of robots are, say nothing about the node.
@@ -200,7 +203,7 @@ class _Graph:
 
     def choose(self, wanted: Sequence[str]) -> list[str]:
         """Return the full names of the nodes that are wanted; those of tools only if named."""
-        shown = [full for full, (name, _) in self.names.items() if not name.startswith('_')]
+        shown = [full for full, (name, _) in self.names.items() if not _OF_TOOLS.match(name)]
         if not wanted:
             if not shown:
                 message = 'there are no nodes on this ROS graph'

@@ -22,9 +22,9 @@ from composer.runtime.rewiring.node_changes import NodeChange, set_sim_times
 from composer.runtime.rewiring.transaction import Transaction
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from composer.language.specs import ProcessSpec
+    from composer.language.specs import ComponentSpec, ProcessSpec
     from composer.planning.plan import Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.nodes.live_node import LiveNode
@@ -62,6 +62,7 @@ class Rewiring:
         self._handle = handle
         self._starter = starter
         self._restarter = restarter
+        self._components = starter.components
         self._old, self._new = old, new
         self._after = {node.full_name: node for node in new.spec.nodes.values()}
         self._transaction = Transaction()
@@ -169,7 +170,11 @@ class Rewiring:
         self._end_nodes(targets('nodes', Action.RECREATE))
         self._end_nodes(name for name in removed if name in clashing)
         self._end_processes(targets('processes', Action.RECREATE))
-        self._begin(targets('nodes', *COMING), targets('processes', *COMING))
+        self._begin(
+            targets('nodes', *COMING),
+            targets('processes', *COMING),
+            list(self._exchange_components(plan)),
+        )
         for name in targets('processes', Action.CHANGE):
             process = self._processes.by_name[name]
             self._transaction.on_undo(process.change, process.spec)
@@ -181,7 +186,29 @@ class Rewiring:
             if full_name in nodes:
                 self._transaction.on_commit(self._restarter.remove, full_name)
         for name in targets('processes', Action.REMOVE):
+            self._transaction.on_commit(self._components.release, self._processes.by_name[name])
             self._transaction.on_commit(self._processes.remove, name)
+
+    def _exchange_components(self, plan: Plan) -> Iterator[tuple[ExternalProcess, ComponentSpec]]:
+        """Unload components that are recreated; yield those that are to be loaded."""
+        for operation in plan.operations:
+            container, section, key = operation.target
+            if section != 'components':
+                continue
+            process = self._processes.by_name[container]
+            before, after = process.spec, self._new.spec.processes[container]
+            if before is not after:
+                self._transaction.on_undo(process.change, before)
+                process.change(after)
+            if operation.action is Action.REMOVE:
+                self._transaction.on_commit(self._components.unload, container, key)
+            if operation.action is Action.RECREATE:
+                old = self._old.spec.processes[container].components[key]
+                self._components.unload(container, key)
+                self._transaction.on_undo(self._components.load, process, old)
+            if operation.action in COMING:
+                self._transaction.on_undo(self._components.unload, container, key)
+                yield process, after.components[key]
 
     def _end_nodes(self, names: Iterable[str]) -> None:
         """End nodes that are recreated; to undo that, they begin again with their state."""
@@ -213,6 +240,7 @@ class Rewiring:
             process = self._processes.by_name[name]
             if process.spec.on_demand and process.has_come_to('running'):
                 self._running.add(name)
+            self._components.release(process)
             self._processes.remove(name)
             self._transaction.on_undo(self._start_processes, [process.spec])
 
@@ -228,9 +256,14 @@ class Rewiring:
             if process.spec.on_demand and process.spec.name in self._running:
                 self._starter.start_on_demand(process)
 
-    def _begin(self, node_names: list[str], process_names: list[str]) -> None:
+    def _begin(
+        self,
+        node_names: list[str],
+        process_names: list[str],
+        components: list[tuple[ExternalProcess, ComponentSpec]],
+    ) -> None:
         """Create and start nodes and processes; each waits for what its `wait_for` names."""
-        if not (node_names or process_names):
+        if not (node_names or process_names or components):
             return
 
         def remove_all() -> None:
@@ -239,6 +272,7 @@ class Rewiring:
                     self._restarter.remove(name)
             for name in process_names:
                 if name in self._processes.by_name:
+                    self._components.release(self._processes.by_name[name])
                     self._processes.remove(name)
 
         self._transaction.on_undo(remove_all)
@@ -246,7 +280,7 @@ class Rewiring:
         self._resume(nodes)
         processes = [ExternalProcess(self._new.spec.processes[name]) for name in process_names]
         self._processes.by_name.update({each.spec.name: each for each in processes})
-        self._starter.start_more(nodes, processes)
+        self._starter.start_more(nodes, processes, components)
         self._start_again(processes)
 
     def _change_nodes(self, plan: Plan, clashing: Collection[Target]) -> None:

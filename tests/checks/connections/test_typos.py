@@ -7,7 +7,7 @@ from textwrap import dedent
 import pytest
 
 from composer.ament import remaps_actions
-from composer.checks.connections import typos
+from composer.checks.connections import remap_rules
 from composer.checks.connections.typos import find_typo
 
 RULE = 'likely-misspelling'
@@ -118,7 +118,7 @@ processes:
 
 @pytest.mark.parametrize(('remaps', 'is_ignored'), [(False, True), (True, False), (None, False)])
 def test_an_older_ros_does_not_remap_an_action(check, monkeypatch, remaps, is_ignored):
-    monkeypatch.setattr(typos, 'remaps_actions', lambda: remaps)
+    monkeypatch.setattr(remap_rules, 'remaps_actions', lambda: remaps)
     nodes = """
   server:
     remap: {do: done, heard: said}
