@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node as RosNode
 
-    from composer.language.specs import ComponentSpec
+    from composer.language.specs import ComponentSpec, DrivenState
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.nodes.system_handle import SystemHandle
 
@@ -57,10 +57,15 @@ class _Loaded:
 
 
 class Components:
-    """Loads and unloads the components of a system."""
+    """Loads and unloads the components of a system.
+
+    Attributes:
+        drive: Brings a node to a state, see `LifecycleDriver`.
+    """
 
     def __init__(self, system: SystemHandle) -> None:
         self._system = system
+        self.drive: Callable[[str, DrivenState, Callable[[], bool]], str]
         self._loaded: dict[tuple[str, str], _Loaded] = {}
         self._clients: dict[str, ContainerClient] = {}
         self._node: RosNode | None = None
@@ -68,6 +73,8 @@ class Components:
         self._is_outdated: Callable[[], bool] = never
         self._stopping = threading.Event()
         self._watcher: threading.Thread | None = None
+        # What brings each component to its state now.
+        self._turns: dict[tuple[str, str], object] = {}
         # Held while a container is asked.
         self._lock = threading.RLock()
 
@@ -157,6 +164,31 @@ class Components:
                     return ''
         return f"there is no node '{full_name}' any more"
 
+    def begin_lifecycle(self, container: str, key: str, component: ComponentSpec) -> None:
+        """Bring a component to the state that the file wants it in, however long that takes."""
+        loaded, goal = self._loaded.get((container, key)), component.lifecycle
+        if loaded is None or goal is None:
+            return
+        turn = self._turns[container, key] = object()
+
+        def has_ended() -> bool:
+            return (
+                self._system.stop.is_set
+                or self._loaded.get((container, key)) is not loaded
+                or self._turns[container, key] is not turn
+            )
+
+        def drive() -> None:
+            name = component.full_name
+            failure = self.drive(name, goal, has_ended)
+            if not has_ended():
+                if failure:
+                    system_logger.error(f"component '{key}': {failure}")
+                else:
+                    system_logger.info(f"component '{key}': node '{name}' is {goal}")
+
+        threading.Thread(target=drive, daemon=True).start()
+
     def release(self, process: ExternalProcess, timeout_sec: float | None = None) -> None:
         """Let go of a container: unload what was loaded into one that is not ours."""
         with self._lock:
@@ -217,9 +249,9 @@ class Components:
             raise ContainerError(message)
         request = _write_request(component, self._system.parameter_files.get(name, {}))
         unique_id, _ = client.load(request, f"'{component.key}'")
-        self._loaded[process.spec.name, component.key] = _Loaded(
-            component, process, unique_id, client.servers
-        )
+        key = process.spec.name, component.key
+        self._loaded[key] = _Loaded(component, process, unique_id, client.servers)
+        self.begin_lifecycle(*key, component)
         if component.log_level is not None:
             self._set_level(component)
         if process.spec.external and self._watcher is None:

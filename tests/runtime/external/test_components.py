@@ -236,3 +236,24 @@ def test_the_nodes_of_a_system_are_listed_as_those_of_a_container(compose, peer,
         "the nodes of a system are those of its file: edit it, then 'composer reload system'"
     )
     assert child.stop() == 0
+
+
+def test_a_component_is_brought_to_a_state_of_its_lifecycle(compose):
+    components = {
+        'it': component('Managed', lifecycle='active'),
+        'talker': component(),
+    }
+    nodes = {'n': {'wait_for': {'node': '/it', 'state': 'active'}, 'on_start': 'parts:starts'}}
+    containers = {'perception': container(components, restart={'delay': 0})}
+    (compose.folder / 'mended').touch()
+    child = compose(system(containers, nodes), CODE)
+    child.wait_for_line("component 'it': node '/it' is active")
+    child.wait_for_line('[n]: starts')
+    child.wait_until_ready()
+
+    os.kill(container_of(child), signal.SIGKILL)
+    child.wait_for_line("component 'it': node '/it' is active", times=2)
+    (compose.folder / 'mended').unlink()
+    os.kill(container_of(child), signal.SIGKILL)
+    child.wait_for_line("component 'it': node '/it' refused to configure: it is unconfigured")
+    assert child.stop() == 0
