@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
 from composer.launch_files.texts import Computed, Text
+from composer.schema.structure import known_keys
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
         stem: The name of the system, for the folder of its parameter files.
     """
     written = SystemFile()
+    if 'containers' not in known_keys(''):
+        _leave_components_out(imported)
     lines = [f'# Imported from {source}.', 'version: 1']
     lines += _arguments(imported.arguments.values())
     common = _common_environment(imported.entries)
@@ -53,6 +56,16 @@ def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
         lines += [f'# {" ".join(remark.split())}' for remark in imported.remarks]
     written.text = '\n'.join(lines) + '\n'
     return written
+
+
+def _leave_components_out(imported: Imported) -> None:
+    """Make plain processes of containers."""
+    for entry in [each for each in imported.entries if each.section == 'containers']:
+        names = ', '.join(entry.data.pop('components', ()))
+        imported.remarks.append(f"'{entry.name}': its components cannot be kept: {names}")
+        entry.section = 'processes'
+        if entry.data.get('external'):
+            imported.entries.remove(entry)
 
 
 def _arguments(arguments: Any) -> list[str]:
@@ -140,22 +153,24 @@ def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
         isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()
     ):
         data = {'/**': {'ros__parameters': data}}
-    text = render_yaml(_resolved(data), RCL)
+    text = render_yaml(data, RCL)
     plain = _NAME.sub('_', label).strip('_') or 'node'
     number, path = 2, f'{stem}.params/{plain}.yaml'
     while path in written.files and written.files[path] != text:
         path, number = f'{stem}.params/{plain}_{number}.yaml', number + 1
     written.files[path] = text
-    return path
+    given: dict[str, Any] = {'file': path}
+    given |= {'expressions': True} if _has_expressions(data) else {}
+    given |= {'root': file.root} if file.root else {}
+    return given if len(given) > 1 else path
 
 
-def _resolved(data: Any) -> Any:
-    """Return data with the values of their expressions, which no parameter file can hold."""
+def _has_expressions(data: Any) -> bool:
     if isinstance(data, dict):
-        return {_resolved(key): _resolved(value) for key, value in data.items()}
+        return any(_has_expressions(each) for each in (*data.keys(), *data.values()))
     if isinstance(data, list):
-        return [_resolved(item) for item in data]
-    return data.value if isinstance(data, Computed) else data
+        return any(map(_has_expressions, data))
+    return isinstance(data, Computed)
 
 
 def _waits(imported: Imported, entry: Entry) -> Any:

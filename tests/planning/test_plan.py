@@ -54,6 +54,12 @@ VALUES = 'talker:\n  ros__parameters:\n    speed: 2.0\n'
 EDITS = [
     ('period: 0.5', 'rate: 4', None, ["~ timer 'say' of 'talker': period 0.5 → 0.25 (13 → 13)"]),
     (
+        "[sleep, '1']",
+        "[sleep, '1'], publishers: {words: std_msgs/msg/String}, nodes: {driver: {}}",
+        None,
+        [],
+    ),
+    (
         'speed: 2.0',
         'speed: 2.0\n    use_sim_time: true',
         'values.yaml',

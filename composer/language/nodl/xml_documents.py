@@ -71,7 +71,7 @@ class _Reader:
         self.findings: list[Diagnostic] = []
         self._source = source
         self._open: list[str] = []
-        self.parser = expat.ParserCreate()
+        self.parser = expat.ParserCreate('utf-8')
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = lambda _: self._open.pop()
         self.parser.StartDoctypeDeclHandler = self._refuse_doctype

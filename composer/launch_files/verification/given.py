@@ -22,6 +22,17 @@ _NOT_COMPARED = re.compile(
 )
 
 
+class _Loader(yaml.SafeLoader):
+    """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
+
+
+def _read_tuple(loader: _Loader, node: Any) -> list[Any]:
+    return loader.construct_sequence(node, deep=True)
+
+
+_Loader.add_constructor('tag:yaml.org,2002:python/tuple', _read_tuple)
+
+
 @dataclass
 class Given:
     """What a process was given.
@@ -116,7 +127,7 @@ def _add_remap(given: Given, rule: str) -> None:
 
 def _load(text: str, replaced: Mapping[str, str]) -> Any:
     try:
-        data = yaml.safe_load(_replace(text, replaced))
+        data = yaml.load(_replace(text, replaced), _Loader)  # noqa: S506 - a safe one
     except yaml.YAMLError:
         return {}
     return data if isinstance(data, dict) else {}
