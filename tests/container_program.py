@@ -7,7 +7,7 @@ package `stand_in`, and of any other there are none:
 - `stand_in::Talker` publishes its parameter `word` on `chatter`.
 - `stand_in::Slow` takes as long as a file `slow` is there.
 - `stand_in::Broken` raises in its constructor; with a file `mended` it does not.
-- `stand_in::Managed` has a lifecycle; without a file `mended` it refuses to be configured.
+- `stand_in::Managed` has a lifecycle.
 - `stand_in::Deadly` ends the process while it is loaded, unless there is a file `mended`.
 """
 
@@ -19,7 +19,7 @@ from pathlib import Path
 import rclpy
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
@@ -59,18 +59,11 @@ class Deadly(Talker):
 
 
 class Managed(LifecycleNode):
-    """A managed node; it refuses to be configured without a file `mended`."""
-
-    def __init__(self, name, **options):
-        options.pop('cli_args', None)
-        super().__init__(name, **options)
-
-    def on_configure(self, _state):
-        is_mended = Path('mended').exists()
-        return TransitionCallbackReturn.SUCCESS if is_mended else TransitionCallbackReturn.FAILURE
+    pass
 
 
-CLASSES = {f'stand_in::{each.__name__}': each for each in (Talker, Slow, Broken, Deadly, Managed)}
+KINDS = (Talker, Slow, Broken, Deadly, Managed)
+CLASSES = {f'stand_in::{each.__name__}': each for each in KINDS}
 CLASSES['composition::Talker'] = Talker
 
 

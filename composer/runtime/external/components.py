@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
@@ -30,10 +31,11 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node as RosNode
 
-    from composer.language.specs import ComponentSpec, DrivenState
+    from composer.language.specs import ComponentSpec
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.nodes.system_handle import SystemHandle
 
+OnLoad: TypeAlias = 'Callable[[ExternalProcess, ComponentSpec, Callable[[], bool]], None]'
 _NODE_NAME = '_composer_components'
 _STOP_SEC = 1.0
 _POLL_SEC = 0.05
@@ -60,12 +62,13 @@ class Components:
     """Loads and unloads the components of a system.
 
     Attributes:
-        drive: Brings a node to a state, see `LifecycleDriver`.
+        on_load: Called with each component that was loaded, or that an edit has changed, its
+            container, and what tells whether it has gone.
     """
 
     def __init__(self, system: SystemHandle) -> None:
         self._system = system
-        self.drive: Callable[[str, DrivenState, Callable[[], bool]], str]
+        self.on_load: OnLoad = lambda _process, _component, _has_ended: None
         self._loaded: dict[tuple[str, str], _Loaded] = {}
         self._clients: dict[str, ContainerClient] = {}
         self._node: RosNode | None = None
@@ -73,8 +76,6 @@ class Components:
         self._is_outdated: Callable[[], bool] = never
         self._stopping = threading.Event()
         self._watcher: threading.Thread | None = None
-        # What brings each component to its state now.
-        self._turns: dict[tuple[str, str], object] = {}
         # Held while a container is asked.
         self._lock = threading.RLock()
 
@@ -164,31 +165,6 @@ class Components:
                     return ''
         return f"there is no node '{full_name}' any more"
 
-    def begin_lifecycle(self, container: str, key: str, component: ComponentSpec) -> None:
-        """Bring a component to the state that the file wants it in, however long that takes."""
-        loaded, goal = self._loaded.get((container, key)), component.lifecycle
-        if loaded is None or goal is None:
-            return
-        turn = self._turns[container, key] = object()
-
-        def has_ended() -> bool:
-            return (
-                self._system.stop.is_set
-                or self._loaded.get((container, key)) is not loaded
-                or self._turns[container, key] is not turn
-            )
-
-        def drive() -> None:
-            name = component.full_name
-            failure = self.drive(name, goal, has_ended)
-            if not has_ended():
-                if failure:
-                    system_logger.error(f"component '{key}': {failure}")
-                else:
-                    system_logger.info(f"component '{key}': node '{name}' is {goal}")
-
-        threading.Thread(target=drive, daemon=True).start()
-
     def release(self, process: ExternalProcess, timeout_sec: float | None = None) -> None:
         """Let go of a container: unload what was loaded into one that is not ours."""
         with self._lock:
@@ -249,16 +225,29 @@ class Components:
             raise ContainerError(message)
         request = _write_request(component, self._system.parameter_files.get(name, {}))
         unique_id, _ = client.load(request, f"'{component.key}'")
-        key = process.spec.name, component.key
-        self._loaded[key] = _Loaded(component, process, unique_id, client.servers)
-        self.begin_lifecycle(*key, component)
+        self._loaded[process.spec.name, component.key] = _Loaded(
+            component, process, unique_id, client.servers
+        )
         if component.log_level is not None:
             self._set_level(component)
+        self._tell_load(self._loaded[process.spec.name, component.key])
         if process.spec.external and self._watcher is None:
             self._watcher = threading.Thread(
                 target=self._watch, name='composer-components', daemon=True
             )
             self._watcher.start()
+
+    def change(self, container: str, component: ComponentSpec) -> None:
+        """Let a loaded component be kept as an edit says."""
+        with self._lock:
+            at = (container, component.key)
+            if (loaded := self._loaded.get(at)) is not None:
+                self._loaded[at] = replace(loaded, component=component)
+                self._tell_load(self._loaded[at])
+
+    def _tell_load(self, loaded: _Loaded) -> None:
+        at = loaded.process.spec.name, loaded.component.key
+        self.on_load(loaded.process, loaded.component, lambda: self._loaded.get(at) is not loaded)
 
     def _watch(self) -> None:
         """Load components again into containers that were restarted by somebody else."""

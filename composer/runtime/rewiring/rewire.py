@@ -207,8 +207,9 @@ class Rewiring:
                 self._components.unload(container, key)
                 self._transaction.on_undo(self._components.load, process, old)
             if operation.action is Action.CHANGE:
-                new = after.components[key]
-                self._transaction.on_commit(self._components.begin_lifecycle, container, key, new)
+                self._transaction.on_commit(
+                    self._components.change, container, after.components[key]
+                )
             if operation.action in COMING:
                 self._transaction.on_undo(self._components.unload, container, key)
                 yield process, after.components[key]
