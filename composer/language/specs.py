@@ -402,6 +402,7 @@ class ComponentSpec:
         plugin: The class, as in `image_proc::RectifyNode`.
         remap: Rules, from and to; the first that matches wins.
         intra_process: Whether messages within the container are handed over.
+        lifecycle: The state that it is brought to; `None` to leave it alone.
         container: The name of the container.
     """
 
@@ -416,6 +417,7 @@ class ComponentSpec:
     log_level: LogLevel | None
     intra_process: bool
     wait_for: tuple[ConditionSpec, ...]
+    lifecycle: DrivenState | None
     container: str
     path: DataPath
 

@@ -290,7 +290,7 @@ _OF_CONTAINERS = (
 )
 _OF_COMPONENTS = (
     *('foreach', 'when', 'description', 'package', 'plugin', 'namespace', 'parameters'),
-    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for'),
+    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for', 'lifecycle'),
 )
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
 LEFT_OUT: dict[str, str] = {
