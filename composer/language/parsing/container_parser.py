@@ -118,6 +118,7 @@ def _parse_component(
         log_level=data.get('log_level'),
         intra_process=data.get('intra_process', False),
         wait_for=parse_conditions(data, path),
+        lifecycle=data.get('lifecycle'),
         container=process,
         path=path,
     )

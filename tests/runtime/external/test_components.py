@@ -236,3 +236,22 @@ def test_the_nodes_of_a_system_are_listed_as_those_of_a_container(compose, peer,
         "the nodes of a system are those of its file: edit it, then 'composer reload system'"
     )
     assert child.stop() == 0
+
+
+def test_a_component_is_brought_to_a_state_whenever_it_is_loaded(compose):
+    components = {
+        'driver': component('Managed', lifecycle='active'),
+        'filter': component(
+            'Managed', lifecycle='inactive', wait_for={'node': 'driver', 'state': 'active'}
+        ),
+    }
+    text = system({'lidar': container(components, restart={'delay': 0})})
+    child = compose(text, CODE, '--watch')
+    child.wait_for_line("component 'driver' is active")
+    child.wait_for_line("component 'filter' is inactive")
+    path = compose.folder / 'system.yaml'
+    path.write_text(path.read_text().replace('"inactive"', '"active"'))
+    child.wait_for_line("component 'filter' is active")
+    os.kill(container_of(child), signal.SIGKILL)
+    child.wait_for_line("component 'driver' is active", times=2)
+    assert child.stop() == 0
