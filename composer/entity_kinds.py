@@ -89,6 +89,13 @@ class EntityKind:
 
 
 _BEHAVIOUR = 'unknown:unknown'
+
+
+def _event(key: str) -> BehaviourKey:
+    """Return the key of a behaviour that is called for a QoS event."""
+    return BehaviourKey(key, ('node', 'event'))
+
+
 _NO_SERVER = ('no-server', "nothing in this system serves '{}'")
 
 ENTITY_KINDS: tuple[EntityKind, ...] = (
@@ -99,6 +106,12 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         'topic',
         provides=True,
         has_qos=True,
+        behaviours=(
+            _event('on_deadline_missed'),
+            _event('on_liveliness_lost'),
+            _event('on_incompatible_qos'),
+            _event('on_matched'),
+        ),
         unused='nothing publishes on it',
         unmatched=('no-subscription', "nothing in this system subscribes to '{}'"),
         stand_in={'type': 'unknown/msg/Unknown'},
@@ -111,7 +124,14 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
         publishes=True,
         has_group=True,
         missed={'queue overruns': 'overruns'},
-        behaviours=(BehaviourKey('behaviour', ('node', 'message'), given='', returned=PUBLISHED),),
+        behaviours=(
+            BehaviourKey('behaviour', ('node', 'message'), given='', returned=PUBLISHED),
+            _event('on_deadline_missed'),
+            _event('on_liveliness_changed'),
+            _event('on_incompatible_qos'),
+            _event('on_message_lost'),
+            _event('on_matched'),
+        ),
         unmatched=('no-publisher', "nothing in this system publishes '{}'"),
         stand_in={'type': 'unknown/msg/Unknown', 'behaviour': _BEHAVIOUR},
     ),

@@ -7,6 +7,7 @@ package `stand_in`, and of any other there are none:
 - `stand_in::Talker` publishes its parameter `word` on `chatter`.
 - `stand_in::Slow` takes as long as a file `slow` is there.
 - `stand_in::Broken` raises in its constructor; with a file `mended` it does not.
+- `stand_in::Managed` has a lifecycle.
 - `stand_in::Deadly` ends the process while it is loaded, unless there is a file `mended`.
 """
 
@@ -18,6 +19,7 @@ from pathlib import Path
 import rclpy
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
@@ -56,7 +58,12 @@ class Deadly(Talker):
         super().__init__(name, **options)
 
 
-CLASSES = {f'stand_in::{each.__name__}': each for each in (Talker, Slow, Broken, Deadly)}
+class Managed(LifecycleNode):
+    pass
+
+
+KINDS = (Talker, Slow, Broken, Deadly, Managed)
+CLASSES = {f'stand_in::{each.__name__}': each for each in KINDS}
 CLASSES['composition::Talker'] = Talker
 
 

@@ -39,7 +39,8 @@ def test_an_entity_has_the_keys_that_its_kind_has(kind):
     assert ('qos' in keys) == kind.has_qos
     assert ('publish' in keys) == kind.publishes
     assert ('group' in keys) == kind.has_group
-    behaviours = keys & {'behaviour', 'accept', 'feedback', 'result'}
+    events = {key for key in keys if key.startswith('on_') and key != 'on_error'}
+    behaviours = events | (keys & {'behaviour', 'accept', 'feedback', 'result'})
     assert behaviours == {each.key for each in kind.behaviours}
     assert ('external' in keys) == (kind.unmatched is not None)
 

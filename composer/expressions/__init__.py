@@ -5,6 +5,7 @@ Importing jinja2 takes as long as a small check: only files that have expression
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 # The sections whose entries may be repeated; so may the entities of nodes, and components.
@@ -16,6 +17,7 @@ _RESERVED = frozenset(
 ) | {'True', 'False', 'None'}
 
 
+_WITH_SEPARATORS = re.compile(r'[^\W\d]\w*([.-]\w+)+')
 # The name under which an expression finds all arguments of its file, as in `args['a.b']`.
 ARGUMENTS = 'args'
 # The names that stand for something in every expression.
@@ -28,15 +30,15 @@ def is_variable_name(name: str) -> bool:
 
 
 def is_argument_name(name: str) -> bool:
-    """Return whether an expression can use the name of an argument, which may have dots."""
+    """Return whether an expression can use the name of an argument, with dots or dashes in it."""
     return name != ARGUMENTS and (
-        is_variable_name(name) or ('.' in name and all(map(str.isidentifier, name.split('.'))))
+        is_variable_name(name) or _WITH_SEPARATORS.fullmatch(name) is not None
     )
 
 
 def written_in_expression(name: str) -> str:
     """Return how an expression writes the name of an argument."""
-    return f"{ARGUMENTS}['{name}']" if '.' in name else name
+    return name if is_variable_name(name) else f"{ARGUMENTS}['{name}']"
 
 
 def is_conditional(entry: Any) -> bool:

@@ -122,6 +122,10 @@ class PublisherSpec:
     topic: str
     qos: QosSpec
     qos_overrides: tuple[str, ...]
+    on_deadline_missed: BehaviourSpec | None
+    on_liveliness_lost: BehaviourSpec | None
+    on_incompatible_qos: BehaviourSpec | None
+    on_matched: BehaviourSpec | None
     local_delivery: bool
     external: bool
     path: DataPath
@@ -155,6 +159,11 @@ class SubscriptionSpec:
     qos_overrides: tuple[str, ...]
     raw: bool
     content_filter: Mapping[str, Any]
+    on_deadline_missed: BehaviourSpec | None
+    on_liveliness_changed: BehaviourSpec | None
+    on_incompatible_qos: BehaviourSpec | None
+    on_message_lost: BehaviourSpec | None
+    on_matched: BehaviourSpec | None
     while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
@@ -393,6 +402,7 @@ class ComponentSpec:
         plugin: The class, as in `image_proc::RectifyNode`.
         remap: Rules, from and to; the first that matches wins.
         intra_process: Whether messages within the container are handed over.
+        lifecycle: The state that it is brought to; `None` to leave it alone.
         container: The name of the container.
     """
 
@@ -407,6 +417,7 @@ class ComponentSpec:
     log_level: LogLevel | None
     intra_process: bool
     wait_for: tuple[ConditionSpec, ...]
+    lifecycle: DrivenState | None
     container: str
     path: DataPath
 

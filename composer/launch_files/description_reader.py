@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
+from composer.expressions import written_in_expression
 from composer.launch_files.conditions import read_condition
 from composer.launch_files.launched_programs import ProgramReader, ends_system
 from composer.launch_files.opaque import OpaqueRuns
 from composer.launch_files.parameters import ParameterReader
 from composer.launch_files.place import join_namespaces, number_code
-from composer.launch_files.results import Argument, LaunchError, argument_code
+from composer.launch_files.results import Argument, LaunchError
 from composer.launch_files.substitutions import Resolver, class_names, private
 from composer.launch_files.surroundings import Wait
 from composer.launch_files.texts import Text, chosen, joined, one
@@ -117,7 +118,7 @@ class DescriptionReader:
                 name, default, description, choices, given
             )
         text = given if given is not None else (default.text if default else '')
-        self.place.scope.configurations[name] = one(argument_code(name), text)
+        self.place.scope.configurations[name] = one(written_in_expression(name), text)
 
     def _set(self, entity: Any) -> None:
         self.place.scope.set(

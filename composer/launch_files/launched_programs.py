@@ -127,6 +127,7 @@ class ProgramReader:
         entry = self._add('processes', label, data, action)
         if is_container or _LOADER in program.text:
             entry.section = 'containers'
+            data['components'] = {}
             for component in private(action, 'composable_node_descriptions') or ():
                 self._add_component(entry, component)
         if 'LifecycleNode' in kinds and self._is_started(action):
@@ -155,8 +156,14 @@ class ProgramReader:
             full = f'/{values[1] or ""}/{values[0]}'.replace('//', '/').replace('//', '/')
             if entry.section == 'containers' and name.text in (values[0], full, full.lstrip('/')):
                 return entry
-        data: dict[str, Any] = {'node': _absolute(name)}
-        return self._add('containers', name.text.strip('/').replace('/', '_'), data, None)
+        for entry in self._place.result.entries:
+            if entry.data.get('external') and entry.name == name.written().strip('/'):
+                return entry
+        data: dict[str, Any] = {'external': True, 'components': {}}
+        entry = self._add('containers', name.written().strip('/'), data, None)
+        # Others may load components into it under other conditions.
+        entry.when = ''
+        return entry
 
     def _add_component(self, entry: Entry | None, component: Any) -> None:
         place, resolver = self._place, Resolver(self._place)
@@ -170,8 +177,6 @@ class ProgramReader:
             'package': resolver.text(private(component, 'package')).written(),
             'plugin': plugin.written(),
         }
-        if name.parts:
-            data['name'] = name.written()
         self._add_namespace(data, private(component, 'node_namespace'))
         self._add_parameters(data, private(component, 'parameters') or ())
         self._add_remaps(data, private(component, 'remappings') or ())
@@ -186,14 +191,15 @@ class ProgramReader:
             when = place.scope.when
         if when and when != entry.when:
             data['when'] = Computed(f'{{{{ {when} }}}}', True)
-        components: dict[str, Any] = entry.data.setdefault('components', {})
-        label = name.text or plugin.text.rpartition(':')[2]
-        number, free = 2, label
-        while free in components:
-            free, number = f'{label}_{number}', number + 1
-        if data.get('name') == free:
-            del data['name']
-        components[free] = data
+        label: str = name.written()
+        if not label:
+            label = plugin.text.rpartition(':')[2]
+            place.remark(f"{plugin.text} has no name of its own here: '{label}' is its node")
+        components: dict[str, Any] = entry.data['components']
+        if label in components:
+            place.remark(f"a second component '{label}' of one container is left out")
+        else:
+            components[label] = data
 
     def _read_process(self, action: Any) -> None:
         resolver = Resolver(self._place)
@@ -334,10 +340,6 @@ def _take_log_level(words: list[Text]) -> str | None:
     level = words[places[0] + 1]
     del words[places[0] : places[0] + 2]
     return level.written() if not level.is_constant else level.text.lower()
-
-
-def _absolute(name: Text) -> str:
-    return name.written() if name.text.startswith('/') else joined((Text(('/',)), name)).written()
 
 
 def _beside(path: Text) -> str:

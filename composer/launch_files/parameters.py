@@ -30,9 +30,14 @@ class Parameters:
 
 @dataclass
 class NewFile:
-    """A parameter file that the import writes beside the system."""
+    """A parameter file that the import writes beside the system.
+
+    Attributes:
+        root: The namespace that its nodes are put in.
+    """
 
     data: dict[str, Any]
+    root: str = ''
 
 
 class ParameterReader:
@@ -125,7 +130,14 @@ class ParameterReader:
             read.values |= values
 
     def _add_file(self, read: Parameters, item: Any) -> None:
-        path = self._resolver.text(private(item, 'param_file'))
+        written = private(item, 'param_file')
+        if (
+            isinstance(written, list)
+            and len(written) == 1
+            and self._add_rewritten(read, written[0])
+        ):
+            return
+        path = self._resolver.text(written)
         substitutes = private(item, 'allow_substs')
         is_template = substitutes is True or (
             substitutes is not False and self._resolver.text(substitutes).text.lower() == 'true'
@@ -143,6 +155,31 @@ class ParameterReader:
                 self._keep_content(read, path)
         else:
             self._remark(f"there is no parameter file '{path.text}': launch goes on without it")
+
+    def _add_rewritten(self, read: Parameters, written: Any) -> bool:
+        """Add nav2's `RewrittenYaml`: a file, and the values that it gives to names in it."""
+        rewrites = private(written, 'param_rewrites')
+        if 'RewrittenYaml' not in class_names(written) or private(written, 'key_rewrites'):
+            return False
+        resolver = self._resolver
+        path = resolver.text(private(written, 'source_file'))
+        data = read_file(path.text)
+        if not isinstance(data, dict) or '$(' in str(data) or any('.' in key for key in rewrites):
+            return False
+        is_typed = bool(private(written, 'convert_types'))
+        by_name, by_value = (
+            {
+                key: resolver.text(value).typed() if is_typed else resolver.text(value).written()
+                for key, value in (given or {}).items()
+            }
+            for given in (rewrites, private(written, 'value_rewrites'))
+        )
+        root = resolver.text(private(written, 'root_key')).written()
+        read.files.append({'file': path.written(), 'root': root} if root else path.written())
+        changed = _rewritten(data, by_name, by_value)
+        if changed:
+            read.files.append(NewFile(changed, root))
+        return True
 
     def _keep_content(self, read: Parameters, path: Text) -> None:
         data = read_file(path.text)
@@ -164,6 +201,20 @@ class ParameterReader:
         return key
 
 
+def _rewritten(data: Any, by_name: dict[str, Any], by_value: dict[str, Any]) -> dict[str, Any]:
+    """Return the part of a parameter file that gets other values."""
+    changed: dict[str, Any] = {}
+    for key, value in data.items():
+        if isinstance(value, dict):
+            inner = _rewritten(value, by_name, by_value)
+            changed |= {key: inner} if inner else {}
+        elif key in by_name:
+            changed[key] = by_name[key]
+        elif isinstance(value, str) and value in by_value:
+            changed[key] = by_value[value]
+    return changed
+
+
 def _unmarked(data: Any) -> Any:
     """Return data with expressions in place of marks."""
     if isinstance(data, dict):
@@ -179,8 +230,10 @@ def _names_in(file: Any) -> set[str]:
     """Return the names of all parameters in a file; of one that cannot be read, of every name."""
     if isinstance(file, NewFile):
         data: Any = file.data
+    elif isinstance(file, dict):
+        return _names_in(file['file'])
     else:
-        data = read_file(file) if '{{' not in file else None
+        data = read_file(str(file.value if isinstance(file, Computed) else file))
     if data is None:
         return _EveryName()
     return set(_flat(data, ''))

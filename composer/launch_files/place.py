@@ -7,7 +7,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from composer.launch_files.results import Entry, Imported, argument_code
+from composer.expressions import written_in_expression
+from composer.launch_files.results import Entry, Imported
 from composer.launch_files.surroundings import Scope
 from composer.launch_files.texts import Computed, Text, joined, one
 
@@ -56,7 +57,9 @@ class Place:
         for argument in self.result.arguments.values():
             # Expressions may hold several arguments.
             if any(
-                re.search(rf'(?<![\w.]){re.escape(argument_code(argument.name))}(?!\w)', code)
+                re.search(
+                    rf'(?<![\w.]){re.escape(written_in_expression(argument.name))}(?!\w)', code
+                )
                 for code in codes
             ):
                 argument.fixed = True

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
-from composer.expressions import is_variable_name
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -66,8 +65,3 @@ class Imported:
     entries: list[Entry] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
-
-
-def argument_code(name: str) -> str:
-    """Return the expression for an argument."""
-    return name if is_variable_name(name) else f"args['{name}']"

@@ -140,22 +140,24 @@ def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
         isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()
     ):
         data = {'/**': {'ros__parameters': data}}
-    text = render_yaml(_resolved(data), RCL)
+    text = render_yaml(data, RCL)
     plain = _NAME.sub('_', label).strip('_') or 'node'
     number, path = 2, f'{stem}.params/{plain}.yaml'
     while path in written.files and written.files[path] != text:
         path, number = f'{stem}.params/{plain}_{number}.yaml', number + 1
     written.files[path] = text
-    return path
+    given: dict[str, Any] = {'file': path}
+    given |= {'expressions': True} if _has_expressions(data) else {}
+    given |= {'root': file.root} if file.root else {}
+    return given if len(given) > 1 else path
 
 
-def _resolved(data: Any) -> Any:
-    """Return data with the values of their expressions, which no parameter file can hold."""
+def _has_expressions(data: Any) -> bool:
     if isinstance(data, dict):
-        return {_resolved(key): _resolved(value) for key, value in data.items()}
+        return any(_has_expressions(each) for each in (*data.keys(), *data.values()))
     if isinstance(data, list):
-        return [_resolved(item) for item in data]
-    return data.value if isinstance(data, Computed) else data
+        return any(map(_has_expressions, data))
+    return isinstance(data, Computed)
 
 
 def _waits(imported: Imported, entry: Entry) -> Any:

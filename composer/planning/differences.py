@@ -138,6 +138,9 @@ _OF_THE_SYSTEM = (
     'shutdown_timeout_sec',
     'diagnostics_period_sec',
 )
+_EVENT_KEYS = {
+    key.key for kind in ENTITY_KINDS for key in kind.behaviours if key.arguments[-1] == 'event'
+}
 _AT_ITS_START = ('on_start', 'wait_for', 'delay', 'lifecycle')
 # Parameters of every node, and the keys of a node that set them where parameter files do not.
 _GIVEN_BY_ROS = {
@@ -416,11 +419,18 @@ def _compared_fields(kind: Any) -> tuple[str, ...]:
     return tuple(each.name for each in fields(kind) if each.name not in skipped)
 
 
+def _reason_of_event(change: Change) -> str:
+    """Return why a behaviour for a QoS event cannot come or go; it can be another one."""
+    is_exchanged = change.old is not None and change.new is not None
+    is_event = change.key in _EVENT_KEYS and not is_exchanged
+    return 'rclpy asks for an event when this is created' if is_event else ''
+
+
 def _modification(
     rules: _Rules, target: Target, name: str, span: Span, changes: list[Change]
 ) -> Operation:
     reasons = (
-        rules.fixed.get(each.key) or rules.fixed.get(each.top_key)
+        rules.fixed.get(each.key) or rules.fixed.get(each.top_key) or _reason_of_event(each)
         for each in changes
         # Where a lifecycle starts counts from the next start.
         if not (each.key == 'lifecycle' and each.old and each.new)

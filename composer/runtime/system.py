@@ -127,6 +127,7 @@ class System:
             self._context, self._executor, self._stop_request, self._processes
         )
         self._processes.on_run = self._driver.begin
+        self._components.on_load = self._driver.begin_component
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = ControlNode(

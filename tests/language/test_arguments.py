@@ -135,7 +135,7 @@ def test_a_file_without_arguments_says_so():
         ('a: {choices: ["{{ b }}"]}', ('bad-argument-declaration', '2:22')),
         ('args: 1', ('bad-argument-declaration', '2:8')),
         ('a..b: 1', ('bad-argument-declaration', '2:8')),
-        ('my-name: 1', ('bad-argument-declaration', '2:8')),
+        ('my name: 1', ('bad-argument-declaration', '2:8')),
         ('true_: 1, "true": 2', ('bad-argument-declaration', '2:18')),
     ],
 )

@@ -6,6 +6,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from composer.entity_kinds import KIND_OF_SECTION
 from composer.language.parsing.entry_parser import (
     Data,
     behaviour_at,
@@ -103,6 +104,7 @@ def _parse_publisher(node: Data, name: str, data: str | Data, path: DataPath) ->
         qos_overrides=_parse_overrides(data.get('qos_overrides', False)),
         local_delivery=_allows_local_delivery(data, node),
         external=data.get('external', False),
+        **_parse_events('publishers', data, path),
         path=path,
     )
 
@@ -122,6 +124,7 @@ def _parse_subscription(node: Data, name: str, data: Data, path: DataPath) -> Su
         read_only=data.get('read_only', False),
         while_inactive=data.get('while_inactive'),
         external=data.get('external', False),
+        **_parse_events('subscriptions', data, path),
         path=path,
         **parse_run_options(data, node),
     )
@@ -207,6 +210,12 @@ def _parse_overrides(data: Any) -> tuple[str, ...]:
     if isinstance(data, bool):
         return _USUAL_OVERRIDES if data else ()
     return tuple(data)
+
+
+def _parse_events(section: str, data: Data, path: DataPath) -> dict[str, Any]:
+    """Return the behaviours for QoS events, by their keys."""
+    keys = [each.key for each in KIND_OF_SECTION[section].behaviours if each.key != 'behaviour']
+    return {key: parse_behaviour(data, path, key) for key in keys}
 
 
 def _full(data: str | Data) -> Data:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
-from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
 from action_msgs.msg import GoalStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
 from composer.errors import (
@@ -21,8 +18,8 @@ from composer.errors import (
 )
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.requests import Requests
-from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.behaviours.waits import WaitNotice
+from composer.runtime.entities.event_behaviours import EventBehaviours
 from composer.runtime.entities.local_goals import GoalClient
 from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
@@ -33,8 +30,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
-    from composer.language.specs import ActionClientSpec
-    from composer.runtime.behaviours.calls import BehaviourCall
+    from composer.language.specs import ActionClientSpec, BehaviourSpec
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -63,7 +59,8 @@ class ActionClient:
             self._unavailable,
             self._unanswered,
         )
-        self._behaviours = _Behaviours(node, spec)
+        self._behaviours = EventBehaviours(node, 'action client', spec.name)
+        self._behaviours.change(_behaviours_of(spec))
         self._goals: WeakSet[Goal] = WeakSet()
         node.at_destruction.append(self._client.destroy)
 
@@ -95,7 +92,7 @@ class ActionClient:
 
     def change(self, spec: ActionClientSpec) -> None:
         """See `LiveEntity`."""
-        self._behaviours.change(spec)
+        self._behaviours.change(_behaviours_of(spec))
         self._local.allow(is_allowed=spec.local_delivery)
 
     def destroy(self) -> None:
@@ -119,14 +116,25 @@ class ActionClient:
 
     def _take_feedback(self, goal: Goal, message: Any) -> None:
         goal.feedback_queue.put(message.feedback)
-        self._behaviours.put('feedback', message.feedback)
+        self._tell('feedback', message.feedback)
+
+    def _tell(self, key: str, item: Any) -> None:
+        if self._behaviours.has(key):
+            # Who holds the goal gets it, too.
+            message_class: type = type(item)
+            self._behaviours.put(key, ownership_of(message_class).copy(item))
 
     def _take_result(self, goal: Goal, future: Future) -> None:
         goal.feedback_queue.put(None)
         if future.exception() is None and (response := future.result()) is not None:
             if response.status != GoalStatus.STATUS_SUCCEEDED:
                 self._logger.warning(f"the goal of '{self._name}' was {goal.status}")
-            self._behaviours.put('result', response.result)
+            self._tell('result', response.result)
+
+
+def _behaviours_of(spec: ActionClientSpec) -> dict[str, BehaviourSpec]:
+    behaviours = {'feedback': spec.feedback, 'result': spec.result}
+    return {key: each for key, each in behaviours.items() if each is not None}
 
 
 class _Client(GoalClient):
@@ -185,70 +193,3 @@ class _Client(GoalClient):
             if message is not None:
                 await super().execute({'feedback': message})
         await super().execute(taken_data)
-
-
-class _Behaviours:
-    """Calls a behaviour for each item, in order, as one of the node's own callbacks.
-
-    What the middleware brings comes in a thread of its own; a guard condition takes it over into
-    the node's callback group, so that the behaviours never run beside the node's others. There is
-    one for all of them: of two, the one triggered last may come first.
-    """
-
-    def __init__(self, node: LiveNode, spec: ActionClientSpec) -> None:
-        self._node = node
-        self._items: deque[tuple[BehaviourCall, Any]] = deque()
-        self._calls: dict[str, BehaviourCall] = {}
-        self._guard: Any = None
-        self.change(spec)
-
-    def change(self, spec: ActionClientSpec) -> None:
-        """Call the behaviours of `spec` from the next item on."""
-        node = self._node
-        behaviours = {'feedback': spec.feedback, 'result': spec.result}
-        self._calls = {
-            key: node.call(
-                Owner('action client', spec.name, key),
-                behaviour.path,
-                node.bind(behaviour),
-                may_begin=node.gate.allows_events,
-            )
-            for key, behaviour in behaviours.items()
-            if behaviour is not None
-        }
-        if not self._calls:
-            self.destroy()
-            return
-        are_async = any(call.is_async for call in self._calls.values())
-        drain = self._drain_async if are_async else self._drain
-        if self._guard is None:
-            self._guard = node.ros.create_guard_condition(drain, callback_group=node.group(None))
-        self._guard.callback = drain
-
-    def destroy(self) -> None:
-        """Call no behaviour any more."""
-        if self._guard is not None:
-            self._node.ros.destroy_guard_condition(self._guard)
-            self._guard = None
-
-    def put(self, key: str, item: Any) -> None:
-        """Let the behaviour under a key, if there is one, be called with an item."""
-        if call := self._calls.get(key):
-            # Who holds the goal gets it, too.
-            message_class: type = type(item)
-            self._items.append((call, ownership_of(message_class).copy(item)))
-            # A server of the same system may be faster than the end of its client.
-            with suppress(AttributeError, InvalidHandle):
-                self._guard.trigger()
-
-    def _drain(self) -> None:
-        while self._items:
-            call, item = self._items.popleft()
-            call.run(item)
-
-    async def _drain_async(self) -> None:
-        while self._items:
-            call, item = self._items.popleft()
-            result = call.run(item)
-            if call.is_async:
-                await result

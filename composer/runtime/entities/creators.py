@@ -66,6 +66,9 @@ def create_entities(nodes: Sequence[LiveNode]) -> None:
             # Last, for its class to find all that it may use.
             if node.parameters is not None:
                 node.parameters.ask(node.spec)
+            for publisher in list(node.entities['publishers'].values()):
+                if isinstance(publisher, Publisher):
+                    publisher.bind_events()
 
 
 def create_entity(node: LiveNode, section: str, spec: Any) -> LiveEntity:
@@ -75,7 +78,10 @@ def create_entity(node: LiveNode, section: str, spec: Any) -> LiveEntity:
         StartError: It cannot be created.
     """
     with _failing_for(node):
-        return CREATORS[section](node, spec)
+        entity = CREATORS[section](node, spec)
+        if isinstance(entity, Publisher):
+            entity.bind_events()
+        return entity
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from sys import getrefcount
 from typing import TYPE_CHECKING
 
 from composer.interfaces.classes import import_interface
+from composer.runtime.entities.event_behaviours import EventBehaviours, events_of
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.ownership import UNHELD_ARGUMENT
 from composer.runtime.messages.payloads import converter_for
@@ -25,6 +26,7 @@ class Publisher:
 
     __slots__ = (
         '_endpoint',
+        '_events',
         '_has_dropped',
         '_local',
         '_node',
@@ -40,12 +42,15 @@ class Publisher:
         self._node = node
         self._spec = spec
         self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
+        self._events = EventBehaviours(node, 'publisher', spec.name)
         self._ros = node.ros.create_publisher(
             message_class,
             spec.topic,
             profile,
             callback_group=node.events,
-            event_callbacks=self._endpoint.publisher_events(),
+            event_callbacks=self._endpoint.publisher_events(
+                self._events.callbacks(events_of(spec))
+            ),
         )
         node.endpoints.append(self._endpoint)
         self._local = node.system.topics.add_publisher(
@@ -83,9 +88,16 @@ class Publisher:
         """See `LiveEntity`."""
         topics = self._node.system.topics
         topics.change_publisher(self._local, is_local=spec.local_delivery)
+        self._spec = spec
+        self.bind_events()
+
+    def bind_events(self) -> None:
+        """Call its behaviours for QoS events from now on; until then, these wait."""
+        self._events.change(events_of(self._spec))
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
+        self._events.destroy()
         self._node.endpoints.remove(self._endpoint)
         self._node.drop_overrides(self._spec, publishes=True)
         self._node.system.topics.remove_publisher(self._local)

@@ -11,6 +11,7 @@ from composer.errors import StartError
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import return_result
 from composer.runtime.behaviours.running_calls import Owner
+from composer.runtime.entities.event_behaviours import EventBehaviours, events_of
 from composer.runtime.health.unmatched import TopicEndpoint
 from composer.runtime.messages.read_only import protector_for
 from composer.runtime.nodes.callback_groups import LifecycleGate
@@ -32,13 +33,16 @@ class Subscription:
         self._owner = Owner('subscription', spec.name)
         profile = node.qos_profile(spec, publishes=False)
         self._endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.placing(spec))
+        self._events = EventBehaviours(node, 'subscription', spec.name)
         self._ros = node.ros.create_subscription(
             import_interface(spec.type),
             spec.topic,
             self._create_callback(spec),
             profile,
             callback_group=node.group(spec.group),
-            event_callbacks=self._endpoint.subscription_events(),
+            event_callbacks=self._endpoint.subscription_events(
+                self._events.callbacks(events_of(spec))
+            ),
             raw=spec.raw,
             **_filter_options(spec),
         )
@@ -47,6 +51,7 @@ class Subscription:
         self._local = node.system.topics.add_subscription(
             node.ros, self._ros, read_only=spec.read_only, reason=_why_sent(spec)
         )
+        self._events.change(events_of(spec), spec)
         node.count_missed(self._owner, self._ros, self._local.inbox)
 
     def change(self, spec: SubscriptionSpec) -> None:
@@ -55,9 +60,11 @@ class Subscription:
         topics.change_subscription(self._local, read_only=spec.read_only)
         self._rest(spec)
         self._ros.callback = self._create_callback(spec)
+        self._events.change(events_of(spec), spec)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
+        self._events.destroy()
         self._node.endpoints.remove(self._endpoint)
         self._node.drop_overrides(self._spec, publishes=False)
         self._node.system.topics.remove_subscription(self._local)

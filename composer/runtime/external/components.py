@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.nodes.system_handle import SystemHandle
 
+OnLoad: TypeAlias = 'Callable[[ExternalProcess, ComponentSpec, Callable[[], bool]], None]'
 _NODE_NAME = '_composer_components'
 _STOP_SEC = 1.0
 _POLL_SEC = 0.05
@@ -57,10 +59,16 @@ class _Loaded:
 
 
 class Components:
-    """Loads and unloads the components of a system."""
+    """Loads and unloads the components of a system.
+
+    Attributes:
+        on_load: Called with each component that was loaded, or that an edit has changed, its
+            container, and what tells whether it has gone.
+    """
 
     def __init__(self, system: SystemHandle) -> None:
         self._system = system
+        self.on_load: OnLoad = lambda _process, _component, _has_ended: None
         self._loaded: dict[tuple[str, str], _Loaded] = {}
         self._clients: dict[str, ContainerClient] = {}
         self._node: RosNode | None = None
@@ -222,11 +230,24 @@ class Components:
         )
         if component.log_level is not None:
             self._set_level(component)
+        self._tell_load(self._loaded[process.spec.name, component.key])
         if process.spec.external and self._watcher is None:
             self._watcher = threading.Thread(
                 target=self._watch, name='composer-components', daemon=True
             )
             self._watcher.start()
+
+    def change(self, container: str, component: ComponentSpec) -> None:
+        """Let a loaded component be kept as an edit says."""
+        with self._lock:
+            at = (container, component.key)
+            if (loaded := self._loaded.get(at)) is not None:
+                self._loaded[at] = replace(loaded, component=component)
+                self._tell_load(self._loaded[at])
+
+    def _tell_load(self, loaded: _Loaded) -> None:
+        at = loaded.process.spec.name, loaded.component.key
+        self.on_load(loaded.process, loaded.component, lambda: self._loaded.get(at) is not loaded)
 
     def _watch(self) -> None:
         """Load components again into containers that were restarted by somebody else."""

@@ -7,7 +7,7 @@ for incompatible types, which only the graph shows.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import TopicEndSpec
 
+_OnEvent: TypeAlias = 'Callable[[Any], None]'
 _PAUSE_SEC = 1.0
 # The graph may learn the name of an end some time after the event.
 _MOST_CHECKS = 10
@@ -78,21 +79,25 @@ class TopicEndpoint:
         """Return its kind, name and place."""
         return f"{self._noun} '{self._spec.name}' ({self._place()})"
 
-    def subscription_events(self) -> SubscriptionEventCallbacks:
-        """Return the event callbacks of a subscription."""
-        return SubscriptionEventCallbacks(
-            incompatible_qos=self._on_incompatible_qos,
-            use_default_callbacks=False,
-            **self.losses.callbacks(),
-        )
+    def subscription_events(self, told: Mapping[str, _OnEvent]) -> SubscriptionEventCallbacks:
+        """Return the event callbacks of a subscription.
 
-    def publisher_events(self) -> PublisherEventCallbacks:
-        """Return the event callbacks of a publisher."""
-        return PublisherEventCallbacks(
-            incompatible_qos=self._on_incompatible_qos,
-            use_default_callbacks=False,
+        Args:
+            told: What else takes events, by rclpy's names of these.
+        """
+        return SubscriptionEventCallbacks(use_default_callbacks=False, **self._callbacks(told))
+
+    def publisher_events(self, told: Mapping[str, _OnEvent]) -> PublisherEventCallbacks:
+        """Return the event callbacks of a publisher; see `subscription_events`."""
+        return PublisherEventCallbacks(use_default_callbacks=False, **self._callbacks(told))
+
+    def _callbacks(self, told: Mapping[str, _OnEvent]) -> dict[str, _OnEvent]:
+        own: dict[str, _OnEvent] = {
+            'incompatible_qos': self._on_incompatible_qos,
             **self.losses.callbacks(),
-        )
+        }
+        both = {name: _one_after_the_other(own.get(name), each) for name, each in told.items()}
+        return {**own, **both}
 
     @property
     def is_due(self) -> bool:
@@ -162,6 +167,17 @@ class TopicEndpoint:
         if not conflicts:
             return None
         return describe_conflicts(conflicts, from_publisher=self._publishes)
+
+
+def _one_after_the_other(first: _OnEvent | None, second: _OnEvent) -> _OnEvent:
+    if first is None:
+        return second
+
+    def call(event: Any) -> None:
+        first(event)
+        second(event)
+
+    return call
 
 
 class GraphWatcher(Watcher):

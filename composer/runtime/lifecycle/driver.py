@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.executor import ComposerExecutor
-    from composer.language.specs import DrivenState
-    from composer.processes.external_process import ProcessRun
+    from composer.language.specs import ComponentSpec, DrivenState
+    from composer.processes.external_process import ExternalProcess, ProcessRun
     from composer.processes.supervisor import ProcessSupervisor
     from composer.runtime.stop_request import StopRequest
 
@@ -83,6 +83,23 @@ class LifecycleDriver:
             target=self._drive_process, args=(run, goal, has_ended), daemon=True
         ).start()
 
+    def begin_component(
+        self, process: ExternalProcess, component: ComponentSpec, is_gone: Callable[[], bool]
+    ) -> None:
+        """Drive a component that was loaded, or that an edit has changed."""
+        if component.lifecycle is None:
+            return
+
+        def has_ended() -> bool:
+            is_over = process.run is not None and process.run.code is not None
+            return is_over or is_gone() or self._stop.is_set
+
+        threading.Thread(
+            target=self._drive_component,
+            args=(process.run, component, component.lifecycle, has_ended),
+            daemon=True,
+        ).start()
+
     def drive(self, name: str, goal: DrivenState, has_ended: Callable[[], bool]) -> str:
         """Bring a node to a state, however long its transitions take.
 
@@ -128,6 +145,23 @@ class LifecycleDriver:
                 self._processes.fail(run)
                 return
             system_logger.info(f"process '{spec.name}': node '{name}' is {goal}")
+
+    def _drive_component(
+        self,
+        run: ProcessRun | None,
+        component: ComponentSpec,
+        goal: DrivenState,
+        has_ended: Callable[[], bool],
+    ) -> None:
+        failure = self.drive(component.full_name, goal, has_ended)
+        if has_ended():
+            return
+        if not failure:
+            system_logger.info(f"component '{component.key}' is {goal}")
+            return
+        system_logger.error(f"component '{component.key}': {failure}")
+        if run is not None:
+            self._processes.fail(run)
 
 
 def driven_nodes(spec: Any) -> Iterable[str]:

@@ -161,13 +161,15 @@ class EntityCreation:
     ) -> CreatedEntity:
         entities = node.entities[section]
         asked, default_name = names
-        if asked in entities:
+        # Those that are declared may not be there yet.
+        taken = {*entities, *getattr(node.spec, section)}
+        if asked in taken:
             noun = KIND_OF_SECTION[section].noun
             message = f"node '{node.spec.name}' has a {noun} '{asked}' already"
             raise EntityError(message, help="give it another 'name'")
         numbered = (f'{default_name}_{number}' for number in count(2))
         name = asked or default_name
-        while name in entities:
+        while name in taken:
             name = next(numbered)
         if behaviour is not None:
             data['behaviour'] = f'{_CREATED}:{section}/{name}'

@@ -206,6 +206,10 @@ class Rewiring:
                 old = self._old.spec.processes[container].components[key]
                 self._components.unload(container, key)
                 self._transaction.on_undo(self._components.load, process, old)
+            if operation.action is Action.CHANGE:
+                self._transaction.on_commit(
+                    self._components.change, container, after.components[key]
+                )
             if operation.action in COMING:
                 self._transaction.on_undo(self._components.unload, container, key)
                 yield process, after.components[key]

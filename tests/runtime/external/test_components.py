@@ -6,6 +6,7 @@ The containers are stand-ins in Python: see `tests/container_program.py`.
 import json
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -194,6 +195,15 @@ def test_an_edit_loads_and_unloads_what_it_names(compose, listed):
     edit(a=stays)
     child.wait_for_line('reloaded in ', times=2)
     assert listed('/perception') == {1: '/a'}
+    restarted = subprocess.run(
+        [sys.executable, '-m', 'composer', 'restart', 'a'],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert restarted.stdout == "system: node '/a' was restarted\n", restarted.stderr
+    assert list(listed('/perception').values()) == ['/a']
+    assert 1 not in listed('/perception')
     assert child.stop() == 0
 
 
@@ -235,4 +245,23 @@ def test_the_nodes_of_a_system_are_listed_as_those_of_a_container(compose, peer,
     assert answer.error_message == (
         "the nodes of a system are those of its file: edit it, then 'composer reload system'"
     )
+    assert child.stop() == 0
+
+
+def test_a_component_is_brought_to_a_state_whenever_it_is_loaded(compose):
+    components = {
+        'driver': component('Managed', lifecycle='active'),
+        'filter': component(
+            'Managed', lifecycle='inactive', wait_for={'node': 'driver', 'state': 'active'}
+        ),
+    }
+    text = system({'lidar': container(components, restart={'delay': 0})})
+    child = compose(text, CODE, '--watch')
+    child.wait_for_line("component 'driver' is active")
+    child.wait_for_line("component 'filter' is inactive")
+    path = compose.folder / 'system.yaml'
+    path.write_text(path.read_text().replace('"inactive"', '"active"'))
+    child.wait_for_line("component 'filter' is active")
+    os.kill(container_of(child), signal.SIGKILL)
+    child.wait_for_line("component 'driver' is active", times=2)
     assert child.stop() == 0

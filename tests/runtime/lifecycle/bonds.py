@@ -49,6 +49,7 @@ class Bond:
 
     def end(self):
         self._say(is_active=False)
+        self._has_died = True
         self._timer.cancel()
         self._node.destroy_timer(self._timer)
         self._node.destroy_subscription(self._subscription)

@@ -12,9 +12,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+
+from composer.executor import ComposerExecutor
 
 RCLError = rclpy_implementation.RCLError
 NAME = sys.argv[1]
@@ -72,7 +74,8 @@ sys.stdout.write(f'pid {os.getpid()}\n')
 sys.stdout.flush()
 rclpy.init()
 node = Managed(NAME)
-executor = MultiThreadedExecutor()
+# See manager.py.
+executor = ComposerExecutor()
 executor.add_node(node)
 with suppress(KeyboardInterrupt, ExternalShutdownException):
     executor.spin()

@@ -7,9 +7,9 @@ import rclpy
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 
+from composer.executor import ComposerExecutor
 from tests.runtime.lifecycle.bonds import Bond
 
 GOALS = {
@@ -46,7 +46,8 @@ class Manager:
             for name in names
             for kind, service in ((ChangeState, 'change_state'), (GetState, 'get_state'))
         }
-        self._executor = MultiThreadedExecutor(4, context=self._context)
+        # rclpy's end with an error where another thread cancels or destroys what they wait for.
+        self._executor = ComposerExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()

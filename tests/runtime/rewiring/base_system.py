@@ -66,6 +66,14 @@ class Kept:
         return 'k'
 
 
+def notice(node, event):
+    node.logger.debug(str(event))
+
+
+async def notice_later(node, event):
+    node.logger.debug(str(event))
+
+
 def adjust(node, changes):
     node.logger.debug(f"changed {sorted(changes)}")
 

@@ -98,6 +98,7 @@ def describe_entity(node, section, name, entity):
     ros = ros_of(entity)
     described = {'place': node.place(getattr(node.spec, section)[name].path)}
     described['bound'] = describe_bound(entity)
+    described['events'] = describe_bound(getattr(entity, '_events', None))
     group = getattr(ros, 'callback_group', None)
     described['group'] = (type(group).__name__, group_of(node, group))
     if section in ('publishers', 'subscriptions'):
@@ -190,10 +191,10 @@ def _referred(each):
 
 
 # Nodes; and goals in flight, which end on the code that they began with.
-_NOT_FOLLOWED = ('_node', '_live_node', '_goal_handles', '_result_futures', '_queue')
+_NOT_FOLLOWED = ('_node', '_live_node', '_goal_handles', '_result_futures', '_queue', '_events')
 _HOLDERS = {
     *('Publisher', 'Subscription', 'Timer', 'Service', 'ServiceClient', 'ActionServer'),
-    *('ActionClient', '_Ticker', '_Execution', '_Behaviours', 'BehaviourCall'),
+    *('ActionClient', '_Ticker', '_Execution', 'EventBehaviours', 'BehaviourCall'),
 }
 
 

@@ -18,6 +18,7 @@ _EXTERNAL = [True, '{{ 1 < 2 }}', 'yes', None]
 _TYPES = ['std_msgs/msg/String', 'std_msgs/msg/Header', 'nowhere/msg/Wrong', 'String']
 _INTROSPECTION = ['metadata', 'contents', 'off', 'all', None]
 _OVERRIDES = [True, ['depth', 'deadline'], ['dept'], None]
+_EVENT = ['parts:notice', 'parts:notice_later', 'parts:notce', None]
 _TOPIC = ['out', 'far', '/away', '~/own', 'bad name', None]
 _QOS = [None, 5, 'near', 'sensor_data', 'nearest', {'depth': 7}, {'dept': 1}]
 _TRIGGERS = ['std_srvs/srv/Trigger', 'std_srvs/srv/Empty', 'std_srvs/srv/Trager']
@@ -145,6 +146,10 @@ VALUES = {
     'publisher.foreach': _FOREACH,
     'publisher.when': _WHEN,
     'publisher.qos_overrides': _OVERRIDES,
+    'publisher.on_deadline_missed': _EVENT,
+    'publisher.on_liveliness_lost': _EVENT,
+    'publisher.on_incompatible_qos': _EVENT,
+    'publisher.on_matched': _EVENT,
     'publisher.type': _TYPES,
     'publisher.topic': _TOPIC,
     'publisher.qos': _QOS,
@@ -160,6 +165,11 @@ VALUES = {
     'subscription.when': _WHEN,
     'subscription.qos_overrides': _OVERRIDES,
     'subscription.raw': [True, False, 'bytes', None],
+    'subscription.on_deadline_missed': _EVENT,
+    'subscription.on_liveliness_changed': _EVENT,
+    'subscription.on_incompatible_qos': _EVENT,
+    'subscription.on_message_lost': _EVENT,
+    'subscription.on_matched': _EVENT,
     'subscription.type': _TYPES,
     'subscription.topic': _TOPIC,
     'subscription.qos': _QOS,
@@ -298,7 +308,7 @@ _OF_CONTAINERS = (
 )
 _OF_COMPONENTS = (
     *('foreach', 'when', 'description', 'package', 'plugin', 'namespace', 'parameters'),
-    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for'),
+    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for', 'lifecycle'),
 )
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
 LEFT_OUT: dict[str, str] = {

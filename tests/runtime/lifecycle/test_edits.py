@@ -1,0 +1,135 @@
+"""Edits of a node with a lifecycle: applied in whatever state it is, which it keeps."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+
+from tests.running import ROOT
+
+pytestmark = pytest.mark.ros
+
+CODE = """
+def tick(node, text='tick'):
+    node.logger.info(text)
+
+def tell(node, text):
+    node.logger.info(text)
+"""
+SYSTEM = """
+version: 1
+nodes:
+  lidar:
+    lifecycle: true
+    timers: {tick: {period: 0.02, behaviour: 'parts:tick'}}
+    on_activate: {behaviour: 'parts:tell', with: {text: activated}}
+    on_deactivate: {behaviour: 'parts:tell', with: {text: deactivated}}
+"""
+
+
+def change(peer, transition):
+    request = Transition(id=transition)
+    assert peer.call(ChangeState, 'lidar/change_state', transition=request).success
+
+
+def state_of(peer):
+    return peer.call(GetState, 'lidar/get_state').current_state.label
+
+
+def edit(compose, child, *replaced):
+    path = compose.folder / 'system.yaml'
+    text = path.read_text()
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    reloads = len(child.matching('reloaded in'))
+    path.write_text(text)
+    child.wait_for_line('reloaded in', times=reloads + 1)
+
+
+def ask(*arguments):
+    done = subprocess.run(
+        [sys.executable, '-m', 'composer', *arguments, '--format', 'json'],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
+    child = compose(SYSTEM, CODE, '--watch')
+    child.wait_until_ready()
+    change(peer, Transition.TRANSITION_CONFIGURE)
+    # While it rests: a timer that comes rests, too, and a behaviour is another one.
+    edit(
+        compose,
+        child,
+        (
+            'timers: {',
+            "timers: {other: {period: 0.02, behaviour: 'parts:tick', with: {text: tock}}, ",
+        ),
+        ('activated', 'up'),
+    )
+    assert not child.matching('[lidar]: t')
+    change(peer, Transition.TRANSITION_ACTIVATE)
+    assert child.matching('[lidar]: up')
+    child.wait_for_line('[lidar]: tock', times=3)
+    child.wait_for_line('[lidar]: tick', times=3)
+    # Where it starts counts from the next start.
+    edit(compose, child, ('lifecycle: true', 'lifecycle: {start: inactive}'))
+    assert state_of(peer) == 'active'
+    # One that is recreated comes back to its state.
+    edit(compose, child, ('lifecycle: {', 'remap: {a: b}\n    lifecycle: {'))
+    assert child.matching('[lidar]: deup')
+    assert len(child.matching('[lidar]: up')) == 2
+    assert state_of(peer) == 'active'
+    ticks = len(child.matching('[lidar]: tick'))
+    child.wait_for_line('[lidar]: tick', times=ticks + 3)
+    # Without a lifecycle it works at once.
+    edit(
+        compose,
+        child,
+        ('    lifecycle: {start: inactive}\n', ''),
+        ("    on_activate: {behaviour: 'parts:tell', with: {text: up}}\n", ''),
+        ("    on_deactivate: {behaviour: 'parts:tell', with: {text: deup}}\n", ''),
+    )
+    ticks = len(child.matching('[lidar]: tick'))
+    child.wait_for_line('[lidar]: tick', times=ticks + 3)
+    assert child.stop() == 0
+
+
+def test_an_edit_that_cannot_come_back_to_its_state_is_undone(compose, peer):
+    child = compose(SYSTEM, CODE, '--watch')
+    child.wait_until_ready()
+    change(peer, Transition.TRANSITION_CONFIGURE)
+    change(peer, Transition.TRANSITION_ACTIVATE)
+    path = compose.folder / 'system.yaml'
+    text = path.read_text().replace('    lifecycle', '    remap: {a: b}\n    lifecycle')
+    (compose.folder / 'parts.py').write_text(CODE + '\ndef refuse(node):\n    return False\n')
+    path.write_text(
+        text.replace("{behaviour: 'parts:tell', with: {text: activated}}", 'parts:refuse')
+    )
+    child.wait_for_line("node 'lidar': on_activate returned False")
+    child.wait_for_line('[lidar]: activated', times=2)
+    child.wait_for_line('[lidar]: tick')
+    assert state_of(peer) == 'active'
+    assert child.stop() == 0
+
+
+def test_the_state_is_shown(compose, peer):
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    (system,) = ask('ps')['systems']
+    assert system['lifecycles'] == {'/lidar': 'unconfigured'}
+    change(peer, Transition.TRANSITION_CONFIGURE)
+    rows = [each for each in ask('top', '--once')['entities'] if each['kind'] == 'lifecycle']
+    assert [(each['node'], each['name']) for each in rows] == [('/lidar', 'inactive')]
+    assert child.stop() == 0
