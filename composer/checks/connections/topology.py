@@ -350,6 +350,9 @@ class _UncertainNames:
 
 
 _OWNERS = (('nodes',), ('processes',))
+# Where the nodes of a process stand, and what may bring any end.
+_INNER = (('nodes',), ('components',))
+_OPEN = ('nodes', 'components', 'nodl')
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4
@@ -362,7 +365,7 @@ _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
 
 def _depth_of(path: DataPath) -> int:
     """Return how much deeper the sections are for a node of a process."""
-    return 2 if path[0] == 'processes' and path[2:3] == ('nodes',) else 0
+    return 2 if path[0] == 'processes' and path[2:3] in _INNER else 0
 
 
 def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
@@ -371,7 +374,7 @@ def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
     section = str(path[depth]) if len(path) > depth else ''
     if section in _WITHOUT_CHANNELS and path[0] != 'include':
         return set()
-    if path[0] == 'processes' and section and section not in (*KIND_OF_SECTION, 'nodes', 'nodl'):
+    if path[0] == 'processes' and section and section not in (*KIND_OF_SECTION, *_OPEN):
         return set()
     # An unknown key may be any section, misspelt.
     known = KIND_OF_SECTION.get(section)
