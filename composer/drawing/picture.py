@@ -209,8 +209,11 @@ def _edges(
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
             node = ids[end.node.path[:2]]
+            # A process may have several nodes.
+            inner = '/'.join(map(str, end.node.path[3:]))
+            owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
             yield Edge(
-                f'{end.kind.noun}:{node.partition(":")[2]}:{end.entity.name}',
+                f'{end.kind.noun}:{owner}:{end.entity.name}',
                 _role(end),
                 sends(channel.kind, provides=end.kind.provides),
                 end.entity.name,
