@@ -7,6 +7,7 @@ Source: https://github.com/ament/ament_cmake/blob/master/ament_cmake_core/doc/re
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import sys
@@ -129,6 +130,15 @@ def list_components(package: str) -> list[str]:
         text = (prefix / COMPONENT_INDEX / package).read_text(encoding='utf-8')
         return [line.partition(';')[0] for line in text.splitlines() if line]
     return []
+
+
+@cache
+def has_content_filters() -> bool | None:
+    """Return whether the installed rclpy filters by content, since Kilted; `None` without one."""
+    spec = importlib.util.find_spec('rclpy')
+    if spec is None or spec.origin is None:
+        return None
+    return (Path(spec.origin).parent / 'subscription_content_filter_options.py').is_file()
 
 
 @cache

@@ -36,6 +36,7 @@ from composer.checks.parameters import check_parameters
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import (
+    check_content_filters,
     check_publish,
     check_qos,
     check_start_values,
@@ -65,6 +66,7 @@ SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
 NODE_RULES: tuple[CheckRule, ...] = (
     check_names,
     check_qos,
+    check_content_filters,
     check_publish,
     check_types,
     check_messages,

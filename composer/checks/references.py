@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from composer.ament import explain_missing_package
+from composer.ament import explain_missing_package, has_content_filters
 from composer.diagnostics import diagnostic_at
 from composer.interfaces.descriptions import MessageDescription
 from composer.language.includes.include_entry import shown_path
@@ -119,6 +119,21 @@ def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]
     if not context.was_dropped(('qos', error.spec.profile)):
         path = context.inner(error.spec.path, 'profile')
         yield context.at_value(path, 'cyclic-qos-profile', str(error))
+
+
+def check_content_filters(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that the installed rclpy has content filters, if any are wanted."""
+    if has_content_filters() is not False:
+        return
+    for node in context.spec.nodes.values():
+        for subscription in node.subscriptions.values():
+            if subscription.content_filter:
+                yield context.at_key(
+                    (*subscription.path, 'content_filter'),
+                    'no-content-filter',
+                    'this rclpy has no content filters: ROS 2 has them for Python since Kilted',
+                    help='let the behaviour return what it does not want',
+                )
 
 
 def check_types(context: CheckContext) -> Iterator[Diagnostic]:

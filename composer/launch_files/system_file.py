@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
 from composer.launch_files.texts import Computed, Text
-from composer.schema.structure import known_keys
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
@@ -34,8 +33,6 @@ def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
         stem: The name of the system, for the folder of its parameter files.
     """
     written = SystemFile()
-    if 'containers' not in known_keys(''):
-        _leave_components_out(imported)
     lines = [f'# Imported from {source}.', 'version: 1']
     lines += _arguments(imported.arguments.values())
     common = _common_environment(imported.entries)
@@ -56,16 +53,6 @@ def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
         lines += [f'# {" ".join(remark.split())}' for remark in imported.remarks]
     written.text = '\n'.join(lines) + '\n'
     return written
-
-
-def _leave_components_out(imported: Imported) -> None:
-    """Make plain processes of containers."""
-    for entry in [each for each in imported.entries if each.section == 'containers']:
-        names = ', '.join(entry.data.pop('components', ()))
-        imported.remarks.append(f"'{entry.name}': its components cannot be kept: {names}")
-        entry.section = 'processes'
-        if entry.data.get('external'):
-            imported.entries.remove(entry)
 
 
 def _arguments(arguments: Any) -> list[str]:

@@ -55,7 +55,7 @@ def test_each_difference_is_told():
         '-remap: a -> b',
         '-parameter: x = 1',
         '-environment: LEVEL=1',
-        '+namespace: None',
+        '+namespace: /',
         '+parameter: x = 1.0',
         '+environment: LEVEL=2',
     ]

@@ -16,6 +16,8 @@ from composer.rules.examples import load_example
 WITHOUT = {
     # Only a ROS that remaps no actions shows it.
     'ignored-remap',
+    # Only a ROS without content filters for Python shows it.
+    'no-content-filter',
     # It is about the command line, not about a file.
     'nothing-to-check',
     # It takes several files at once.

@@ -47,7 +47,7 @@ class Given:
     program: str
     arguments: list[str] = field(default_factory=list)
     name: str | None = None
-    namespace: str | None = None
+    namespace: str = '/'
     remaps: dict[str, str] = field(default_factory=dict)
     parameters: dict[str, Any] = field(default_factory=dict)
     others: list[str] = field(default_factory=list)
@@ -57,7 +57,7 @@ class Given:
     @property
     def label(self) -> str:
         """How the process is called in a report."""
-        name = f' {join_names(self.namespace or "/", self.name)}' if self.name else ''
+        name = f' {join_names(self.namespace, self.name)}' if self.name else ''
         return f'{Path(self.program).name}{name}'
 
     def lines(self) -> Iterator[str]:
@@ -120,7 +120,7 @@ def _add_remap(given: Given, rule: str) -> None:
     if old in ('__node', '__name'):
         given.name = given.name or new
     elif old == '__ns':
-        given.namespace = given.namespace or expand_namespace(new)
+        given.namespace = expand_namespace(new)
     else:
         given.remaps.setdefault(old, new)
 
@@ -142,7 +142,7 @@ def _merged(sources: list[Any], given: Given) -> dict[str, Any]:
     if given.name is None:
         flat = ((node, values) for node, values in by_node.items())
         return {f'{node}: {key}': value for node, vals in flat for key, value in vals.items()}
-    full = join_names(given.namespace or '/', given.name)
+    full = join_names(given.namespace, given.name)
     merged: dict[str, Any] = {}
     for node, values in by_node.items():
         if matches_pattern(node, full):

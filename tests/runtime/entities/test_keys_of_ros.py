@@ -138,6 +138,5 @@ def test_the_keys_do_what_ros_does(compose, peer):
     wait_for(lambda: asked(1) and events[-1].response, 'contents in the events')
     compose.write(SYSTEM.replace('raw: true', "content_filter: {expression: data = 'hi'}"), CODE)
     if importlib.util.find_spec('rclpy.subscription_content_filter_options') is None:
-        told = child.wait_for_line('not reloaded')
-        assert "the content_filter of subscription 'raw' needs a newer ROS 2" in told
+        child.wait_for_line('error[no-content-filter]: this rclpy has no content filters')
     assert child.stop() == 0

@@ -157,12 +157,12 @@ def _stays(key, operation):
     """Return whether an operation on something leaves this of it as it was."""
     if operation is None:
         return True
-    if operation.action is Action.RECREATE:
-        return key.startswith(('own_state', 'health'))
     changed = {each.top_key for each in operation.changes}
-    if key == 'phase':
-        return not {'period', 'rate'} & changed
     if key.startswith('health') and key.endswith(')'):
         # As of `action 'count' (accept)`: the edit may remove just that.
         return key.rpartition('(')[2][:-1] not in changed
+    if operation.action is Action.RECREATE:
+        return key.startswith(('own_state', 'health'))
+    if key == 'phase':
+        return not {'period', 'rate'} & changed
     return key not in ('bound', 'value', 'descriptor')
