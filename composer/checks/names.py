@@ -63,7 +63,8 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
 def _check_declared(context: CheckContext, node: DeclaredNodeSpec) -> Iterator[Diagnostic]:
     """Check the names in what an external process is said to have."""
     is_apart = node.path[-1] != node.process
-    if is_apart and (problem := find_node_name_problem(node.name)):
+    is_component = node.path[-2:-1] == ('components',)
+    if is_apart and not is_component and (problem := find_node_name_problem(node.name)):
         message = f"'{node.name}' cannot name a node: {problem}"
         yield context.at_key(node.path, _RULE, message)
         return

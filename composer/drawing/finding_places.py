@@ -115,7 +115,10 @@ class _PathFinder:
 
 def _end_of(path: DataPath) -> DataPath:
     """Return the part of a path that an end would have; a process may have several nodes."""
-    is_inside = path[:1] == ('processes',) and path[_NODE : _NODE + 1] == ('nodes',)
+    is_inside = path[:1] == ('processes',) and path[_NODE : _NODE + 1] in (
+        ('nodes',),
+        ('components',),
+    )
     return path[: _ENTITY + 2 if is_inside else _ENTITY]
 
 

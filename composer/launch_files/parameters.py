@@ -87,7 +87,7 @@ class ParameterReader:
         if isinstance(written, tuple) and written and isinstance(written[0], list | tuple):
             return [self._resolver.text(each).typed() for each in written]
         if isinstance(written, tuple) and written and hasattr(written[0], 'perform'):
-            return self._command(written) or self._resolver.text(written).typed()
+            return self._command(written) or self._kept(self._resolver.text(written)).typed()
         return list(written) if isinstance(written, tuple) else written
 
     def _described(self, written: Any) -> Any:
@@ -98,11 +98,16 @@ class ParameterReader:
         if command:
             return command
         if kind in (None, str):
-            text = self._resolver.text(value)
+            text = self._kept(self._resolver.text(value))
             return text.written() if kind is str else text.typed()
         if isinstance(value, list | tuple) and value and not hasattr(value[0], 'perform'):
             return [self._typed(each, kind) for each in value]
         return self._typed(value, kind)
+
+    def _kept(self, text: Text) -> Text:
+        if self._resolver.is_new_file(text.text):
+            self._remark(f"'{text.text}' was written by the import itself: keep a copy of it")
+        return text
 
     def _typed(self, written: Any, kind: Any) -> Any:
         if isinstance(written, bool | int | float):

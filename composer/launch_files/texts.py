@@ -189,7 +189,7 @@ def split_words(text: Text) -> list[Text]:
     for part in text.parts:
         if isinstance(part, Code):
             plain += f'\ue003{len(codes)}\ue004'
-            codes.append(part)
+            codes.append(_without_quotes(part))
         else:
             plain += part
     words = []
@@ -202,6 +202,15 @@ def split_words(text: Text) -> list[Text]:
         )
         words.append(Text(parts))
     return words
+
+
+def _without_quotes(part: Code) -> Code:
+    """Return a part of a command line without the quotes that a shell takes away from it."""
+    for quote in '"', "'":
+        if quote in part.text:
+            code = f'({part.code} | replace({quote!r}, {""!r}))'
+            part = Code(code, part.text.replace(quote, ''), part.kind)
+    return part
 
 
 def _written_part(part: str | Code) -> str:

@@ -96,6 +96,8 @@ def test_names_are_those_of_the_process():
 def test_private_names_are_unknown_where_the_name_of_the_node_is():
     camera = CAMERA.replace('    image: {', '    image: {topic: ~/image, ')
     assert not check(camera + BASE)
+    (finding,) = check(camera.replace('msg/Image', 'msg/Imu') + BASE)
+    assert (finding.rule, finding.span.text) == ('no-publisher', 'image')
 
 
 SEVERAL = """\
@@ -135,6 +137,44 @@ def test_what_a_program_publishes_need_not_be_heard_but_what_it_hears_is_missed(
     assert (finding.rule, finding.span.text) == ('no-publisher', 'odom')
     elsewhere = '{odom: {type: std_msgs/msg/String, external: true}, cmd_vel'
     assert not check(CAMERA + BASE.replace('{cmd_vel', elsewhere))
+
+
+CONTAINER = """\
+containers:
+  robot:
+    command: ['true']
+    components:
+      camera:
+        package: image_tools
+        plugin: image_tools::Cam2Image
+        remap: {picture: image}
+        parameters: {rate: {type: double, default: 2}, size: {type: integer_array}}
+        publishers: {picture: {type: sensor_msgs/msg/Image, qos: sensor_data}}
+        services: {set_camera_info: sensor_msgs/srv/SetCameraInfo}
+        actions: {fibonacci: test_msgs/action/Fibonacci}
+      base: {package: base, plugin: 'base::Base', %s}
+"""
+
+
+def test_components_have_ends_as_processes_do():
+    def rules(container):
+        text = f'version: 1\n{NODES}{container}'
+        system = load_system_text(text)
+        assert system.spec.processes['robot'].components['camera'].parameters == {'rate': 2.0}
+        found = check_system(system, InterfaceCatalogue())
+        said = ('no-', 'conflicting', 'likely')
+        return [each.rule for each in found if each.rule.startswith(said)]
+
+    whole = CONTAINER % 'subscriptions: {cmd_vel: geometry_msgs/msg/Twist}'
+    assert not rules(whole)
+    assert rules(whole.replace('{cmd_vel:', '{vel:')) == ['no-subscription', 'no-publisher']
+    assert rules(whole.replace('{picture: image}', '{pictures: image}')) == [
+        *('no-publisher', 'likely-misspelling'),
+    ]
+    assert rules(whole.replace('msg/Image', 'msg/Imu')) == ['conflicting-types']
+    assert not rules(CONTAINER % 'namespace: x')
+    outside = whole.replace("command: ['true']", 'external: true').replace('{cmd_vel:', '{vel:')
+    assert not rules(outside)
 
 
 @pytest.mark.parametrize(

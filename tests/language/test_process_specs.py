@@ -183,3 +183,49 @@ def test_names_of_included_processes_hold_where_they_are_started_and_waited_for(
     assert [each.start for each in processes['left_homing'].on_exit] == [None, 'left_mission']
     assert conditions(processes['left_mission']) == [('process', 'left_homing')]
     assert [name for name, each in processes.items() if each.on_demand] == ['left_mission']
+
+
+def test_components_lie_where_defaults_and_includes_put_them(load):
+    part = """
+        version: 1
+        args: {count: 2}
+        defaults: {namespace: drivers, use_sim_time: true, log_level: warn}
+        nodes: {n: {wait_for: {node: left/filter_1}}}
+        containers:
+          container:
+            components:
+              "filter_{{ i }}":
+                foreach: {i: "{{ range(count) }}"}
+                package: vendor
+                plugin: vendor::Filter
+                namespace: left
+                remap: {points: cloud}
+                wait_for: {process: container}
+              /far/other: {package: vendor, plugin: "vendor::Other", when: "{{ count > 2 }}"}
+          /lidar/container: {components: {it: {package: vendor, plugin: "vendor::It"}}}
+    """
+    robot = """
+        version: 1
+        include: {arm: {file: part.yaml, namespace: arm, remap: {points: /all}}}
+        processes: {container: {command: [a]}}
+    """
+    system = load(robot=robot, part=part)
+    processes = system.spec.processes
+
+    own, other = processes['arm_container'], processes['/lidar/container']
+    assert (own.package, own.executable) == ('rclcpp_components', 'component_container')
+    assert (own.full_name, own.external) == ('/arm/drivers/container', False)
+    assert (other.full_name, other.external) == ('/lidar/container', True)
+    names = {key: each.full_name for key, each in own.components.items()}
+    assert names == {f'filter_{i}': f'/arm/drivers/left/filter_{i}' for i in range(2)}
+    assert [each.full_name for each in other.components.values()] == ['/arm/drivers/it']
+    first = own.components['filter_0']
+    assert first.remap == (('points', '/all'),)
+    assert (dict(first.parameters), first.log_level) == ({'use_sim_time': True}, 'warn')
+    assert conditions(first) == [('process', 'arm_container')]
+    place = system.positions.value((*first.path, 'plugin'))
+    assert (place.source.name.rpartition('/')[2], place.line) == ('part.yaml', 12)
+    assert list(system.unused.processes['arm_container'].components) == [
+        *('filter_0', 'filter_1'),
+        '/far/other',
+    ]

@@ -8,6 +8,7 @@ from composer.launch_files.description_reader import DescriptionReader
 from composer.launch_files.place import Place
 from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
+from composer.launch_files.texts import Text, joined, one, split_words
 from tests.launch_files import stand_ins as launch
 
 SIDE = launch.LaunchConfiguration('side')
@@ -117,6 +118,12 @@ def test_what_a_node_is_given(tmp_path, entity, data):
     (process,) = yaml.safe_load(system.text)['processes'].values()
     assert process == {'package': 'arm', 'executable': 'drive', **data}
     resolved(tmp_path, system)
+
+
+def test_quotes_in_the_default_of_a_word_are_those_of_a_shell():
+    words = split_words(joined((Text(('xacro prefix:=',)), one('prefix', '""'), Text((' -x',)))))
+    assert [each.text for each in words] == ['xacro', 'prefix:=', '-x']
+    assert words[1].written() == """prefix:={{ (prefix | replace('"', '')) }}"""
 
 
 def test_arguments_remain_arguments(tmp_path):

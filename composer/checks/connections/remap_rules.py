@@ -15,11 +15,17 @@ from composer.names import expand_name, find_topic_name_problem
 from composer.spelling import did_you_mean, find_nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.language.specs import ActionClientSpec, ActionSpec, NodeSpec, ProcessSpec
+    from composer.language.specs import (
+        ActionClientSpec,
+        ActionSpec,
+        DeclaredNodeSpec,
+        NodeSpec,
+        ProcessSpec,
+    )
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'likely-misspelling'
@@ -47,8 +53,8 @@ def check_remap_rules(context: CheckContext) -> Iterator[Diagnostic]:
         for rule, verdict in _check_node(context, node):
             note(node.path, rule, verdict)
     for process in context.spec.processes.values():
-        for rule, verdict in _check_process(context, process):
-            note(process.path, rule, verdict)
+        for path, rule, verdict in _check_process(context, process):
+            note(path, rule, verdict)
     for span, (rule, finding) in found.items():
         if span not in matching and rule not in matching_rules:
             yield finding
@@ -81,37 +87,63 @@ def _check_node(
 
 def _check_process(
     context: CheckContext, process: ProcessSpec
-) -> Iterator[tuple[tuple[str, str], _Verdict]]:
-    """Yield the rules of a process, each with its verdict."""
-    for rule in process.remap:
-        path = (*process.path, 'remap', rule[0])
+) -> Iterator[tuple[DataPath, tuple[str, str], _Verdict]]:
+    """Yield the rules of a process and of its components, each with its owner and verdict."""
+    components = [node for node in process.nodes if node.path[-2:-1] == ('components',)]
+    others = [node for node in process.nodes if node not in components]
+    title = f"process '{process.name}'"
+    is_open = not process.declares_all_ends or bool(components)
+    yield from _check_declared(
+        context, title, process.path, others, process.remap, is_open=is_open
+    )
+    for node in components:
+        title = f"component '{node.name}'"
+        is_open = node.sections is None
+        yield from _check_declared(context, title, node.path, [node], node.remap, is_open=is_open)
+
+
+def _check_declared(
+    context: CheckContext,
+    title: str,
+    path: DataPath,
+    nodes: Sequence[DeclaredNodeSpec],
+    rules: Sequence[tuple[str, str]],
+    *,
+    is_open: bool,
+) -> Iterator[tuple[DataPath, tuple[str, str], _Verdict]]:
+    """Yield rules for declared nodes with their verdicts.
+
+    Args:
+        path: That of the owner of the rules.
+        is_open: Whether the nodes may have more than is declared.
+    """
+    names = {
+        expand_name(end.channel, node.name, node.namespace)
+        for node in nodes
+        for _, end in node.ends()
+    }
+    for rule in rules:
         bare = rule[0].rpartition('://')[2]
         if not _is_rule(rule[0]):
             continue
-        names = {
-            expand_name(end.channel, node.name, node.namespace)
-            for node in process.nodes
-            for _, end in node.ends()
-        }
-        meant = {expand_name(bare, node.name, node.namespace) for node in process.nodes}
-        is_for_ros = any(_is_of_ros(context, name) for name in meant)
+        meant = {expand_name(bare, node.name, node.namespace) for node in nodes}
         if meant & names:
-            yield rule, True
+            yield path, rule, True
             continue
-        if is_for_ros or not meant or _may_mean_more(process, bare):
-            yield rule, False
+        is_for_ros = any(_is_of_ros(context, name) for name in meant)
+        if is_open or is_for_ros or not meant or _may_mean_more(nodes, bare):
+            yield path, rule, False
             continue
-        namespace, name = process.namespace or '/', min(meant)
-        message = f"process '{process.name}' has nothing called '{name}', and ROS ignores the rule"
-        help_text = did_you_mean(_find_meant(bare, name, names, namespace))
-        yield rule, context.at_key(path, _RULE, message, help=help_text)
+        name = min(meant)
+        message = f"{title} has nothing called '{name}', and ROS ignores the rule"
+        help_text = did_you_mean(_find_meant(bare, name, names, nodes[0].namespace))
+        at = (*path, 'remap', rule[0])
+        yield path, rule, context.at_key(at, _RULE, message, help=help_text)
 
 
-def _may_mean_more(process: ProcessSpec, source: str) -> bool:
-    """Return whether nobody knows all names that a process has."""
-    if not process.declares_all_ends:
-        return True
-    nameless = [node for node in process.nodes if not node.is_named]
+def _may_mean_more(nodes: Sequence[DeclaredNodeSpec], source: str) -> bool:
+    """Return whether nobody knows all names that nodes have."""
+    nameless = [node for node in nodes if not node.is_named]
     private = (end.channel.startswith('~') for node in nameless for _, end in node.ends())
     return any(private) or (bool(nameless) and source.startswith('~'))
 

@@ -226,8 +226,11 @@ def build_topology(
     possible: set[PossibleEnd] = set(uncertain.missing)
     for node, kind, channel_kind, entity in _ends(spec.end_owners()):
         name = written_name(entity, kind)
-        if uncertain.has(node, entity.path, channel_kind, name):
+        if uncertain.has(node, entity.path, channel_kind):
             possible.add((channel_kind, kind.provides, None))
+            continue
+        if name.startswith('~') and not (isinstance(node, NodeSpec) or node.is_named):
+            possible.add((channel_kind, kind.provides, entity.type))
             continue
         # Without a type, too, it would be a reason to say nothing of any other.
         if is_misnamed(system.positions, node, name) and has_real_type(entity):
@@ -331,13 +334,9 @@ class _UncertainNames:
         }
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
-    def has(
-        self, node: NodeSpec | DeclaredNodeSpec, entity: DataPath, kind: str, name: str
-    ) -> bool:
+    def has(self, node: NodeSpec | DeclaredNodeSpec, entity: DataPath, kind: str) -> bool:
         """Return whether the name of an entity is not known for certain."""
         if kind in _SCHEMES and node.path in self._misruled:
-            return True
-        if not (isinstance(node, NodeSpec) or node.is_named) and name.startswith('~'):
             return True
         if not self._paths:
             return False
@@ -350,6 +349,9 @@ class _UncertainNames:
 
 
 _OWNERS = (('nodes',), ('processes',))
+# Where the nodes of a process stand, and what may bring any end.
+_INNER = (('nodes',), ('components',))
+_OPEN = ('nodes', 'components', 'nodl')
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4
@@ -362,7 +364,7 @@ _WITHOUT_CHANNELS = {each.name for each in fields(NodeSpec)} - {
 
 def _depth_of(path: DataPath) -> int:
     """Return how much deeper the sections are for a node of a process."""
-    return 2 if path[0] == 'processes' and path[2:3] == ('nodes',) else 0
+    return 2 if path[0] == 'processes' and path[2:3] in _INNER else 0
 
 
 def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
@@ -371,7 +373,7 @@ def _ends_lost_with(path: DataPath) -> set[PossibleEnd]:
     section = str(path[depth]) if len(path) > depth else ''
     if section in _WITHOUT_CHANNELS and path[0] != 'include':
         return set()
-    if path[0] == 'processes' and section and section not in (*KIND_OF_SECTION, 'nodes', 'nodl'):
+    if path[0] == 'processes' and section and section not in (*KIND_OF_SECTION, *_OPEN):
         return set()
     # An unknown key may be any section, misspelt.
     known = KIND_OF_SECTION.get(section)

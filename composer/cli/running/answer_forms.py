@@ -19,6 +19,7 @@ STATUS: Final[Form] = {
     'pid': int,
     'uptime_sec': float,
     'nodes': [str],
+    'components': [str],
     'lifecycles': ANY,
     'health': (NoneType, {'level': str, 'message': str}),
     'last_reload': (NoneType, {'time': float, 'succeeded': bool}),

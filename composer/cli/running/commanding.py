@@ -89,7 +89,10 @@ def _find_node(systems: Iterable[RunningSystem], name: str) -> tuple[RunningSyst
         name: Its full name, or what follows the last slash of it if that tells it.
     """
     nodes = [
-        (system, node) for system in systems for node in (system.status or {}).get('nodes', ())
+        (system, node)
+        for system in systems
+        for key in ('nodes', 'components')
+        for node in (system.status or {}).get(key, ())
     ]
     found = [each for each in nodes if each[1] == f'/{name.lstrip("/")}']
     found = found or [each for each in nodes if each[1].endswith(f'/{name}')]

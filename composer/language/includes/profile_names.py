@@ -29,12 +29,12 @@ class ProfileRenaming:
     def in_process(self, process: dict[str, Any]) -> dict[str, Any]:
         """Return a process whose ends, and those of its nodes, use the new names."""
         changed = self.in_node(process)
-        nodes = changed.get('nodes')
-        if not (self._names and isinstance(nodes, dict)):
-            return changed
-        return changed | {
-            'nodes': {name: node and self.in_node(node) for name, node in nodes.items()}
-        }
+        for key in ('nodes', 'components'):
+            nodes = changed.get(key)
+            if self._names and isinstance(nodes, dict):
+                renamed = {name: node and self.in_node(node) for name, node in nodes.items()}
+                changed = changed | {key: renamed}
+        return changed
 
     def in_node(self, node: dict[str, Any]) -> dict[str, Any]:
         """Return a node whose entities use the new names."""

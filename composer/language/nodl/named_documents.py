@@ -36,7 +36,8 @@ def read_nodl_documents(system: LoadedSystem) -> None:
 
 def _names_documents(process: dict[str, Any]) -> bool:
     nodes = process.get('nodes')
-    inner = nodes.values() if isinstance(nodes, dict) else ()
+    inner = [*nodes.values()] if isinstance(nodes, dict) else []
+    inner += process.get('components', {}).values()
     return _KEY in process or any(node and _KEY in node for node in inner)
 
 
@@ -56,6 +57,11 @@ class _Declaring:
                 name: self._with_document(name, node) if node and _KEY in node else node
                 for name, node in nodes.items()
             }
+        if 'components' in self._process:
+            self._process['components'] = {
+                name: self._with_ends(each, ('components', name)) if _KEY in each else each
+                for name, each in self._process['components'].items()
+            }
         if _KEY in self._process:
             text = self._process.pop(_KEY)
             for node in self._choose(self._read(text, (*self._path, _KEY)), text):
@@ -69,6 +75,14 @@ class _Declaring:
         last = name.rpartition('/')[2]
         chosen = [each for each in found if each.name in (None, last)] or found
         return self._merged(plain, chosen[0], path) if chosen else plain
+
+    def _with_ends(self, component: dict[str, Any], at: DataPath) -> dict[str, Any]:
+        plain = dict(component)
+        path = (*self._path, *at)
+        found = self._read(plain.pop(_KEY), (*path, _KEY))
+        last = str(at[-1]).rpartition('/')[2]
+        chosen = [each for each in found if each.name in (None, last)] or found
+        return self._declaring(plain, chosen[0], path) if chosen else plain
 
     def _choose(self, nodes: list[NodlNode], text: str) -> list[NodlNode]:
         """Return the nodes of a document that are in the program of the process."""
@@ -88,24 +102,27 @@ class _Declaring:
     def _add(self, node: NodlNode) -> None:
         name = self._process.get('name', node.name)
         if name is None:
-            # The names and values of its parameters stand beside those that it is given.
-            given = self._process.get('parameters', {})
-            declared = {
-                key: {part: value for part, value in each.items() if part != 'default'}
-                for key, each in node.data.pop('parameters', {}).items()
-                if key not in given
-            }
-            # It may have none at all.
-            node.data.setdefault('publishers', {})
-            self._process = self._merged(self._process, node, self._path)
-            if declared:
-                self._process['parameters'] = {**declared, **given}
+            self._process = self._declaring(self._process, node, self._path)
             return
         nodes = self._process.get('nodes')
         listed = dict(nodes) if isinstance(nodes, dict) else dict.fromkeys(nodes or ())
         own = listed.get(name) or {}
         listed[name] = self._merged(own, node, (*self._path, 'nodes', name))
         self._process['nodes'] = listed
+
+    def _declaring(self, entry: dict[str, Any], node: NodlNode, path: DataPath) -> dict[str, Any]:
+        """Return a process or component with what a document says beside its other keys."""
+        # The names of its parameters stand beside the values that it is given.
+        given = entry.get('parameters', {})
+        declared = {
+            key: {part: value for part, value in each.items() if part != 'default'}
+            for key, each in node.data.pop('parameters', {}).items()
+            if key not in given
+        }
+        # It may have no ends at all.
+        node.data.setdefault('publishers', {})
+        merged = self._merged(entry, node, path)
+        return merged | ({'parameters': {**declared, **given}} if declared else {})
 
     def _merged(self, entry: dict[str, Any], node: NodlNode, path: DataPath) -> dict[str, Any]:
         """Return an entry with what a document says; what the entry says wins."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.language.parameter_files import parse_parameter_files
 from composer.language.parsing.condition_parser import parse_conditions
+from composer.language.parsing.declared_ends import given_values, parse_own_ends
 from composer.language.specs import ComponentSpec, DeclaredNodeSpec
 from composer.names import expand_namespace
 
@@ -111,7 +112,7 @@ def _parse_component(
         description=data.get('description', ''),
         package=data['package'],
         plugin=data['plugin'],
-        parameters=MappingProxyType(data.get('parameters', {})),
+        parameters=MappingProxyType(given_values(data.get('parameters', {}))),
         parameter_files=parse_parameter_files(data),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
@@ -123,15 +124,20 @@ def _parse_component(
     )
 
 
-def declare_component(component: ComponentSpec) -> DeclaredNodeSpec:
-    """Return what is known of the node that a component is."""
+def declare_component(component: ComponentSpec, data: dict[str, Any]) -> DeclaredNodeSpec:
+    """Return what is known of the node that a component is.
+
+    Args:
+        data: The component as the file has it.
+    """
+    is_declared, sections, parameters = parse_own_ends(data, component.path)
     return DeclaredNodeSpec(
         name=component.name,
         is_named=True,
         namespace=component.namespace,
         remap=component.remap,
-        sections=None,
-        parameters={},
+        sections=sections if is_declared else None,
+        parameters=parameters,
         declares_all_parameters=False,
         process=component.container,
         path=component.path,

@@ -72,23 +72,36 @@ def parse_declared_nodes(
 
 def _parse_own_node(process: str, data: Data, path: DataPath) -> DeclaredNodeSpec | None:
     """Return the node whose ends stand beside the keys of its process."""
-    is_declared = any(section in data for section in END_SECTIONS)
-    written = {
-        name: value for name, value in data.get('parameters', {}).items() if is_declaration(value)
-    }
-    if not is_declared and not written:
+    is_declared, sections, parameters = parse_own_ends(data, path)
+    if not is_declared and not parameters:
         return None
     return DeclaredNodeSpec(
         name=data.get('name', process),
         is_named='name' in data,
         namespace=_namespace_of(data),
         remap=tuple(data.get('remap', {}).items()),
-        sections=_parse_sections(data, path) if is_declared else None,
-        parameters=_parse_parameters({'parameters': written}, path),
+        sections=sections if is_declared else None,
+        parameters=parameters,
         declares_all_parameters=False,
         process=process,
         path=path,
     )
+
+
+def parse_own_ends(
+    data: Data, path: DataPath
+) -> tuple[bool, Mapping[str, Mapping[str, DeclaredEndSpec]], Mapping[str, ParameterSpec]]:
+    """Return whether ends are declared, which, and the parameters declared among the values.
+
+    Args:
+        data: A process or a component.
+    """
+    written = {
+        name: value for name, value in data.get('parameters', {}).items() if is_declaration(value)
+    }
+    is_declared = any(section in data for section in END_SECTIONS)
+    parameters = _parse_parameters({'parameters': written}, path)
+    return is_declared, _parse_sections(data, path), parameters
 
 
 def _parse_node(
@@ -148,3 +161,5 @@ def entries_with_ends(process: Data) -> Iterator[tuple[DataPath, Data]]:
     for name, node in (nodes if isinstance(nodes, dict) else {}).items():
         if node is not None:
             yield ('nodes', name), node
+    for name, component in process.get('components', {}).items():
+        yield ('components', name), component

@@ -94,6 +94,10 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
     stop = data.get('stop', {})
     nodes, declares_all_ends = parse_declared_nodes(name, data, path)
     components = parse_components(name, data, path)
+    loaded = [declare_component(each, data['components'][key]) for key, each in components.items()]
+    if loaded and not data.get('external'):
+        # Nobody else loads anything into it.
+        declares_all_ends = all(each.sections is not None for each in loaded)
     return ProcessSpec(
         name=name,
         description=data.get('description', ''),
@@ -121,8 +125,8 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
         on_demand=False,
-        nodes=(*nodes, *map(declare_component, components.values())),
-        declares_all_ends=declares_all_ends and not components,
+        nodes=(*nodes, *loaded),
+        declares_all_ends=declares_all_ends,
         lifecycle=data.get('lifecycle'),
         components=components,
         external=data.get('external', False),

@@ -6,6 +6,7 @@ The containers are stand-ins in Python: see `tests/container_program.py`.
 import json
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -194,6 +195,15 @@ def test_an_edit_loads_and_unloads_what_it_names(compose, listed):
     edit(a=stays)
     child.wait_for_line('reloaded in ', times=2)
     assert listed('/perception') == {1: '/a'}
+    restarted = subprocess.run(
+        [sys.executable, '-m', 'composer', 'restart', 'a'],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert restarted.stdout == "system: node '/a' was restarted\n", restarted.stderr
+    assert list(listed('/perception').values()) == ['/a']
+    assert 1 not in listed('/perception')
     assert child.stop() == 0
 
 

@@ -267,6 +267,7 @@ WITNESS_NODE = {
 SYSTEM = {
     'version': 1,
     'args': {'speed': {'default': 1.0, 'type': 'double'}, 'where': 'far'},
+    'vars': {'half': '{{ speed / 2 }}'},
     'check': {'other': {'args': {'speed': 2.0}}},
     'qos': {'near': {'depth': 3}},
     'defaults': {'log_level': 'info'},
@@ -287,6 +288,8 @@ SYSTEM = {
                 'limit': 5,
                 'mode': {'default': 'slow', 'choices': ['slow', 'fast']},
                 'marks': {'type': 'integer_array', 'default': [1, 2]},
+                'said': {'command': ['echo', 'one']},
+                'read': {'file': 'others.yaml', 'key': 'talker.ros__parameters.name'},
             },
             'parameter_files': ['parameters.yaml'],
             'state': {'begun': False, 'last': None},
@@ -349,6 +352,7 @@ SYSTEM = {
         },
         'user': {
             'namespace': '/inner',
+            'parameter_files': [{'file': 'others.yaml', 'expressions': True, 'root': 'x'}],
             'service_clients': {'ask': {'type': _TRIGGER, 'service': '/ask'}},
             'action_clients': {
                 'count': {'type': _FIBONACCI, 'action': '/count', 'feedback': 'parts:follow'}
@@ -356,7 +360,11 @@ SYSTEM = {
         },
     },
     'processes': {
-        'sleeper': {'command': ['sh', '-c', 'exec sleep 1000'], 'on_exit': ['parts:ended']},
+        'sleeper': {
+            'command': ['sh', '-c', 'exec sleep 1000'],
+            'env': {'SAID': {'command': ['echo', 'one']}, 'READ': {'file': 'others.yaml'}},
+            'on_exit': ['parts:ended'],
+        },
         'packaged': {'package': 'sleeping', 'executable': 'sleeper', 'name': 'dreamer'},
     },
 }

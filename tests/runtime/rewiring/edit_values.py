@@ -33,6 +33,10 @@ _WAIT_FOR = [*_CONDITION, _CONDITION, {'topic': '/nowhere', 'timeout': 0.1}, [],
 _ON_EXIT = ['shutdown', 'parts:ended', {'start': 'packaged'}, [{'behaviour': 'parts:ended'}]]
 _DELAY = [0.05, 0.1, -1, None]
 _FILES = [['parameters.yaml'], ['parameters.yaml', 'others.yaml'], ['absent.yaml'], None]
+_COMMAND = [['echo', 'two'], ['echo', '{{ half }}'], ['false'], ['eccho', '1'], [], None]
+_TIMEOUT = [9.0, 0, None]
+_FILE = ['others.yaml', 'absent.yaml', 3, None]
+_KEY = ['talker.ros__parameters.name', 'talker.name', '', None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
 # Whatever its arguments are.
 _SLEEP = ['sh', '-c', 'exec sleep 900']
@@ -42,9 +46,20 @@ VALUES = {
     'system.version': [1, 2, '1', None],
     'system.description': _STRINGS,
     'system.args': [{'speed': 2.0, 'where': 'far'}, {'speed': 3.0}, None],
+    'system.vars': [{'half': '{{ speed * 2 }}'}, {'half': '{{ half }}'}, {}, None],
     'argument.type': ['double', 'string', 'float', None],
     'argument.default': [1.5, 99.0, 'fast', None],
     'argument.description': _STRINGS,
+    **{
+        f'{thing}.{key}': values
+        for thing in ('argument', 'parameter', 'start_value')
+        for key, values in (
+            ('command', _COMMAND),
+            ('timeout', _TIMEOUT),
+            ('file', _FILE),
+            ('key', _KEY),
+        )
+    },
     'argument.choices': [[1.0, 1.5], [1.0, 2.0, 99.0], [], None],
     'system.check': [{'other': {}}, {'other': {'args': {'speed': 2.0}}}, {'a': 1}, None],
     'combination.args': [{'speed': 2.0}, {'sped': 2.0}, None],
@@ -98,6 +113,9 @@ VALUES = {
     'condition.timeout': [0.3, 5.0, 0, None],
     'node.delay': _DELAY,
     'node.parameter_files': _FILES,
+    'parameter_file.file': _FILE,
+    'parameter_file.expressions': [True, False, {'half': 1}, 'perhaps', None],
+    'parameter_file.root': ['/inner', '{{ where }}', 'a b', None],
     'node.foreach': _FOREACH,
     'node.when': _WHEN,
     'node.namespace': _NAMESPACE,

@@ -58,7 +58,7 @@ def _read(reader):
     from composer.cli.common.file_selection import load_given
     from composer.interfaces.catalogue import InterfaceCatalogue
 
-    system = load_given(reader.paths, reader.words, reader.set_values)
+    system = load_given(reader.paths, reader.words, reader.set_values, reader=reader.reader)
     return create_context(system, InterfaceCatalogue())
 
 
