@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
+    from composer.language.specs import ComponentSpec, ConditionSpec, NodeSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
 NodeKind: TypeAlias = Literal['node', 'process']
@@ -165,11 +165,15 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:
         )
 
 
-def _specs(context: CheckContext) -> Iterator[tuple[NodeKind, NodeSpec | ProcessSpec]]:
+def _specs(
+    context: CheckContext,
+) -> Iterator[tuple[NodeKind, NodeSpec | ProcessSpec | ComponentSpec]]:
     for node in context.spec.nodes.values():
         yield 'node', node
     for process in context.spec.processes.values():
         yield 'process', process
+    for component in context.spec.components:
+        yield 'node', component
 
 
 def _channels(topology: Topology, places: FindingPlaces) -> Iterator[ChannelBox]:
@@ -208,9 +212,13 @@ def _edges(
     for channel in topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
-            node = ids[end.node.path[:2]]
+            # A process may have several nodes; components are drawn apart.
+            boxed = end.node.path if end.node.path in ids else end.node.path[:2]
+            node = ids[boxed]
+            inner = '' if boxed == end.node.path else str(end.node.path[-1])
+            owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
             yield Edge(
-                f'{end.kind.noun}:{node.partition(":")[2]}:{end.entity.name}',
+                f'{end.kind.noun}:{owner}:{end.entity.name}',
                 _role(end),
                 sends(channel.kind, provides=end.kind.provides),
                 end.entity.name,
@@ -245,13 +253,16 @@ def _waits(
             target = _target(waiter, condition)
             if target in known:
                 yield Wait(ids[waiter.path], target, condition.path)
+    for component in context.spec.components:
+        # It is drawn at its container.
+        yield Wait(ids[component.path], f'process:{component.container}', component.path)
     for process in context.spec.processes.values():
         for action in process.on_exit:
             if f'process:{action.start}' in known:
                 yield Wait(f'process:{action.start}', ids[process.path], action.path)
 
 
-def _target(waiter: NodeSpec | ProcessSpec, condition: ConditionSpec) -> str:
+def _target(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
     if condition.kind == 'process':
         return f'process:{condition.name}'
     name = expand_name(condition.name, waiter.name, expand_namespace(waiter.namespace or ''))

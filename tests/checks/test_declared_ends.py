@@ -96,6 +96,8 @@ def test_names_are_those_of_the_process():
 def test_private_names_are_unknown_where_the_name_of_the_node_is():
     camera = CAMERA.replace('    image: {', '    image: {topic: ~/image, ')
     assert not check(camera + BASE)
+    (finding,) = check(camera.replace('msg/Image', 'msg/Imu') + BASE)
+    assert (finding.rule, finding.span.text) == ('no-publisher', 'image')
 
 
 SEVERAL = """\

@@ -59,7 +59,12 @@ def test_a_right_file_has_no_findings():
         ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', None)),
         (
             'version: 1',
-            ('missing-key', "'nodes' or 'processes' or 'include' is missing", '1:1', None),
+            (
+                'missing-key',
+                "'nodes' or 'processes' or 'containers' or 'include' is missing",
+                '1:1',
+                None,
+            ),
         ),
         (
             'version: 2\nnodes: {}',

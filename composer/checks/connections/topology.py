@@ -226,8 +226,11 @@ def build_topology(
     possible: set[PossibleEnd] = set(uncertain.missing)
     for node, kind, channel_kind, entity in _ends(spec.end_owners()):
         name = written_name(entity, kind)
-        if uncertain.has(node, entity.path, channel_kind, name):
+        if uncertain.has(node, entity.path, channel_kind):
             possible.add((channel_kind, kind.provides, None))
+            continue
+        if name.startswith('~') and not (isinstance(node, NodeSpec) or node.is_named):
+            possible.add((channel_kind, kind.provides, entity.type))
             continue
         # Without a type, too, it would be a reason to say nothing of any other.
         if is_misnamed(system.positions, node, name) and has_real_type(entity):
@@ -331,13 +334,9 @@ class _UncertainNames:
         }
         self._all = ('defaults', 'namespace') in self._paths or ('defaults',) in self._paths
 
-    def has(
-        self, node: NodeSpec | DeclaredNodeSpec, entity: DataPath, kind: str, name: str
-    ) -> bool:
+    def has(self, node: NodeSpec | DeclaredNodeSpec, entity: DataPath, kind: str) -> bool:
         """Return whether the name of an entity is not known for certain."""
         if kind in _SCHEMES and node.path in self._misruled:
-            return True
-        if not (isinstance(node, NodeSpec) or node.is_named) and name.startswith('~'):
             return True
         if not self._paths:
             return False

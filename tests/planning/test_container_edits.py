@@ -1,0 +1,72 @@
+"""What an edit of containers and their components does."""
+
+import subprocess
+import sys
+
+import pytest
+
+SYSTEM = """\
+version: 1
+containers:
+  perception:
+    command: [sleep, '9']
+    components:
+      talker: {package: vendor, plugin: 'vendor::Talker', parameters: {word: a}}
+      filter: {package: vendor, plugin: 'vendor::Filter', parameter_files: [values.yaml]}
+"""
+EDITS = {
+    'a component comes and another one goes': (
+        "talker: {package: vendor, plugin: 'vendor::Talker', parameters: {word: a}}",
+        "other: {package: vendor, plugin: 'vendor::Other'}",
+        [
+            "- component 'talker' of 'perception' (system.yaml:6); lost: its state",
+            "+ component 'other' of 'perception' (edited.yaml:6)",
+        ],
+    ),
+    'one is loaded anew': (
+        '{word: a}',
+        '{word: b}, intra_process: true',
+        [
+            "± component 'talker' of 'perception': parameters.word a → b "
+            '(system.yaml:6 → edited.yaml:6), '
+            'intra_process false → true (system.yaml:6 → edited.yaml:6); '
+            'a component takes this when it is loaded; lost: its state'
+        ],
+    ),
+    'what it waits for counts later': (
+        '{word: a}',
+        '{word: a}, wait_for: {process: perception, state: running}, description: told',
+        [
+            "~ component 'talker' of 'perception': wait_for [] → "
+            '["process perception running within 30 s"] (system.yaml:6 → edited.yaml:6); '
+            'wait_for counts from its next start'
+        ],
+    ),
+    'the container with all of them': (
+        "'9'",
+        "'8'",
+        [
+            "± process 'perception': command "
+            '["sleep", "9"] → ["sleep", "8"] (system.yaml:4 → edited.yaml:4); '
+            'a process takes this when it starts; lost: the running process'
+        ],
+    ),
+    'nothing': ('version: 1', 'version: 1\ndescription: told', []),
+}
+
+
+@pytest.mark.parametrize('name', EDITS)
+def test_an_edit_of_a_container_is_told(tmp_path, name):
+    old, new, told = EDITS[name]
+    (tmp_path / 'values.yaml').write_text('/**: {ros__parameters: {size: 1}}')
+    (tmp_path / 'system.yaml').write_text(SYSTEM)
+    (tmp_path / 'edited.yaml').write_text(SYSTEM.replace(old, new))
+    done = subprocess.run(
+        [sys.executable, '-m', 'composer', 'plan', 'system.yaml', 'edited.yaml'],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+
+    assert done.stdout.splitlines()[:-1] == told, done.stderr
