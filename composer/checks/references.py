@@ -123,17 +123,22 @@ def _explain_qos(context: CheckContext, error: QosError) -> Iterator[Diagnostic]
 
 def check_content_filters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that the installed rclpy has content filters, if any are wanted."""
-    if has_content_filters() is not False:
+    filtered = [
+        subscription
+        for node in context.spec.nodes.values()
+        for subscription in node.subscriptions.values()
+        if subscription.content_filter
+    ]
+    # A file without them needs no ROS.
+    if not filtered or has_content_filters() is not False:
         return
-    for node in context.spec.nodes.values():
-        for subscription in node.subscriptions.values():
-            if subscription.content_filter:
-                yield context.at_key(
-                    (*subscription.path, 'content_filter'),
-                    'no-content-filter',
-                    'this rclpy has no content filters: ROS 2 has them for Python since Kilted',
-                    help='let the behaviour return what it does not want',
-                )
+    for subscription in filtered:
+        yield context.at_key(
+            (*subscription.path, 'content_filter'),
+            'no-content-filter',
+            'this rclpy has no content filters: ROS 2 has them for Python since Kilted',
+            help='let the behaviour return what it does not want',
+        )
 
 
 def check_types(context: CheckContext) -> Iterator[Diagnostic]:

@@ -475,7 +475,7 @@ def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: P
 def import_command(
     file: Path, words: tuple[str, ...], output: Path | None, *, verifies: bool
 ) -> int:
-    """Turn the launch file FILE (.launch.py, .xml or .yaml) into a system.
+    """Turn the launch file FILE into a system.
 
     It is resolved by the installed launch and launch_ros, with these values for its arguments. All
     of its arguments remain arguments of the system. What cannot be kept is a comment with the line

@@ -9,7 +9,8 @@ from typing import Any, Final, TypeAlias
 from composer.errors import ComposerError
 from composer.runtime.control import protocol
 
-# A type; a mapping of the keys that must be there; a list of one form; or a tuple of alternatives.
+# A type; a mapping of the keys that must be there, or of `str` for any; a list of one form; or a
+# tuple of alternatives.
 Form: TypeAlias = Any
 
 _FIGURE = (NoneType, float)
@@ -20,7 +21,7 @@ STATUS: Final[Form] = {
     'uptime_sec': float,
     'nodes': [str],
     'components': [str],
-    'lifecycles': ANY,
+    'lifecycles': {str: str},
     'health': (NoneType, {'level': str, 'message': str}),
     'last_reload': (NoneType, {'time': float, 'succeeded': bool}),
 }
@@ -59,6 +60,8 @@ def read_answer(text: str, form: Form = ANY) -> dict[str, Any]:
 
 
 def _fits(data: Any, form: Form) -> bool:
+    if isinstance(form, dict) and str in form:
+        return isinstance(data, dict) and all(_fits(each, form[str]) for each in data.values())
     if isinstance(form, dict):
         return isinstance(data, dict) and all(
             key in data and _fits(data[key], each) for key, each in form.items()
