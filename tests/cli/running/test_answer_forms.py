@@ -17,6 +17,7 @@ STATUS_ANSWER = {
     'uptime_sec': 1.5,
     'last_error': '',
     'nodes': ['/a'],
+    'components': ['/b'],
     'more': None,
     'health': {'level': 'ok', 'message': ''},
     'last_reload': {'time': 1, 'succeeded': True},
