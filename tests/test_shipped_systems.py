@@ -15,6 +15,8 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -192,6 +194,25 @@ def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for
     wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
     assert child.stop() == 0
     wait_for(lambda: not nodes_of(peer), 'the end of the program')
+
+
+def test_the_managed_system_brings_the_scanner_up_and_waits_for_a_manager(
+    up, peer, wait_for, monkeypatch
+):
+    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
+    monkeypatch.setenv('PATH', os.pathsep.join(folders))
+    nearest = peer.listen(Float64, '/rover/nearest')
+    kept = peer.listen(LaserScan, '/rover/kept')
+    child = up('managed')
+    wait_for(lambda: nearest, 'a distance')
+    assert nearest[0].data == 1.0
+    assert not kept
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        request = Transition(id=transition)
+        assert peer.call(ChangeState, '/rover/mapper/change_state', transition=request).success
+    child.wait_for_line('Hello map!')
+    wait_for(lambda: kept, 'a scan of the mapper')
+    assert child.stop() == 0
 
 
 def test_the_patrol_drives_a_program_whose_description_a_command_prints(

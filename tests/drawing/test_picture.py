@@ -275,6 +275,36 @@ def test_processes_and_what_is_waited_for(draw):
     ]
 
 
+def test_ends_that_processes_declare_are_drawn_and_marked(draw):
+    text = """
+        version: 1
+        nodes:
+          viewer:
+            publishers: {copy: {type: std_msgs/msg/String, external: true}}
+            subscriptions:
+              image: {type: std_msgs/msg/String, publish: copy}
+              words: {type: std_msgs/msg/String, publish: copy}
+        processes:
+          camera: {command: ['true'], publishers: {image: std_msgs/msg/String}}
+          robot:
+            command: ['true']
+            nodes:
+              speaker: {publishers: {words: std_msgs/msg/Int8}}
+        containers:
+          box:
+            command: ['true']
+            components:
+              thinker: {package: a, plugin: A, publishers: {thoughts: std_msgs/msg/String}}
+    """
+    document = describe_picture(draw(text))
+    edges = by_id(document, 'edges')
+    assert edges['publisher:camera:image']['node'] == 'process:camera'
+    assert edges['publisher:robot/speaker:words']['node'] == 'process:robot'
+    assert edges['publisher:camera:image']['delivery'] == 'sent'
+    assert edges['publisher:/thinker:thoughts']['node'] == 'node:/thinker'
+    assert marked(document)['publisher:robot/speaker:words'] == ['conflicting-types']
+
+
 def test_two_nodes_of_one_name_are_two(draw):
     text = 'version: 1\nnodes: {/a/n: {}, n: {namespace: /a}}\n'
     ids = [node['id'] for node in describe_picture(draw(text))['nodes']]

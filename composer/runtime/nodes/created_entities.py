@@ -181,7 +181,7 @@ class EntityCreation:
         except StartError as error:
             raise EntityError(str(error), help=error.help) from error
         entities[name] = entity
-        if section == 'timers' and node.gate.is_open:
+        if section == 'timers' and node.gate.is_open and not node.gate.rests:
             entity.ros.reset()
         return _HANDLES.get(section, CreatedEntity)(section, name, entity)
 

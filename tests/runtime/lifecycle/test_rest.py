@@ -51,6 +51,7 @@ def say(node, text):
 def send(node):
     for number in range(3):
         node.publish('words', f'{number} of {node.state.round}')
+    node.logger.info(f'has sent round {node.state.round}')
     node.state.round += 1
     try:
         node.call('ask', timeout=30)
@@ -155,6 +156,7 @@ def test_what_comes_meanwhile_is_dropped_or_kept(compose, peer, wait_for, local)
     client = peer.run(peer.node.create_client, Trigger, 'go')
     assert client.wait_for_service(20.0)
     pending = client.call_async(Trigger.Request())
+    child.wait_for_line('has sent round 1')
     lead(peer, CONFIGURE)
     assert not child.matching('[robot]: dropped')
     assert not child.matching('[robot]: kept')
@@ -250,4 +252,42 @@ def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
     assert result.result().status == GoalStatus.STATUS_ABORTED
     assert child.matching('[robot]: noted')
     peer.run(client.destroy)
+    assert child.stop() == 0
+
+
+def test_what_a_transition_creates_rests_until_active(compose, peer):
+    code = """
+def create(node):
+    node.create_timer(0.02, tick)
+    node.create_subscription('std_msgs/msg/String', 'words', hear)
+
+def tick(node):
+    node.logger.info('tick')
+
+def hear(node, message):
+    node.logger.info(f'heard {message.data}')
+
+def other(node):
+    node.logger.info('other')
+    return 'x'
+"""
+    text = """
+        version: 1
+        nodes:
+          robot:
+            lifecycle: true
+            on_configure: parts:create
+          other:
+            publishers: {words: {type: std_msgs/msg/String, external: true}}
+            timers: {t: {period: 0.02, behaviour: 'parts:other', publish: words}}
+    """
+    child = compose(text, code)
+    child.wait_until_ready()
+    lead(peer, CONFIGURE)
+    child.wait_for_line('[other]: other', times=len(child.matching('[other]: other')) + 5)
+    assert not child.matching('[robot]: tick')
+    assert not child.matching('[robot]: heard')
+    lead(peer, ACTIVATE)
+    child.wait_for_line('[robot]: tick', times=3)
+    child.wait_for_line('[robot]: heard x', times=3)
     assert child.stop() == 0
