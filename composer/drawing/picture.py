@@ -212,9 +212,10 @@ def _edges(
     for channel in topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
-            node = ids[end.node.path[:2]]
-            # A process may have several nodes.
-            inner = '/'.join(map(str, end.node.path[3:]))
+            # A process may have several nodes; components are drawn apart.
+            boxed = end.node.path if end.node.path in ids else end.node.path[:2]
+            node = ids[boxed]
+            inner = '' if boxed == end.node.path else str(end.node.path[-1])
             owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
             yield Edge(
                 f'{end.kind.noun}:{owner}:{end.entity.name}',

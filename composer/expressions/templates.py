@@ -128,13 +128,9 @@ class TemplateEvaluator:
             return written
         return _as_text(self._evaluate(written, path, is_key=True))
 
-    def has_failed(self, path: DataPath) -> bool:
-        """Return whether the value at a path, or one in it, could not be evaluated."""
-        return any(each[: len(path)] == path for each in self.document.dropped)
-
     def is_sampled(self, path: DataPath) -> bool:
-        """Return whether the value at a path, or one in it, depends on samples."""
-        return any(each[: len(path)] == path for each in self.document.sampled_paths)
+        """Return whether the value at a path depends on samples."""
+        return path in self.document.sampled_paths
 
     def _evaluate(self, text: str, path: DataPath, *, is_key: bool = False) -> Any:
         if self._sandbox.explained > MAX_FINDINGS:

@@ -156,11 +156,13 @@ class ProgramReader:
             full = f'/{values[1] or ""}/{values[0]}'.replace('//', '/').replace('//', '/')
             if entry.section == 'containers' and name.text in (values[0], full, full.lstrip('/')):
                 return entry
+        key = f'/{name.text.lstrip("/")}'
+        if not name.is_constant:
+            key = Computed(f"{{{{ '/' ~ {name.code}.lstrip('/') }}}}", key)
         for entry in self._place.result.entries:
-            if entry.data.get('external') and entry.name == name.written().strip('/'):
+            if entry.action is None and entry.name == key:
                 return entry
-        data: dict[str, Any] = {'external': True, 'components': {}}
-        entry = self._add('containers', name.written().strip('/'), data, None)
+        entry = self._add('containers', key, {'components': {}}, None)
         # Others may load components into it under other conditions.
         entry.when = ''
         return entry

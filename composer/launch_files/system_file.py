@@ -114,9 +114,9 @@ def _finished(
     }
     if env:
         data['env'] = env | data.get('env', {})
-    for owner, label in _with_files(data, entry.name):
+    for owner, node in _with_files(data):
         owner['parameter_files'] = [
-            _written_file(each, label, written, stem) for each in owner['parameter_files']
+            _written_file(each, node, written, stem) for each in owner['parameter_files']
         ]
     waits = list(_waits(imported, entry))
     if waits:
@@ -124,24 +124,27 @@ def _finished(
     return data
 
 
-def _with_files(data: dict[str, Any], name: str) -> Any:
+def _with_files(data: dict[str, Any]) -> Any:
+    """Yield what has parameter files, each with the name of its node, if that is known."""
     if 'parameter_files' in data:
-        yield data, name
+        yield data, data.get('name')
     for label, component in data.get('components', {}).items():
         if 'parameter_files' in component:
             yield component, label
 
 
-def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
+def _written_file(file: Any, node: str | None, written: SystemFile, stem: str) -> Any:
     if not isinstance(file, NewFile):
         return file
     data = file.data
     if not any(
         isinstance(value, dict) and 'ros__parameters' in str(value) for value in data.values()
     ):
-        data = {'/**': {'ros__parameters': data}}
+        # As launch does: what is for a node of this name comes after what is for all.
+        data = {_pattern(node): {'ros__parameters': data}}
     text = render_yaml(data, RCL)
-    plain = _NAME.sub('_', label).strip('_') or 'node'
+    label = node.value if isinstance(node, Computed) else node
+    plain = _NAME.sub('_', label or '').strip('_') or 'node'
     number, path = 2, f'{stem}.params/{plain}.yaml'
     while path in written.files and written.files[path] != text:
         path, number = f'{stem}.params/{plain}_{number}.yaml', number + 1
@@ -150,6 +153,12 @@ def _written_file(file: Any, label: str, written: SystemFile, stem: str) -> Any:
     given |= {'expressions': True} if _has_expressions(data) else {}
     given |= {'root': file.root} if file.root else {}
     return given if len(given) > 1 else path
+
+
+def _pattern(node: str | None) -> str:
+    if isinstance(node, Computed):
+        return Computed(f'/**/{node}', f'/**/{node.value}')
+    return f'/**/{node}' if node else '/**'
 
 
 def _has_expressions(data: Any) -> bool:

@@ -290,12 +290,18 @@ def test_ends_that_processes_declare_are_drawn_and_marked(draw):
             command: ['true']
             nodes:
               speaker: {publishers: {words: std_msgs/msg/Int8}}
+        containers:
+          box:
+            command: ['true']
+            components:
+              thinker: {package: a, plugin: A, publishers: {thoughts: std_msgs/msg/String}}
     """
     document = describe_picture(draw(text))
     edges = by_id(document, 'edges')
     assert edges['publisher:camera:image']['node'] == 'process:camera'
     assert edges['publisher:robot/speaker:words']['node'] == 'process:robot'
     assert edges['publisher:camera:image']['delivery'] == 'sent'
+    assert edges['publisher:/thinker:thoughts']['node'] == 'node:/thinker'
     assert marked(document)['publisher:robot/speaker:words'] == ['conflicting-types']
 
 

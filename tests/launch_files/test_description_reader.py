@@ -189,7 +189,7 @@ def test_values_after_a_file_that_has_them_too_are_in_a_file_of_their_own(tmp_pa
     assert data['parameters'] == {'x': 0}
     assert data['parameter_files'] == [str(tmp_path / 'own.yaml'), 'x.params/a.yaml']
     assert yaml.safe_load(system.files['x.params/a.yaml']) == {
-        '/**': {'ros__parameters': {'y': 2, 'z': 3}}
+        '/**/a': {'ros__parameters': {'y': 2, 'z': 3}}
     }
 
 

@@ -54,13 +54,12 @@ def import_launch_file(
             click.echo(f'{names}: parameter files of the system; -o writes them, too', err=True)
     if not verifies:
         return ExitCode.DONE
-    from composer.cli.importing.verification import verify
+    from composer.cli.importing.verification import verify, without_components
 
     with tempfile.TemporaryDirectory(prefix='composer-import-') as folder:
         copy = Path(folder) / f'{stem}.yaml'
-        if output is None:
-            list(_write(system, copy))
-        return verify(path, given, imported, output or copy)
+        list(_write(render_system(without_components(imported), path.name, stem), copy))
+        return verify(path, given, imported, copy)
 
 
 def _read_words(words: Sequence[str]) -> dict[str, str]:

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +42,7 @@ def verify(launch_file: Path, given: Mapping[str, str], imported: Imported, syst
 
     Args:
         given: The arguments of both.
-        system: The file that the launch file was imported to.
+        system: The file with the system, without components.
     """
     with tempfile.TemporaryDirectory(prefix='composer-verify-') as text:
         folder = Path(text)
@@ -49,6 +50,20 @@ def verify(launch_file: Path, given: Mapping[str, str], imported: Imported, syst
         launched = _run('launch', launch_file.absolute(), given, folder, site)
         composed = _run('system', system.absolute(), {}, folder, site)
     return _report(launched, composed, imported, site.expected)
+
+
+def without_components(imported: Imported) -> Imported:
+    """Return a system with plain processes in place of containers: nothing loads stand-ins."""
+    entries = [
+        replace(
+            entry,
+            section='processes',
+            data={key: value for key, value in entry.data.items() if key != 'components'},
+        )
+        for entry in imported.entries
+        if entry.action is not None or 'launch' in entry.data
+    ]
+    return replace(imported, entries=entries)
 
 
 class _Site:
@@ -64,9 +79,7 @@ class _Site:
         self._prefix = prefix
         self.replaced: dict[str, str] = {}
         self.ends = ','.join(_names_that_end(imported))
-        self.expected = sum(
-            'launch' not in each.data and 'node' not in each.data for each in entries
-        )
+        self.expected = sum(each.action is not None for each in entries)
         self.delay_sec = max((_now(each.data.get('delay', 0.0)) for each in entries), default=0.0)
         bin_folder = prefix / 'bin'
         bin_folder.mkdir(parents=True)

@@ -160,16 +160,23 @@ class _Computation:
 
     def _compute_variable(self, name: str) -> None:
         path = self._path(name)
-        value = self._evaluator.evaluate(self._variables[name], path)
-        if self._evaluator.has_failed(path):
+        value, has_failed, is_sampled = self._evaluate(self._variables[name], path)
+        if has_failed:
             self._use_sample(name)
         else:
-            self._set(name, value)
+            self._set(name, value, is_sampled=is_sampled)
+
+    def _evaluate(self, data: Any, path: DataPath) -> tuple[Any, bool, bool]:
+        """Return data with values in place, whether one has failed, and one is a sample."""
+        dropped, sampled = len(self._document.dropped), len(self._document.sampled)
+        value = self._evaluator.evaluate(data, path)
+        has_failed = len(self._document.dropped) > dropped
+        return value, has_failed, len(self._document.sampled) > sampled
 
     def _compute_default(self, argument: ArgumentSpec) -> None:
         path = self._path(argument.name)
-        value = self._evaluator.evaluate(_data_of(argument), path)
-        if self._evaluator.has_failed(path):
+        value, has_failed, is_sampled = self._evaluate(_data_of(argument), path)
+        if has_failed:
             self._use_sample(argument.name)
             return
         if isinstance(argument.default, StartDefault):
@@ -195,10 +202,10 @@ class _Computation:
         problems = list(self._find_problems(computed))
         if problems:
             self._use_sample(argument.name)
-            if not self._evaluator.is_sampled(path):
+            if not is_sampled:
                 self._document.diagnostics += problems
         else:
-            self._set(argument.name, value)
+            self._set(argument.name, value, is_sampled=is_sampled)
 
     def _find_problems(self, argument: ArgumentSpec) -> list[Diagnostic]:
         span = self._span(argument.name)
@@ -211,10 +218,10 @@ class _Computation:
             if keys == ('default',)
         ]
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: Any, *, is_sampled: bool) -> None:
         self._values[name] = value
         self._origins[name] = self._span(name).place
-        if self._evaluator.is_sampled(self._path(name)):
+        if is_sampled:
             self._samples.add(name)
 
     def _use_sample(self, name: str) -> None:
