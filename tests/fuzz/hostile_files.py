@@ -400,7 +400,7 @@ def undefined_names(folder):
 
 @case('bad-argument-declaration')
 def argument_names(folder):
-    text = ''.join(f'  a-{index}: 1\n' for index in range(50_000 // DIVISOR))
+    text = ''.join(f'  a {index}: 1\n' for index in range(50_000 // DIVISOR))
     write(folder, f'{HEAD}args:\n{text}nodes: {{}}\n')
 
 

@@ -38,7 +38,7 @@ class Publisher:
 
     def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
         message_class = import_interface(spec.type)
-        profile = node.qos_profile(spec, publishes=True)
+        profile = node.overrides.profile(spec, node.system.profiles, publishes=True)
         self._node = node
         self._spec = spec
         self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
@@ -99,6 +99,6 @@ class Publisher:
         """See `LiveEntity`."""
         self._events.destroy()
         self._node.endpoints.remove(self._endpoint)
-        self._node.drop_overrides(self._spec, publishes=True)
+        self._node.overrides.drop(self._spec, publishes=True)
         self._node.system.topics.remove_publisher(self._local)
         self._node.ros.destroy_publisher(self._ros)

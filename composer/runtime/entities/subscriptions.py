@@ -31,7 +31,7 @@ class Subscription:
     def __init__(self, node: LiveNode, spec: SubscriptionSpec) -> None:
         self._node, self._spec = node, spec
         self._owner = Owner('subscription', spec.name)
-        profile = node.qos_profile(spec, publishes=False)
+        profile = node.overrides.profile(spec, node.system.profiles, publishes=False)
         self._endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.placing(spec))
         self._events = EventBehaviours(node, 'subscription', spec.name)
         self._ros = node.ros.create_subscription(
@@ -66,7 +66,7 @@ class Subscription:
         """See `LiveEntity`."""
         self._events.destroy()
         self._node.endpoints.remove(self._endpoint)
-        self._node.drop_overrides(self._spec, publishes=False)
+        self._node.overrides.drop(self._spec, publishes=False)
         self._node.system.topics.remove_subscription(self._local)
         self._node.ros.destroy_subscription(self._ros)
 

@@ -202,7 +202,11 @@ class _Ticker:
         try:
             if self._generator is None:
                 self._generator = self._begin()
-            return await anext(self._generator)
+            self._thread = get_ident()
+            result = await anext(self._generator)
+            if self._is_closed:
+                await self._generator.aclose()
+            return result  # noqa: TRY300 - as above
         except StopAsyncIteration:
             self.timer.cancel()
             return None
@@ -210,6 +214,7 @@ class _Ticker:
             self._generator = None
             raise
         finally:
+            self._thread = 0
             self._turn.release()
 
 

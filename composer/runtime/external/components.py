@@ -140,16 +140,18 @@ class Components:
             finally:
                 self._is_outdated = never
 
-    def unload(self, container: str, key: str, timeout_sec: float | None = None) -> None:
-        """Unload a component, if it is loaded."""
+    def unload(self, container: str, key: str, timeout_sec: float = DEFAULT_WAIT_SEC) -> bool:
+        """Unload a component, if it is loaded; return whether it is not any more."""
         with self._lock:
             loaded = self._loaded.pop((container, key), None)
             if loaded is None:
-                return
+                return True
             try:
                 self._client(loaded.process).unload(loaded.unique_id, timeout_sec)
             except ContainerError as error:
                 system_logger.warning(f"component '{key}' could not be unloaded: {error}")
+                return False
+            return True
 
     def restart(self, full_name: str) -> str:
         """Unload and load a component; return why that failed, an empty string if it did not."""
@@ -165,16 +167,15 @@ class Components:
                     return ''
         return f"there is no node '{full_name}' any more"
 
-    def release(self, process: ExternalProcess, timeout_sec: float | None = None) -> None:
+    def release(self, process: ExternalProcess, timeout_sec: float = DEFAULT_WAIT_SEC) -> None:
         """Let go of a container: unload what was loaded into one that is not ours."""
         with self._lock:
+            answers = process.spec.external
             for container, key in list(self._loaded):
-                if self._loaded[container, key].process is not process:
-                    continue
-                if process.spec.external:
-                    self.unload(container, key, timeout_sec)
-                else:
-                    del self._loaded[container, key]
+                if self._loaded[container, key].process is process:
+                    # One that is silent once is not asked again.
+                    answers = answers and self.unload(container, key, timeout_sec)
+                    self._loaded.pop((container, key), None)
             if client := self._clients.pop(process.spec.name, None):
                 client.destroy()
 
@@ -220,7 +221,8 @@ class Components:
     def _load(self, process: ExternalProcess, component: ComponentSpec) -> None:
         client = self._client(process)
         name = component.full_name
-        if name in client.list_nodes().values():
+        timeout_sec = DEFAULT_WAIT_SEC if process.spec.external else None
+        if name in client.list_nodes(timeout_sec).values():
             message = f"it has a node '{name}' already, which somebody else has loaded"
             raise ContainerError(message)
         request = _write_request(component, self._system.parameter_files.get(name, {}))

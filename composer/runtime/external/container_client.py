@@ -54,7 +54,7 @@ class ContainerClient:
         )
         return frozenset(bytes(each.endpoint_gid) for each in ends)
 
-    def list_nodes(self, timeout_sec: float | None = None) -> dict[int, str]:
+    def list_nodes(self, timeout_sec: float | None) -> dict[int, str]:
         """Return the full names of the nodes in the container, by their unique ids.
 
         Args:
@@ -88,7 +88,7 @@ class ContainerClient:
             raise ContainerError(answer.error_message or 'it gave no reason')
         return answer.unique_id, answer.full_node_name
 
-    def unload(self, unique_id: int, timeout_sec: float | None = None) -> None:
+    def unload(self, unique_id: int, timeout_sec: float) -> None:
         """Unload a component.
 
         Raises:

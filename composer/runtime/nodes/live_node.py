@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections import Counter, defaultdict
+from collections import defaultdict
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 
@@ -29,7 +28,6 @@ from composer.runtime.health.hangs import HangLimit
 from composer.runtime.health.missed import count_missed
 from composer.runtime.lifecycle.lifecycle_node import LifecycleRosNode
 from composer.runtime.messages.ownership import UNHELD_RESULT
-from composer.runtime.messages.qos_profiles import apply_qos_overrides, create_qos_profile
 from composer.runtime.nodes.behaviour_node import Node
 from composer.runtime.nodes.callback_groups import (
     EventGroup,
@@ -39,6 +37,7 @@ from composer.runtime.nodes.callback_groups import (
     LifecycleGate,
 )
 from composer.runtime.nodes.created_entities import EntityCreation
+from composer.runtime.nodes.qos_overrides import QosOverrides
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
@@ -48,11 +47,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from rclpy.callback_groups import CallbackGroup
-    from rclpy.qos import QoSProfile
     from rclpy.task import Future
 
     from composer.executor.sources.inbox import Inbox
-    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec, TopicEndSpec
+    from composer.language.specs import BehaviourSpec, EntitySpec, NodeSpec
     from composer.runtime.health.statistics import EntityHealth
     from composer.runtime.health.unmatched import TopicEndpoint
     from composer.runtime.nodes.live_entity import (
@@ -80,6 +78,7 @@ class LiveNode:
         serving: The callback group of requests to action servers.
         functions: The behaviours, by their names, as they were when the node was created or
             changed: one that goes calls those that it has known.
+        overrides: The parameters that override the QoS of its publishers and subscriptions.
         created: The behaviours of entities that other behaviours have created, by their names.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
@@ -101,6 +100,7 @@ class LiveNode:
     gate: Gate
     serving: CallbackGroup
     functions: Mapping[str, Callable[..., Any]]
+    overrides: QosOverrides
     created: dict[str, Callable[..., Any]] = field(default_factory=dict)
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
@@ -112,7 +112,6 @@ class LiveNode:
     lifecycle: NodeLifecycle | None = None
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _views: dict[Owner, Node] = field(default_factory=dict)
-    _overridden: Counter[str] = field(default_factory=Counter)
     _instances: dict[type, Any] = field(default_factory=dict)
     _is_destroyed: bool = False
 
@@ -163,38 +162,6 @@ class LiveNode:
             'warn_after': spec.warn_after_sec,
             'local_delivery': spec.local_delivery,
         }
-
-    def qos_profile(self, spec: TopicEndSpec, *, publishes: bool) -> QoSProfile:
-        """Return the QoS of a publisher or subscription, with what ROS parameters override."""
-        profile = create_qos_profile(spec.qos, self.system.profiles)
-        if spec.qos_overrides:
-            prefix = self._prefix(spec, publishes=publishes)
-            self._undeclare(prefix)
-            self._overridden[prefix] += 1
-            topic = self.ros.resolve_topic_name(spec.topic)
-            apply_qos_overrides(self.ros, topic, profile, spec.qos_overrides, publishes=publishes)
-        return profile
-
-    def drop_overrides(self, spec: TopicEndSpec, *, publishes: bool) -> None:
-        """Undeclare the parameters that override the QoS of what is removed."""
-        if spec.qos_overrides:
-            prefix = self._prefix(spec, publishes=publishes)
-            self._overridden[prefix] -= 1
-            if not self._overridden[prefix]:
-                self._undeclare(prefix)
-
-    def _prefix(self, spec: TopicEndSpec, *, publishes: bool) -> str:
-        topic = self.ros.resolve_topic_name(spec.topic)
-        return f'qos_overrides.{topic}.{"publisher" if publishes else "subscription"}.'
-
-    def _undeclare(self, prefix: str) -> None:
-        for name in self.ros.list_parameters([], 0).names:
-            if name.startswith(prefix):
-                # They are read-only.
-                self.ros.put_parameter(
-                    self.ros.get_parameter(name), ParameterDescriptor(name=name)
-                )
-                self.ros.undeclare_parameter(name)
 
     def make_instances(self) -> None:
         """Make an instance of each class whose methods are behaviours of the node."""
@@ -434,6 +401,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         gate=gate,
         serving=GatedMutuallyExclusiveGroup(gate),
         functions=system.functions,
+        overrides=QosOverrides(ros),
     )
     creation.node = live
     return live

@@ -184,6 +184,8 @@ def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
         'last_error': '',
         'last_reload': None,
         'health': None,
+        'components': [],
+        'lifecycles': {},
     }
     pretend('first', '{')
     pretend('second', json.dumps({**known, 'nodes': []}))

@@ -11,6 +11,7 @@ version: 1
 nodes:
   rig:
     parameters: {source: cam_0}
+    state: {timers: {}}
     timers: {idle: {period: 100, behaviour: 'parts:idle'}}
     on_start: parts:Rig.begin
   other:
@@ -28,7 +29,8 @@ class Rig:
         node.create_subscription(String, node.parameters.source, self.hear)
         node.create_subscription('std_msgs/msg/String', 'cam_1', hear, qos_profile_sensor_data)
         self.fast = node.create_timer(0.05, self.tick)
-        self.slow = [node.create_timer(0.05, steps) for _ in range(2)]
+        for make in (steps, steps_later):
+            node.state.timers[make.__name__] = node.create_timer(0.05, make)
         node.create_publisher(String, 'fixed', {'durability': 'transient_local'})
         node.create_service('std_srvs/srv/Trigger', 'ask', self.answer)
         self.client = node.create_client('std_srvs/srv/Trigger', 'ask')
@@ -73,7 +75,19 @@ def refused(node, *arguments, **options):
 def steps(node):
     try:
         yield
-        node.logger.info('step')
+        node.destroy(node.state.timers['steps'])
+        yield
+        node.logger.error('resumed')
+    finally:
+        node.logger.info('closed')
+
+
+async def steps_later(node):
+    try:
+        yield
+        node.destroy(node.state.timers['steps_later'])
+        yield
+        node.logger.error('resumed')
     finally:
         node.logger.info('closed')
 
@@ -104,6 +118,7 @@ def test_what_a_behaviour_creates_works_as_what_the_file_declares(compose):
         child.wait_for_line(line)
     assert not child.matching('tick 21')
     child.wait_for_line('[rig]: closed', times=2)
+    assert not child.matching('resumed')
     # An edit elsewhere leaves them, also of this node.
     compose.write(SYSTEM.replace('period: 100', 'period: 99'), CODE)
     child.wait_for_line('reloaded in')
