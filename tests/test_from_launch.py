@@ -88,8 +88,9 @@ def folder(tmp_path, monkeypatch, shared_cache):
         program.chmod(program.stat().st_mode | stat.S_IXUSR)
     # The stand-in of a container, and what it can load.
     container = prefix / 'lib' / 'rclcpp_components' / EXECUTABLES['rclcpp_components']
-    program = Path(__file__).with_name('container_program.py').read_text()
-    container.write_text(f'#!{sys.executable}\n{program}')
+    program = str(Path(__file__).with_name('container_program.py'))
+    run = f"import runpy\nrunpy.run_path({program!r}, run_name='__main__')\n"
+    container.write_text(f'#!{sys.executable}\n{run}')
     (index / 'composition').touch()
     components = index.with_name('rclcpp_components')
     components.mkdir()

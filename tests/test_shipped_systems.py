@@ -16,7 +16,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -180,9 +180,13 @@ def test_the_camera_is_a_driver_of_its_own_if_it_is_real(up, peer, wait_for, ins
     assert child.stop() == 0
 
 
-def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for, monkeypatch):
-    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
-    monkeypatch.setenv('PATH', os.pathsep.join(folders))
+@pytest.fixture
+def python3(monkeypatch):
+    """Let processes find the Python of the tests as `python3`."""
+    monkeypatch.setenv('PATH', str(Path(sys.executable).parent), prepend=os.pathsep)
+
+
+def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for, python3):
     ranges = peer.listen(Range, '/front/range', qos_profile_sensor_data)
     obstacles = peer.listen(Bool, 'obstacle')
     child = up('hybrid')
@@ -197,10 +201,8 @@ def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for
 
 
 def test_the_managed_system_brings_the_scanner_up_and_waits_for_a_manager(
-    up, peer, wait_for, monkeypatch
+    up, peer, wait_for, python3
 ):
-    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
-    monkeypatch.setenv('PATH', os.pathsep.join(folders))
     nearest = peer.listen(Float64, '/rover/nearest')
     kept = peer.listen(LaserScan, '/rover/kept')
     child = up('managed')
@@ -216,10 +218,8 @@ def test_the_managed_system_brings_the_scanner_up_and_waits_for_a_manager(
 
 
 def test_the_patrol_drives_a_program_whose_description_a_command_prints(
-    up, peer, wait_for, monkeypatch
+    up, peer, wait_for, python3
 ):
-    folders = [str(Path(sys.executable).parent), os.environ['PATH']]
-    monkeypatch.setenv('PATH', os.pathsep.join(folders))
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     described = peer.listen(String, '/patrol_1/robot_description', latched)
     distances = peer.listen(Float64, '/patrol_1/distance')
@@ -230,6 +230,29 @@ def test_the_patrol_drives_a_program_whose_description_a_command_prints(
     assert described[0].data == '<robot name="patrol_1"><link name="base_link"/></robot>\n'
     nodes = {f'/patrol_1/{name}' for name in ('patrol', 'odometer', 'base')}
     wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    assert child.stop() == 0
+
+
+def test_the_cell_loads_components_and_brings_one_to_active(
+    up, peer, wait_for, python3, monkeypatch, shared_cache
+):
+    monkeypatch.setenv('XDG_CACHE_HOME', str(shared_cache))
+    judged = peer.listen(Bool, '/cell_1/too_hot')
+    child = up('cell')
+    wait_for(lambda: judged, 'a judgement')
+
+    assert judged[0].data
+    assert peer.call(GetState, '/cell_1/gripper/get_state').current_state.label == 'active'
+    assert child.stop() == 0
+
+
+def test_the_imported_sensors_start_one_after_the_other(up, peer, wait_for, python3):
+    heard = {
+        name: peer.listen(Range, f'/scout/{name}/range', qos_profile_sensor_data)
+        for name in ('front', 'rear')
+    }
+    child = up('sensors')
+    wait_for(lambda: all(heard.values()), 'measurements of both')
     assert child.stop() == 0
 
 

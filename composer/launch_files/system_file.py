@@ -25,12 +25,15 @@ class SystemFile:
     files: dict[str, str] = field(default_factory=dict)
 
 
-def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
+def render_system(
+    imported: Imported, source: str, stem: str, folder: str | None = None
+) -> SystemFile:
     """Return an imported launch file as a system.
 
     Args:
         source: What was imported, for the first line.
         stem: The name of the system, for the folder of its parameter files.
+        folder: Where it is to stand: paths below that are written as `{{ here }}/…`.
     """
     written = SystemFile()
     lines = [f'# Imported from {source}.', 'version: 1']
@@ -43,7 +46,7 @@ def render_system(imported: Imported, source: str, stem: str) -> SystemFile:
         if entries:
             lines += ['', f'{section}:']
         for entry in entries:
-            data = _finished(imported, entry, common, written, stem)
+            data = _from_here(_finished(imported, entry, common, written, stem), folder)
             lines += [f'  # {entry.origin}'] if entry.origin else []
             lines += [f'  {line}' for line in render_yaml({entry.name: data}).splitlines()]
     if not imported.entries:
@@ -122,6 +125,19 @@ def _finished(
     if waits:
         data['wait_for'] = waits[0] if len(waits) == 1 else waits
     return data
+
+
+def _from_here(data: Any, folder: str | None) -> Any:
+    """Return data with paths below a folder as the file there writes them."""
+    if isinstance(data, dict):
+        return {key: _from_here(value, folder) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_from_here(value, folder) for value in data]
+    is_path = isinstance(data, str) and folder is not None and data.startswith(f'{folder}/')
+    if not is_path or (not isinstance(data, Computed) and '{' in data):
+        return data
+    value = data.value if isinstance(data, Computed) else data
+    return Computed('{{ here }}' + data[len(str(folder)) :], value)
 
 
 def _with_files(data: dict[str, Any]) -> Any:

@@ -197,3 +197,16 @@ def test_an_argument_without_a_value_is_asked_for():
     with pytest.raises(LaunchError, match="requires the argument 'port'") as caught:
         read(launch.DeclareLaunchArgument('port'))
     assert caught.value.help == 'give it a value: port:=…'
+
+
+def test_paths_below_the_folder_of_the_system_are_relative_to_it(tmp_path):
+    program, other = str(tmp_path / 'parts' / 'run.py'), f'{tmp_path}_2/run.py'
+    place = Place(launch.Loader(), {})
+    process = launch.ExecuteLocal([python(program), python(other)])
+    DescriptionReader(place).read([launch.LaunchDescription([process])])
+    system = render_system(place.result, 'x.launch.py', 'x', str(tmp_path))
+
+    (data,) = yaml.safe_load(system.text)['processes'].values()
+    assert data['command'] == ['{{ here }}/parts/run.py', other]
+    (spec,) = resolved(tmp_path, system).values()
+    assert list(spec.command) == [program, other]

@@ -43,7 +43,9 @@ def import_launch_file(
         raise ComposerError(message)
     stem = output.stem if output else path.name.partition('.')[0]
     imported = import_file(path, given)
-    system = render_system(imported, path.name, stem)
+    # Not `resolve`: launch leaves links in its paths.
+    folder = str(output.parent.absolute()) if output else None
+    system = render_system(imported, path.name, stem, folder)
     if output is not None:
         for written in _write(system, output):
             click.echo(f'wrote {written}', err=True)

@@ -99,7 +99,7 @@ def test_components_are_loaded_and_loaded_again(compose, peer, wait_for, listed)
     child = compose(system(containers, nodes), CODE)
     child.wait_for_line('1 node, 2 components and 1 process ready in ')
 
-    told = ['[perception] extra talker', '[n]: starts', '[perception] extra second []']
+    told = ['perception]: extra talker', '[n]: starts', '[perception] extra second []']
     at = [child.lines.index(child.wait_for_line(each)) for each in told]
     assert at == sorted(at)
     child.wait_for_line("talker ['enable_logger_service', 'use_intra_process_comms']")
@@ -190,7 +190,7 @@ def test_an_edit_loads_and_unloads_what_it_names(compose, listed):
     # A component that cannot be loaded leaves all as it was.
     edit(a=stays, b=component('Broken'))
     child.wait_for_line('Component constructor threw an exception: no such device')
-    child.wait_for_line('[perception] extra b', times=4)
+    child.wait_for_line('[perception]: extra b', times=4)
     assert sorted(listed('/perception').values()) == ['/a', '/b', '/c']
     edit(a=stays)
     child.wait_for_line('reloaded in ', times=2)
