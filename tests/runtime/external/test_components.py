@@ -99,7 +99,7 @@ def test_components_are_loaded_and_loaded_again(compose, peer, wait_for, listed)
     child = compose(system(containers, nodes), CODE)
     child.wait_for_line('1 node, 2 components and 1 process ready in ')
 
-    told = ['perception]: extra talker', '[n]: starts', '[perception] extra second []']
+    told = ['perception]: extra talker', '[n]: starts', 'perception]: extra second []']
     at = [child.lines.index(child.wait_for_line(each)) for each in told]
     assert at == sorted(at)
     child.wait_for_line("talker ['enable_logger_service', 'use_intra_process_comms']")
