@@ -9,8 +9,11 @@ import pytest
 def behaviour_node(node):
     """Return a node as its behaviours see it."""
     from composer.runtime.nodes.behaviour_node import Node
+    from composer.runtime.nodes.created_entities import EntityCreation
 
-    return Node(node, SimpleNamespace(), {}, SimpleNamespace(), lambda code: None)
+    return Node(
+        node, SimpleNamespace(), {}, SimpleNamespace(), lambda code: None, EntityCreation()
+    )
 
 
 @pytest.fixture

@@ -310,6 +310,11 @@ _OF_COMPONENTS = (
     *('foreach', 'when', 'description', 'package', 'plugin', 'namespace', 'parameters'),
     *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for', 'lifecycle'),
 )
+_OF_DECLARED_NODES = (
+    *('publishers', 'subscriptions', 'services', 'service_clients', 'actions', 'action_clients'),
+    'nodl',
+)
+_DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
 LEFT_OUT: dict[str, str] = {
     **dict.fromkeys(
@@ -318,5 +323,11 @@ LEFT_OUT: dict[str, str] = {
     ),
     'system.containers': _APART,
     **{f'container.{key}': _APART for key in _OF_CONTAINERS},
-    **{f'component.{key}': _APART for key in _OF_COMPONENTS},
+    **{f'component.{key}': _APART for key in (*_OF_COMPONENTS, *_OF_DECLARED_NODES)},
+    **{f'process.{key}': _DECLARED for key in (*_OF_DECLARED_NODES, 'nodes')},
+    **{f'declared_node.{key}': _DECLARED for key in (*_OF_DECLARED_NODES, 'parameters')},
+    **{f'declared_topic.{key}': _DECLARED for key in ('type', 'topic', 'qos', 'external')},
+    **{f'declared_service.{key}': _DECLARED for key in ('type', 'service', 'qos', 'external')},
+    **{f'declared_action.{key}': _DECLARED for key in ('type', 'action', 'external')},
+    'process.launch': 'it needs a ros2, as tests/processes/test_launch_process.py has one',
 }
