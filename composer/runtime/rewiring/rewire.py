@@ -175,11 +175,12 @@ class Rewiring:
             targets('processes', *COMING),
             list(self._exchange_components(plan)),
         )
-        for name in targets('processes', Action.CHANGE):
+        for name, spec in self._new.spec.processes.items():
             process = self._processes.by_name[name]
-            self._transaction.on_undo(process.change, process.spec)
             before = process.spec.lifecycle
-            process.change(self._new.spec.processes[name])
+            # Also of one that does as before: errors tell of its places.
+            self._transaction.on_undo(process.change, process.spec)
+            process.change(spec)
             if process.run is not None and process.spec.lifecycle != before:
                 self._transaction.on_commit(self._processes.on_run, process.run)
         for full_name in removed:

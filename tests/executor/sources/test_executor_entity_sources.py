@@ -24,6 +24,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, Trigger
 
 from composer.executor import ComposerExecutor
+from composer.executor.c_bindings import Readiness
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
@@ -361,6 +362,7 @@ def test_a_response_waits_for_a_message_that_came_after_the_last_look(
     node: Any, executor: Any
 ) -> None:
     heard: list[str] = []
+    readiness = Readiness(executor.context)
     client = node.create_client(Trigger, 'greet')
     subscription = node.create_subscription(Int32, 'count', lambda _: heard.append('message'), 10)
     publisher = node.create_publisher(Int32, 'count', 10)
@@ -375,6 +377,8 @@ def test_a_response_waits_for_a_message_that_came_after_the_last_look(
     executor.spin_once(timeout_sec=DEADLINE_SEC)
     wait_for(executor._spinner.poller.peek)
     publisher.publish(Int32())
+    # Fast DDS may need a moment for the first one.
+    wait_for(lambda: readiness.has_messages(subscription.handle.pointer))
     executor.spin_until_future_complete(future, timeout_sec=DEADLINE_SEC)
     wait_for(lambda: executor.spin_once(timeout_sec=0) or 'response' in heard)
     assert heard == ['message', 'response']
