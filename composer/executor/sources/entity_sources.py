@@ -255,26 +255,27 @@ class ClientSource(EventSource):
     """A service client.
 
     Whoever spins until the response is there stops then. So what came with it or before it runs
-    first, once: rclpy executes tasks and messages before responses.
+    first, once for each response: rclpy executes tasks and messages before responses.
     """
 
     rank = 2
     ask = staticmethod(Readiness.has_responses)
     watch_entity = staticmethod(c_bindings.watch_client)
-    __slots__ = ('_has_yielded',)
+    __slots__ = ('_yielded_at',)
 
     def open(self) -> None:
         """See the base class."""
-        self._has_yielded = False
+        self._yielded_at = -1
         super().open()
 
     def run(self) -> Any:
         """See the base class."""
         parts = self.parts
-        self._has_yielded = not self._has_yielded and (
-            parts.poller.peek() or bool(parts.scheduler.count_tasks())
-        )
-        if self._has_yielded:
+        # A run in vain may have yielded: that does not count for what comes after it.
+        if self.revision != self._yielded_at and (
+            parts.poller.peek() or parts.scheduler.count_tasks()
+        ):
+            self._yielded_at = self.revision + 1
             parts.scheduler.add_events(self, 1)
             return NOTHING
         revision = self.revision
