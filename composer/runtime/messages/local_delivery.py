@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 import threading
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
@@ -54,6 +54,7 @@ class LocalPublisher:
         is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
+        tap: Called with each message before it goes anywhere; it must not change or keep it.
     """
 
     def __init__(self, node: Any, ros: RosPublisher, *, is_local: bool, returns: bool) -> None:
@@ -61,6 +62,7 @@ class LocalPublisher:
         self.ros = ros
         self.is_local = is_local
         self.reason = ''
+        self.tap: Callable[[Any], None] | None = None
         self._own_reason = why_sent(ros.qos_profile)
         self._returns = returns
         self._ownership = ownership_of(ros.msg_type)
@@ -117,6 +119,8 @@ class LocalPublisher:
         Args:
             is_held: Whether somebody refers to it.
         """
+        if self.tap is not None:
+            self.tap(message)
         if self.reason:
             self._send(message)
         elif (
@@ -178,6 +182,9 @@ class LocalPublisher:
             inbox.put(message)
 
 
+FindTap: TypeAlias = 'Callable[[LocalPublisher], Callable[[Any], None] | None]'
+
+
 class LocalSubscription:
     """A subscription of the system.
 
@@ -217,6 +224,15 @@ class LocalTopics:
         self._returns = not may_be_late(get_rmw_implementation_identifier(), os.environ)
         self._topics: defaultdict[tuple[str, type], _Topic] = defaultdict(_Topic)
         self._lock = threading.Lock()
+        self._find_tap: FindTap | None = None
+
+    def tap(self, find_tap: FindTap | None) -> None:
+        """Have `find_tap` say for each publisher, now and later, who is told of its messages."""
+        with self._lock:
+            self._find_tap = find_tap
+            for topic in self._topics.values():
+                for publisher in topic.publishers:
+                    publisher.tap = find_tap and find_tap(publisher)
 
     def add_publisher(
         self, node: Any, ros: RosPublisher, *, is_local: bool = True
@@ -225,6 +241,7 @@ class LocalTopics:
         publisher = LocalPublisher(node, ros, is_local=is_local, returns=self._returns)
         with self._lock:
             topic = self._topic(ros)
+            publisher.tap = self._find_tap and self._find_tap(publisher)
             topic.publishers.append(publisher)
             publisher.connect(topic.subscriptions)
         return publisher
