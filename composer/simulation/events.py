@@ -35,8 +35,8 @@ class Event:
         node: The full name of the node that did it; empty for the scenario itself.
         name: The full name of the topic, service or action; the parameter's name; the level of a
             log line in small letters; the owner of a callback or an error, as `timer 'tick'`.
-        value: The message (of an interface class; of a result, `(status, message)`, with the status
-            as in `succeeded`); the value of the parameter; the text of a line or a traceback; the
+        value: The message (of an interface class; of a result, `(status, message)`, with a status
+            as `succeeded`); the value of the parameter; the text of a line or a traceback; the
             name of the state; the exit code. Nobody changes it.
     """
 
