@@ -171,6 +171,10 @@ def _compile_min_items(_: SchemaCompiler, schema: Schema) -> Check:
     return lambda data: not isinstance(data, list) or len(data) >= schema['minItems']
 
 
+def _compile_max_items(_: SchemaCompiler, schema: Schema) -> Check:
+    return lambda data: not isinstance(data, list) or len(data) <= schema['maxItems']
+
+
 def _compile_min_length(_: SchemaCompiler, schema: Schema) -> Check:
     return lambda data: not isinstance(data, str) or len(data) >= schema['minLength']
 
@@ -232,6 +236,7 @@ _COMPILERS: dict[str, Callable[[SchemaCompiler, Schema], Check]] = {
     'exclusiveMinimum': _compile_exclusive_minimum,
     'maximum': _compile_maximum,
     'minItems': _compile_min_items,
+    'maxItems': _compile_max_items,
     'minLength': _compile_min_length,
     'minProperties': _compile_min_properties,
     'propertyNames': _compile_property_names,

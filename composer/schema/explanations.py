@@ -156,18 +156,21 @@ _BOUNDS = {
     'maximum': 'at most',
     'exclusiveMinimum': 'more than',
     'minItems': 'at least',
+    'maxItems': 'at most',
     'minLength': 'at least',
 }
-_BOUND_UNITS = {'minItems': ' item', 'minLength': ' character'}
+_BOUND_UNITS = {'minItems': ' item', 'maxItems': ' item', 'minLength': ' character'}
 
 
 def _explain_bound(error: ValidationError) -> Iterator[Violation]:
     keyword = str(error.validator)
     path = path_of(error)
     limit = f'{error.validator_value:.9f}'.rstrip('0').rstrip('.')
+    unit = _BOUND_UNITS.get(keyword, '')
+    plural = 's' if unit and error.validator_value != 1 else ''
     yield Violation(
         'out-of-range',
-        f'expected {_BOUNDS[keyword]} {limit}{_BOUND_UNITS.get(keyword, "")}, '
+        f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, '
         f'got {show_value(error.instance)}',
         path,
         droppable(path),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from composer.entity_kinds import KIND_OF_SECTION
 from composer.input_limits import MAX_FINDINGS
 from composer.records import record
-from composer.schema import schema_path
+from composer.schema import SCHEMA_NAME, schema_path
 from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain
 from composer.yaml_text.document import copy_data
@@ -77,6 +77,20 @@ def check_structure(document: Document) -> None:
         document.data, document.dropped = data, {*failed, *_drop_invalid(data, violations)}
 
 
+def check_keys_and_values(document: Document, schema_name: str) -> set[DataPath]:
+    """Check data of a file that is not a system; return the paths of what is not valid.
+
+    Misspelt keys are reported, and then read as those that were meant; other data stay.
+    """
+    if document.data is None:
+        return set()
+    document.data = copy_data(document.data)
+    document.diagnostics += _correct_keys(document.data, document.positions, schema=schema_name)
+    violations = _find_violations(document.data, schema_name)
+    document.diagnostics += [each.diagnostic(document.positions) for each in violations]
+    return {each.path for each in violations}
+
+
 def correct_outer_keys(document: Document) -> None:
     """Correct misspelt keys that are read before the check against the schema.
 
@@ -137,12 +151,13 @@ def _correct_keys(
     data: dict[str, Any],
     positions: SourceMap,
     is_wanted: Callable[[DataPath, str], bool] = lambda *_: True,
+    schema: str = SCHEMA_NAME,
 ) -> list[Diagnostic]:
     """Correct misspelt keys in place; return the findings for them."""
     findings: list[Diagnostic] = []
     while len(findings) < MAX_FINDINGS:
         names: dict[DataPath, dict[Key, str]] = {}
-        for violation in _find_violations(data):
+        for violation in _find_violations(data, schema):
             meant = violation.meant
             if meant is None or not is_wanted(violation.path, meant):
                 continue
@@ -207,11 +222,12 @@ def without_templates(schema: Any) -> Any:
     return plain
 
 
-def _find_violations(data: dict[str, Any]) -> list[Violation]:
+def _find_violations(data: dict[str, Any], schema: str = SCHEMA_NAME) -> list[Violation]:
     """Return the violations, a thousand at most."""
-    if _schema().is_valid(data):
+    if _schema(schema).is_valid(data):
         return []
-    violations = (each for error in _validator().iter_errors(data) for each in explain(error))
+    errors = _validator(schema).iter_errors(data)
+    violations = (each for error in errors for each in explain(error))
     return list(islice(violations, MAX_FINDINGS))
 
 
@@ -257,15 +273,15 @@ class _Schema:
 
 
 @cache
-def _schema() -> _Schema:
-    document = without_templates(json.loads(schema_path().read_text(encoding='utf-8')))
+def _schema(name: str = SCHEMA_NAME) -> _Schema:
+    document = without_templates(json.loads(schema_path(name).read_text(encoding='utf-8')))
     compiler = SchemaCompiler(document['$defs'])
     return _Schema(document, compiler, compiler.compile(document))
 
 
 @cache
-def _validator() -> Any:
+def _validator(name: str) -> Any:
     # Importing it takes a fifth of a check's time, and most files are valid.
     from composer.schema.validator import create_validator
 
-    return create_validator(_schema().document, _schema().compiler)
+    return create_validator(_schema(name).document, _schema(name).compiler)

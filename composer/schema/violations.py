@@ -140,10 +140,11 @@ def describe_types(types: str | list[str]) -> str:
 def owner_of(error: ValidationError) -> str:
     """Return the end of a message, which names the entry; empty for the whole file."""
     title = error.schema.get('title')
-    if not title or title == 'Composer system':
-        return ''
     path = path_of(error)
-    name = f" '{path[-1]}'" if path and path[-1] != title else ''
+    if not title or not path:
+        return ''
+    is_named = isinstance(path[-1], str) and path[-1] != title
+    name = f" '{path[-1]}'" if is_named else ''
     return f' in {title}{name}'
 
 

@@ -1,0 +1,1 @@
+"""Data of a scenario file, valid by its schema → specs."""

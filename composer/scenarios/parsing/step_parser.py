@@ -1,0 +1,96 @@
+"""Parses the steps of a case."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from composer.scenarios.parsing.case_parts import parse_values
+from composer.scenarios.parsing.names import absolute
+from composer.scenarios.specs import (
+    CallStepSpec,
+    GoalStepSpec,
+    PublishStepSpec,
+    ScheduleSpec,
+    SetParametersStepSpec,
+)
+from composer.scenarios.times import to_nanoseconds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from composer.scenarios.parsing.names import NameReader
+    from composer.scenarios.specs import StepSpec
+    from composer.yaml_text.positions import DataPath
+
+DEFAULT_TIMEOUT_SEC = 5.0
+
+
+def parse_step(data: Mapping[str, Any], path: DataPath, names: NameReader) -> StepSpec:
+    """Return a step."""
+    if 'set_parameters' in data:
+        return SetParametersStepSpec(
+            schedule=_parse_schedule(data),
+            values=parse_values(data['set_parameters'], names),
+            refused=data.get('refused', False),
+            path=path,
+        )
+    verb = next(verb for verb in _VERBS if verb in data)
+    return _VERBS[verb](data, path)
+
+
+def _parse_schedule(data: Mapping[str, Any]) -> ScheduleSpec:
+    every = data.get('every')
+    return ScheduleSpec(
+        at_ns=to_nanoseconds(data.get('at', 0)),
+        every_ns=None if every is None else to_nanoseconds(every),
+        times=None if 'times' not in data else int(data['times']),
+    )
+
+
+def _parse_publish(data: Mapping[str, Any], path: DataPath) -> PublishStepSpec:
+    return PublishStepSpec(
+        schedule=_parse_schedule(data),
+        topic=absolute(data['publish']),
+        message=data.get('message', {}),
+        type=data.get('type'),
+        qos=data.get('qos'),
+        path=path,
+    )
+
+
+def _parse_call(data: Mapping[str, Any], path: DataPath) -> CallStepSpec:
+    return CallStepSpec(
+        schedule=_parse_schedule(data),
+        service=absolute(data['call']),
+        request=data.get('request', {}),
+        response=data.get('response'),
+        fails=data.get('fails', False),
+        timeout_sec=float(data.get('timeout', DEFAULT_TIMEOUT_SEC)),
+        tolerance=float(data.get('tolerance', 0)),
+        type=data.get('type'),
+        path=path,
+    )
+
+
+def _parse_goal(data: Mapping[str, Any], path: DataPath) -> GoalStepSpec:
+    cancel_at = data.get('cancel_at')
+    return GoalStepSpec(
+        schedule=_parse_schedule(data),
+        action=absolute(data['send_goal']),
+        goal=data.get('goal', {}),
+        cancel_at_ns=None if cancel_at is None else to_nanoseconds(cancel_at),
+        feedback=tuple(data['feedback']) if 'feedback' in data else None,
+        result=data.get('result'),
+        status=data.get('status', 'succeeded' if cancel_at is None else None),
+        timeout_sec=float(data.get('timeout', DEFAULT_TIMEOUT_SEC)),
+        tolerance=float(data.get('tolerance', 0)),
+        type=data.get('type'),
+        path=path,
+    )
+
+
+_VERBS: dict[str, Callable[[Mapping[str, Any], DataPath], StepSpec]] = {
+    'publish': _parse_publish,
+    'call': _parse_call,
+    'send_goal': _parse_goal,
+}
