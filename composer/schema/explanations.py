@@ -170,8 +170,7 @@ def _explain_bound(error: ValidationError) -> Iterator[Violation]:
     plural = 's' if unit and error.validator_value != 1 else ''
     yield Violation(
         'out-of-range',
-        f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, '
-        f'got {show_value(error.instance)}',
+        f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, got {show_value(error.instance)}',
         path,
         droppable(path),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.scenarios.parsing.names import absolute
+from composer.scenarios.parsing.full_names import absolute
 from composer.scenarios.specs import (
     ActionStandInSpec,
     FeedbackSpec,
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from composer.scenarios.parsing.names import NameReader
+    from composer.scenarios.parsing.full_names import NameReader
     from composer.scenarios.specs import ValuesByNode
     from composer.yaml_text.positions import DataPath
 

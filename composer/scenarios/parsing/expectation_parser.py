@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.scenarios.parsing.case_parts import parse_values, parse_window
-from composer.scenarios.parsing.names import absolute
+from composer.scenarios.parsing.full_names import absolute
 from composer.scenarios.specs import (
     ErrorExpectationSpec,
     ExitExpectationSpec,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from composer.scenarios.parsing.names import NameReader
+    from composer.scenarios.parsing.full_names import NameReader
     from composer.scenarios.specs import ExpectationSpec
     from composer.yaml_text.positions import DataPath
 

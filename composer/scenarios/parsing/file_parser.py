@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import diagnostic_at
 from composer.scenarios.parsing.case_parts import parse_given
 from composer.scenarios.parsing.expectation_parser import parse_expectation
-from composer.scenarios.parsing.names import NameReader
+from composer.scenarios.parsing.full_names import NameReader
 from composer.scenarios.parsing.step_parser import parse_step
 from composer.scenarios.specs import CaseSpec, ScenarioSpec, SystemReferenceSpec
 from composer.scenarios.times import to_nanoseconds

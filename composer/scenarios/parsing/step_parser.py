@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.scenarios.parsing.case_parts import parse_values
-from composer.scenarios.parsing.names import absolute
+from composer.scenarios.parsing.full_names import absolute
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
@@ -18,7 +18,7 @@ from composer.scenarios.times import to_nanoseconds
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from composer.scenarios.parsing.names import NameReader
+    from composer.scenarios.parsing.full_names import NameReader
     from composer.scenarios.specs import StepSpec
     from composer.yaml_text.positions import DataPath
 
