@@ -5,7 +5,7 @@ import textwrap
 import pytest
 
 from composer.reports.text import render_finding
-from composer.scenarios.loading import load_scenarios
+from composer.scenarios.scenario_files import load_scenarios
 from composer.scenarios.specs import (
     CallStepSpec,
     ErrorExpectationSpec,
