@@ -1,0 +1,1 @@
+"""Recordings: MCAP files as rosbag2 writes them, written and read."""

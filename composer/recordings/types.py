@@ -1,0 +1,171 @@
+"""The message classes of recorded topics: installed ones, or built of what the file defines."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
+from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.classes import InterfaceNotFoundError, import_interface
+from composer.recordings.definitions import full_definition, import_message, type_hash
+from composer.recordings.recorded_topics import RecordedTopic, RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from composer.recordings.reading import Recording
+
+_PART: Final = re.compile(r'^=+\nMSG: *(\S+) *\n', re.MULTILINE)
+_FIELD: Final = re.compile(r'^[ \t]*([\w/]+)(\S*)[ \t]+(\w+)[ \t]*(?!=)(?:[^=\w]|$)', re.MULTILINE)
+
+
+class MessageTypes:
+    """The classes of the topics of a recording.
+
+    Packages that are not installed are built of the definitions in the file, as far as these and
+    the build tools are there.
+
+    Args:
+        progress: Gets a short line about each step that takes long.
+
+    Attributes:
+        problems: Why the messages of a topic cannot be used, by its name and type.
+    """
+
+    def __init__(
+        self, recording: Recording, progress: Callable[[str], None] = lambda _line: None
+    ) -> None:
+        self.problems: dict[tuple[str, str], str] = {}
+        self._classes: dict[tuple[str, str], type] = {}
+        usable = [each for each in recording.topics if not each.problem]
+        self.problems |= {
+            (each.name, each.type): each.problem for each in recording.topics if each.problem
+        }
+        reason = _build_missing(usable, progress)
+        for topic in usable:
+            try:
+                found = import_message(topic.type)
+                _check_definition(topic, found)
+            except ComposerError as error:
+                is_absent = reason and isinstance(error, InterfaceNotFoundError)
+                self.problems[topic.name, topic.type] = str(reason if is_absent else error)
+            else:
+                self._classes[topic.name, topic.type] = found
+
+    def find(self, topic: RecordedTopic) -> type | None:
+        """Return the class of a topic's messages; `None` if it has a problem."""
+        return self._classes.get((topic.name, topic.type))
+
+    def decoder(self, topic: RecordedTopic) -> Callable[[bytes], Any] | None:
+        """Return what makes a message of its recorded bytes; `None` if it has a problem."""
+        found = self.find(topic)
+        return found and partial(_decode, topic, found)
+
+
+def _decode(topic: RecordedTopic, message_class: type, data: bytes) -> Any:
+    try:
+        return _rclpy.rclpy_deserialize(data, message_class)
+    except Exception as error:
+        message = f"a recorded message of '{topic.name}' is no {topic.type}: {error}"
+        raise RecordingError(message) from error
+
+
+def _check_definition(topic: RecordedTopic, message_class: type) -> None:
+    """Refuse a topic whose type was another one when it was recorded.
+
+    Raises:
+        RecordingError: Its messages would be read wrongly.
+    """
+    own_hash = type_hash(message_class)
+    if topic.type_hash and own_hash:
+        is_same = topic.type_hash == own_hash
+    elif topic.definition:
+        ours, theirs = full_definition(message_class), topic.definition
+        is_same = _fields_by_type(ours, topic.type) == _fields_by_type(theirs, topic.type)
+    else:
+        is_same = True
+    if not is_same:
+        message = f'{topic.type} was recorded with another definition than the installed one'
+        raise RecordingError(message)
+
+
+def _fields_by_type(definition: str, root: str) -> dict[str, list[tuple[str, ...]]]:
+    """Return the types and names of fields, with short names of types, whatever else differs."""
+    return {
+        name: [
+            (kind.rpartition('/')[2], bounds, field)
+            for kind, bounds, field in _FIELD.findall(text)
+        ]
+        for name, text in split_definition(definition, root).items()
+    }
+
+
+def split_definition(definition: str, root: str) -> dict[str, str]:
+    """Return the definition of each message in a recorded one, by full name.
+
+    Args:
+        root: The full name of the first one.
+    """
+    first, *others = _PART.split(definition)
+    found = {root: first}
+    for name, text in zip(others[::2], others[1::2], strict=True):
+        package, _, short = name.rpartition('/')
+        found[f'{package.partition("/")[0]}/msg/{short}'] = text
+    return found
+
+
+def _build_missing(
+    topics: Iterable[RecordedTopic], progress: Callable[[str], None]
+) -> ComposerError | None:
+    """Build the packages that are not installed; return why that did not work."""
+    missing: dict[str, dict[str, str]] = {}
+    prefixes = ament_prefixes()
+    for topic in topics:
+        for name, text in split_definition(topic.definition, topic.type).items():
+            package, kind, short = name.split('/')
+            is_absent = not find_package(package, prefixes, INTERFACE_INDEX)
+            if kind == 'msg' and is_absent and topic.definition:
+                missing.setdefault(package, {})[short] = text
+    if not missing or _can_import(missing):
+        return None
+    # They are imported only where something must be built.
+    from composer.interfaces.build.provision import import_packages, provide_packages
+    from composer.interfaces.definitions.packages import load_packages
+
+    try:
+        with tempfile.TemporaryDirectory(prefix='composer-recording-') as folder:
+            folders = _write_definitions(Path(folder), missing)
+            packages = load_packages(folders, InterfaceCatalogue())
+            import_packages(provide_packages(packages, progress))
+    except ComposerError as error:
+        return error
+    return None
+
+
+def _can_import(missing: Mapping[str, Iterable[str]]) -> bool:
+    """Return whether Python finds the messages nevertheless, as in a folder of `PYTHONPATH`."""
+    try:
+        for package, names in missing.items():
+            for name in names:
+                import_interface(f'{package}/msg/{name}')
+    except InterfaceNotFoundError:
+        return False
+    return True
+
+
+def _write_definitions(folder: Path, missing: Mapping[str, Mapping[str, str]]) -> dict[str, Path]:
+    folders = {}
+    for package, messages in missing.items():
+        folders[package] = folder / package
+        (folder / package / 'msg').mkdir(parents=True)
+        for name, text in messages.items():
+            path = folder / package / 'msg' / f'{name}.msg'
+            path.write_text(text, encoding='utf-8')
+    return folders

@@ -1,0 +1,96 @@
+"""Recordings to read, and messages with something in each field."""
+
+from itertools import count
+
+import pytest
+from composer.interfaces.class_fields import describe_class
+from composer.interfaces.classes import import_interface, interface_name
+
+SCALARS = {
+    'bool': lambda number: bool(number % 2),
+    'byte': lambda number: bytes([number % 256]),
+    'char': lambda number: number % 256,
+    'float32': lambda number: number / 4,
+    'float64': lambda number: number / 3,
+    'string': lambda number: f'ü{number}',
+    'wstring': lambda number: f'語{number}',
+}
+QOS = {
+    'history': 'keep_last',
+    'depth': 10,
+    'reliability': 'reliable',
+    'durability': 'volatile',
+    'deadline': 2**63 - 1,
+    'lifespan': 2**63 - 1,
+    'liveliness': 'automatic',
+    'liveliness_lease_duration': 2**63 - 1,
+}
+
+
+def filled(message_class, numbers=None):
+    """Return a message whose fields have values that differ."""
+    numbers = numbers or count(1)
+    message = message_class()
+    for field in describe_class(message_class).fields:
+        setattr(message, field.name, _value(field.type, numbers))
+    return message
+
+
+def _value(field, numbers):
+    if field.array is not None:
+        size = 3 if field.array_bound is None else min(3, field.array_bound)
+        size = field.array_bound if field.array == 'fixed' else size
+        return [_value(field.item, numbers) for _ in range(size)]
+    if field.nested:
+        return filled(import_interface(field.nested), numbers)
+    number = next(numbers)
+    value = SCALARS[field.kind](number) if field.kind in SCALARS else number % 100
+    return value[: field.string_bound] if field.string_bound else value
+
+
+def write_recording(path, topics, *, chunks=1, closes=True):
+    """Write an MCAP file, and return it.
+
+    Args:
+        topics: Messages by topic; they are published one ns after the other.
+        chunks: Among how many chunks they are distributed.
+        closes: Whether the file is completed.
+    """
+    from composer.recordings import metadata
+    from composer.recordings.definitions import full_definition, type_hash
+    from composer.recordings.mcap_writer import McapWriter
+    from rclpy.serialization import serialize_message
+
+    with path.open('wb', buffering=0) as stream:
+        writer = McapWriter(stream, 'test')
+        entries = []
+        for topic, messages in topics.items():
+            kind = type(messages[0])
+            schema = (interface_name(kind), 'ros2msg', full_definition(kind).encode())
+            about = {
+                'offered_qos_profiles': metadata.render_qos([QOS]),
+                'topic_type_hash': type_hash(kind),
+            }
+            channel = writer.add_channel(topic, schema, about)
+            entries += [(channel, serialize_message(each)) for each in messages]
+        size = -(-len(entries) // chunks)
+        for number, (channel, data) in enumerate(entries):
+            writer.add_messages([(channel, 1000 + number, 900 + number, data)])
+            if number % size == size - 1:
+                writer.flush()
+        if closes:
+            writer.finish()
+    return path
+
+
+@pytest.fixture
+def all_messages():
+    """Return a filled message of each type of test_msgs and of some nested deeply, by topic."""
+    from composer.interfaces.catalogue import InterfaceCatalogue
+
+    catalogue = InterfaceCatalogue()
+    names = [*catalogue.names('msg', 'test_msgs'), 'nav_msgs/msg/Odometry', 'std_msgs/msg/Char']
+    return {
+        f'/{name.replace("/", "_").lower()}': [filled(import_interface(name)) for _ in range(3)]
+        for name in names
+    }
