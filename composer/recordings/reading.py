@@ -68,7 +68,7 @@ class Recording:
         """
         from composer.recordings.types import MessageTypes
 
-        types = MessageTypes(self)
+        types = MessageTypes(self.topics)
         for message in self.raw_messages(topics):
             decode = types.decoder(message.topic)
             if decode is not None:

@@ -18,16 +18,14 @@ from composer.recordings.definitions import full_definition, import_message, typ
 from composer.recordings.recorded_topics import RecordedTopic, RecordingError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from composer.recordings.reading import Recording
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
 _PART: Final = re.compile(r'^=+\nMSG: *(\S+) *\n', re.MULTILINE)
 _FIELD: Final = re.compile(r'^[ \t]*([\w/]+)(\S*)[ \t]+(\w+)[ \t]*(?!=)(?:[^=\w]|$)', re.MULTILINE)
 
 
 class MessageTypes:
-    """The classes of the topics of a recording.
+    """The classes of recorded topics.
 
     Packages that are not installed are built of the definitions in the file, as far as these and
     the build tools are there.
@@ -40,14 +38,14 @@ class MessageTypes:
     """
 
     def __init__(
-        self, recording: Recording, progress: Callable[[str], None] = lambda _line: None
+        self,
+        topics: Collection[RecordedTopic],
+        progress: Callable[[str], None] = lambda _line: None,
     ) -> None:
         self.problems: dict[tuple[str, str], str] = {}
         self._classes: dict[tuple[str, str], type] = {}
-        usable = [each for each in recording.topics if not each.problem]
-        self.problems |= {
-            (each.name, each.type): each.problem for each in recording.topics if each.problem
-        }
+        usable = [each for each in topics if not each.problem]
+        self.problems |= {(each.name, each.type): each.problem for each in topics if each.problem}
         reason = _build_missing(usable, progress)
         for topic in usable:
             try:

@@ -3,6 +3,7 @@
 from itertools import count
 
 import pytest
+
 from composer.interfaces.class_fields import describe_class
 from composer.interfaces.classes import import_interface, interface_name
 
@@ -56,10 +57,11 @@ def write_recording(path, topics, *, chunks=1, closes=True):
         chunks: Among how many chunks they are distributed.
         closes: Whether the file is completed.
     """
+    from rclpy.serialization import serialize_message
+
     from composer.recordings import metadata
     from composer.recordings.definitions import full_definition, type_hash
     from composer.recordings.mcap_writer import McapWriter
-    from rclpy.serialization import serialize_message
 
     with path.open('wb', buffering=0) as stream:
         writer = McapWriter(stream, 'test')

@@ -5,13 +5,13 @@ import struct
 from collections import Counter
 
 import pytest
-from composer.recordings.reading import read_recording
-from composer.recordings.recorded_topics import RecordingError
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
+from composer.recordings.reading import read_recording
+from composer.recordings.recorded_topics import RecordingError
 from tests.recordings.conftest import QOS, write_recording
 
 pytestmark = pytest.mark.ros
@@ -187,7 +187,7 @@ def test_a_topic_of_another_definition_is_left_out(tmp_path):
     recording = read_recording(path)
 
     assert [topic for _, topic, _ in recording.messages()] == ['/t1']
-    assert MessageTypes(recording).problems == {
+    assert MessageTypes(recording.topics).problems == {
         ('/t0', 'std_msgs/msg/String'): (
             'std_msgs/msg/String was recorded with another definition than the installed one'
         )
