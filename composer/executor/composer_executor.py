@@ -15,10 +15,12 @@ from rclpy.task import Future, Task
 
 from composer.executor.after_fork import RefusedSpinner
 from composer.executor.deadlines import DelayedCall
+from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.sources.inbox import Inbox
 from composer.executor.spinner import Spinner
 from composer.executor.switch_interval import short_switch_interval
 from composer.executor.tasks import ExecutorTask, ImmediateCallback, ScheduledTask
+from composer.executor.wait_set_thread import WaitSetThread
 
 _MAX_THREADS = 256
 _NEVER_CALLED = (
@@ -64,8 +66,13 @@ class ComposerExecutor(MultiThreadedExecutor):
         super().__init__(num_threads, context=context)  # Its pool is never used.
         self.is_forked = False
         self.has_own_rules = type(self).can_execute is not ComposerExecutor.can_execute
-        self._spinner = Spinner(self, num_threads or _MAX_THREADS, self._guard, self._sigint_gc)
+        self._spinner = self._create_spinner(num_threads or _MAX_THREADS)
         _executors.add(self)
+
+    def _create_spinner(self, max_running: int) -> Spinner:
+        """Return what is behind all methods."""
+        parts = ExecutorParts(self, max_running)
+        return Spinner(parts, WaitSetThread(self._guard, self._sigint_gc, self.context))
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)

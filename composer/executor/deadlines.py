@@ -56,7 +56,7 @@ class Deadlines:
     """
 
     def __init__(self, wake: Callable[[], None]) -> None:
-        self.timer = TimerFd(blocking=False)
+        self.timer = self._create_timer()
         self.jumped: deque[JumpingClock] = deque()
         self.wake = wake
         self._lock = threading.Lock()
@@ -66,6 +66,9 @@ class Deadlines:
         self._numbers = itertools.count()
         self._heap_limit = _MIN_HEAP_LIMIT
         self._clocks: dict[int, JumpingClock] = {}
+
+    def _create_timer(self) -> TimerFd:
+        return TimerFd(blocking=False)
 
     def set(self, timed: Timed, deadline_ns: int | None) -> None:
         """Replace the deadline of `timed`; None for no deadline."""
@@ -77,13 +80,17 @@ class Deadlines:
                 replaced[-1] = None
             if deadline_ns is None:
                 return
-            entry = self._entries[timed] = [deadline_ns, next(self._numbers), timed]
+            entry = self._entries[timed] = [deadline_ns, self._number(timed), timed]
             heapq.heappush(self._heap, entry)
             if len(self._heap) > self._heap_limit:
                 self._drop_replaced()
             # An earlier entry of the same may be the first: others come between the two.
             if self._heap[0] is entry:
                 self.timer.expire_at(deadline_ns)
+
+    def _number(self, _timed: Timed) -> Any:
+        """Return what orders `timed` among those with the same deadline; no two are equal."""
+        return next(self._numbers)
 
     def run_due(self) -> None:
         """Call `on_deadline` of all that is due, and set the kernel timer for the next."""

@@ -39,6 +39,7 @@ class EventLoop:
         runner: Executes what the scheduler started.
         on_error: Receives what the loop itself raised.
         notify: Makes those who spin look again.
+        workers: Creates the threads, as `WorkerThreads` does.
 
     Attributes:
         watchers: Those who want to look again after each callback.
@@ -51,8 +52,9 @@ class EventLoop:
         runner: 'CallbackRunner',
         on_error: Callable[[BaseException], None],
         notify: Callable[[], None],
+        workers: Callable[..., WorkerThreads],
     ) -> None:
-        self.workers = WorkerThreads(self._lead, self._on_takeover, on_error)
+        self.workers = workers(self._lead, self._on_takeover, on_error)
         self.watchers: set[object] = set()
         self._parts = parts
         self._registry = registry

@@ -28,16 +28,19 @@ class EventPoller:
     All listeners have been called when `peek` returns. It raises `LostDescriptorError` if somebody
     has closed or replaced a descriptor, a second later at most.
 
+    Args:
+        deadlines: Creates those of the executor, as `Deadlines` does.
+
     Attributes:
         waiting_threads: Those that wait.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, deadlines: Callable[[Callable[[], None]], Deadlines] = Deadlines) -> None:
         self._epoll = select.epoll()
         self.event_fds = EventFds(self._epoll)
         self.waiting_threads: set[int] = set()
         self._next_check = 0.0
-        self.deadlines = Deadlines(self.wake)
+        self.deadlines = deadlines(self.wake)
         # Last, for the others close themselves if there are no more descriptors.
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._epoll.register(self._wake_fd, select.EPOLLIN)

@@ -16,7 +16,7 @@ from composer.executor.event_loop import CallbackRunner, EventLoop
 from composer.executor.scheduler import Session
 from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.wait_set_thread import WaitSetThread
-from composer.executor.worker_threads import TAKEOVER_SEC
+from composer.executor.worker_threads import TAKEOVER_SEC, WorkerThreads
 
 GRACE_SEC = 0.05
 """How long `spin_once` waits for the callback that it began, and `spin` for those under way."""
@@ -63,25 +63,31 @@ class Spinner:
     """All that is behind the methods of `ComposerExecutor`.
 
     Args:
-        executor: The executor that futures are given.
-        max_running: How many callbacks may run at the same time.
-        guard: A guard condition for the wait set thread.
-        sigint_guard: The guard condition that rclpy triggers on SIGINT and SIGTERM.
+        parts: The parts of the executor.
+        wait_set_thread: Sees what the poller does not.
+        workers: Creates the threads, as `WorkerThreads` does.
     """
 
-    def __init__(self, executor: Any, max_running: int, guard: Any, sigint_guard: Any) -> None:
-        parts = ExecutorParts(executor, max_running)
+    def __init__(
+        self,
+        parts: ExecutorParts,
+        wait_set_thread: WaitSetThread,
+        workers: Callable[..., WorkerThreads] = WorkerThreads,
+    ) -> None:
         self.poller = parts.poller
         self.scheduler = parts.scheduler
         self.notifier = Notifier()
         self.is_shutdown = False
-        self.wait_set_thread = WaitSetThread(guard, sigint_guard, executor.context, self)
+        self.wait_set_thread = wait_set_thread
+        wait_set_thread.serve(self)
         self.registry = EntityRegistry(parts, self.wait_set_thread)
         runner = CallbackRunner(parts)
-        self._loop = EventLoop(parts, self.registry, runner, self.report, self.notifier.notify)
+        self._loop = EventLoop(
+            parts, self.registry, runner, self.report, self.notifier.notify, workers
+        )
         self.workers = self._loop.workers
         self.execute_at_once = self._loop.execute_at_once
-        self._executor = executor
+        self._executor = parts.executor
         self._waiting_callbacks: set[object] = set()
         self._are_callbacks_free = False
         self._closing = threading.Lock()

@@ -55,14 +55,13 @@ class WaitSetThread:
         guard: A guard condition that wakes the thread.
         sigint_guard: The guard condition that rclpy triggers on SIGINT and SIGTERM.
         context: The rclpy context.
-        owner: The executor.
     """
 
-    def __init__(self, guard: Any, sigint_guard: Any, context: Any, owner: Owner) -> None:
+    def __init__(self, guard: Any, sigint_guard: Any, context: Any) -> None:
         self._guard = guard
         self._sigint_guard = sigint_guard
         self._context = context
-        self._owner = owner
+        self._owner: Owner
         self._lock = threading.Lock()
         self._flushed = threading.Condition(self._lock)
         self._flush_requests = 0
@@ -71,22 +70,26 @@ class WaitSetThread:
         self._closing = False
         self._users: set[object] = set()
         self._is_new = False
-        self._waited_for: set[WaitSetSource] = set()
+        self._waited_for: dict[WaitSetSource, None] = {}
         self._signalled_until = 0.0
         self._events_from = 0.0
         self._wait_set: tuple[tuple[int, ...], Any] | None = None
+
+    def serve(self, owner: Owner) -> None:
+        """Tell an executor what it sees, before it begins."""
+        self._owner = owner
 
     def add(self, source: WaitSetSource) -> None:
         """Wait for the entity of `source`."""
         source.on_taken = self.wake
         with self._lock:
-            self._waited_for.add(source)
+            self._waited_for[source] = None
         self.wake()
 
     def remove(self, source: WaitSetSource) -> None:
         """Undo `add`; when this returns, the thread does not wait for the entity."""
         with self._lock:
-            self._waited_for.discard(source)
+            self._waited_for.pop(source, None)
         self.flush()
 
     def add_user(self, user: object) -> None:

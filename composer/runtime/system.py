@@ -91,9 +91,7 @@ class System:
         self._stop_request = stop_request or StopRequest()
         self._nodes: dict[str, LiveNode] = {}
         self._context = create_ros_context(ros_arguments)
-        self._executor = SystemExecutor(
-            self._context,
-            spec.threads,
+        self._executor = self._create_executor(
             log=system_logger.error,
             on_lost=partial(
                 self._stop_request.fail, 'the ROS context was shut down, so the system ends'
@@ -133,6 +131,14 @@ class System:
         self._control = ControlNode(
             self, spec, self._handle.health, self._hang_watcher.overdue_calls, commands
         )
+
+    def _create_executor(self, **calls: Any) -> SystemExecutor:
+        """Return what runs the callbacks.
+
+        Args:
+            calls: Arguments of `SystemExecutor`: what it calls.
+        """
+        return SystemExecutor(self._context, self._reading.spec.threads, **calls)
 
     def _create_handle(
         self, ros_arguments: Sequence[str], log_levels: Sequence[str]
@@ -185,9 +191,7 @@ class System:
         """
         try:
             self._control.start(self._context, self._handle.ros_arguments)
-            self._starter.create(self._reading.spec.nodes.values())
-            for node in self._nodes.values():
-                self._executor.add_node(node.ros)
+            self._create_nodes()
             self._executor.start()
             self._hang_watcher.start()
             self._graph_watcher.start()
@@ -216,6 +220,12 @@ class System:
         self.state.is_up = True
         self._control.begin()
         self._parameter_services.begin()
+
+    def _create_nodes(self) -> None:
+        """Create all nodes; none of their behaviours is called yet."""
+        self._starter.create(self._reading.spec.nodes.values())
+        for node in self._nodes.values():
+            self._executor.add_node(node.ros)
 
     def wait(self) -> None:
         """Wait until a stop is requested, or nobody reads the output any more."""

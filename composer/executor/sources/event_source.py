@@ -14,6 +14,8 @@ from composer.executor.scheduler import Group, Scheduler
 from composer.executor.sources.qos_events import QosEventPoll
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from composer.executor.sources.inbox import Inbox
 
 NOTHING = object()
@@ -21,16 +23,28 @@ NOTHING = object()
 
 
 class ExecutorParts:
-    """The parts of an executor that its sources and its threads work with."""
+    """The parts of an executor that its sources and its threads work with.
 
-    def __init__(self, executor: Any, max_running: int) -> None:
+    Args:
+        max_running: How many callbacks may run at the same time.
+        poller: Where events arrive; a new one by default.
+        scheduler: Creates the queues, as `Scheduler` does.
+    """
+
+    def __init__(
+        self,
+        executor: Any,
+        max_running: int,
+        poller: EventPoller | None = None,
+        scheduler: Callable[..., Scheduler] = Scheduler,
+    ) -> None:
         self.executor = executor
         self.readiness = Readiness(executor.context)
-        self.poller = EventPoller()
+        self.poller = poller or EventPoller()
         self.event_fds = self.poller.event_fds
         self.deadlines = self.poller.deadlines
         self.qos_event_poll = QosEventPoll(self.deadlines, self.readiness, self.event_fds.lock)
-        self.scheduler = Scheduler(
+        self.scheduler = scheduler(
             max_running, self.poller.wake, self.poller.waiting_threads, self._has_node
         )
 

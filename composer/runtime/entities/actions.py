@@ -19,12 +19,15 @@ from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner, Progress
 from composer.runtime.entities.goal_queue import GoalQueue, goal_key
 from composer.runtime.entities.local_goals import GoalServer
+from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
+from composer.runtime.nodes.goals import STATUS_NAMES
 
 if TYPE_CHECKING:
     from composer.language.specs import ActionSpec
     from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.live_node import LiveNode
+    from composer.simulation.events import EventKind
 
 _POLL_SEC = 0.005
 # A request to cancel takes effect right after its callback; this only bounds an error of rclpy.
@@ -149,6 +152,7 @@ class ActionServer(GoalServer):
         self._queue.add(goal)
 
     async def _decide(self, goal: Any) -> GoalResponse:
+        self._execution.tell('goal', goal)
         if self._execution.is_ending() or not self._queue.has_room():
             return GoalResponse.REJECT
         if self._accept is None:
@@ -163,6 +167,7 @@ class ActionServer(GoalServer):
         return GoalResponse.ACCEPT
 
     def _cancel(self, goal: Any) -> CancelResponse:
+        self._execution.tell('cancel', goal.request)
         if self._queue.take_out(goal):
             threading.Thread(target=self._end_cancelled, args=(goal,), daemon=True).start()
         return CancelResponse.ACCEPT
@@ -194,6 +199,7 @@ class _Execution:
         action_class: Any = import_interface(spec.type)
         self._node = node
         self._queue = queue
+        self._name = node.ros.resolve_action_name(spec.action)
         self._begin = node.bind(spec.behaviour, Owner('action', spec.name))
         self._result_class = action_class.Result
         self._to_result = converter_for(action_class.Result).convert
@@ -219,9 +225,21 @@ class _Execution:
             if goal.is_active:
                 # Its behaviour raised.
                 goal.abort()
-            return self._result_class() if result is FAILED else result
+            result = self._result_class() if result is FAILED else result
+            self._tell_result(goal, result)
+            return result
         finally:
             self._queue.finished(goal)
+
+    def tell(self, kind: EventKind, message: Any) -> None:
+        """Tell who observes the system."""
+        self._node.system.tell(kind, self._node.full_name, self._name, message)
+
+    def _tell_result(self, goal: Any, result: Any) -> None:
+        if (observe := self._node.system.observe) is not None:
+            status = STATUS_NAMES.get(goal.status, 'unknown')
+            copy = ownership_of(self._result_class).copy
+            observe('result', self._node.full_name, self._name, (status, copy(result)))
 
     def is_ending(self) -> bool:
         """Return whether goals are neither accepted nor continued."""
@@ -271,7 +289,9 @@ class _Execution:
 
     def _publish(self, goal: Any, payload: Any) -> None:
         if payload is not None:
-            goal.publish_feedback(self._to_feedback(payload))
+            feedback = self._to_feedback(payload)
+            self.tell('feedback', feedback)
+            goal.publish_feedback(feedback)
 
     def _must_end(self, goal: Any) -> bool:
         return (

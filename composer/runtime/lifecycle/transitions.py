@@ -246,6 +246,8 @@ class Lifecycle:
                     timer.reset()
         self.follow()
         node.system.executor.wake()
+        if node.system.observe is not None:
+            node.system.observe('state', node.full_name, '', self.state)
 
     def _let_publish(self, *, may_publish: bool) -> None:
         self._gate.may_publish = may_publish

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from composer.errors import ComposerError
     from composer.runtime.behaviours.waits import Waits
 
-_STATUS_NAMES = {
+STATUS_NAMES = {
     GoalStatus.STATUS_UNKNOWN: 'unknown',
     GoalStatus.STATUS_ACCEPTED: 'accepted',
     GoalStatus.STATUS_EXECUTING: 'executing',
@@ -54,9 +54,9 @@ class Goal:
     def status(self) -> str:
         """The state of the goal: `executing`, `succeeded`, `canceled`, `aborted`, and so on."""
         if self.result_future.exception() is not None:
-            return _STATUS_NAMES[GoalStatus.STATUS_UNKNOWN]
+            return STATUS_NAMES[GoalStatus.STATUS_UNKNOWN]
         if self.result_future.done():
-            return _STATUS_NAMES[self.result_future.result().status]
+            return STATUS_NAMES[self.result_future.result().status]
         return 'executing'
 
     @property

@@ -22,7 +22,7 @@ from composer.runtime.behaviours.callables import Method, make_instance
 from composer.runtime.behaviours.calls import FAILED, BehaviourCall, discard_result
 from composer.runtime.behaviours.error_reports import ErrorReporter
 from composer.runtime.behaviours.running_calls import Owner, RunningCalls
-from composer.runtime.behaviours.tracebacks import summarize
+from composer.runtime.behaviours.tracebacks import format_behaviour_error, summarize
 from composer.runtime.behaviours.waits import Waits
 from composer.runtime.health.hangs import HangLimit
 from composer.runtime.health.missed import count_missed
@@ -206,6 +206,7 @@ class LiveNode:
             if isinstance(error, SystemStoppingError):
                 return
             health.note_error(error)
+            self._tell_error(owner, error)
             self.errors.report(f'{owner} ({self.place(path)})', error)
             self.system.act_on_error(self.spec.full_name, own.on_error)
 
@@ -216,7 +217,7 @@ class LiveNode:
             deliver=deliver,
             failed=failed,
             add_time=health.times.add,
-            may_begin=may_begin,
+            may_begin=self._observed(owner, may_begin),
         )
 
     def reported_call(
@@ -241,11 +242,36 @@ class LiveNode:
         def report(owner: Owner, error: BaseException) -> None:
             if isinstance(error, SystemStoppingError):
                 return
+            self._tell_error(owner, error)
             self.errors.report(f'{owner} ({self.place(path)})', error)
             if failed is not None:
                 failed(error)
 
-        return BehaviourCall(owner, function, self.running, deliver=deliver, failed=report)
+        may_begin = self._observed(owner, None)
+        return BehaviourCall(
+            owner, function, self.running, deliver=deliver, failed=report, may_begin=may_begin
+        )
+
+    def _observed(
+        self, owner: Owner, may_begin: Callable[[], bool] | None
+    ) -> Callable[[], bool] | None:
+        """Return what tells whether a call may begin, and that it does, if somebody observes."""
+        observe, name, what = self.system.observe, self.full_name, str(owner)
+        if observe is None:
+            return may_begin
+
+        def begin() -> bool:
+            may_call = may_begin is None or may_begin()
+            if may_call:
+                observe('callback', name, what, None)
+            return may_call
+
+        return begin
+
+    def _tell_error(self, owner: Owner, error: BaseException) -> None:
+        if self.system.observe is not None:
+            text = f'{summarize(error)}\n{format_behaviour_error(error)}'.rstrip()
+            self.system.observe('error', self.full_name, str(owner), text)
 
     def serve_at_once(self) -> None:
         """Answer requests from now on, if the node has nothing to do before."""
@@ -404,4 +430,12 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         overrides=QosOverrides(ros),
     )
     creation.node = live
+    if (observe := system.observe) is not None:
+        name = live.full_name
+
+        def tell(parameters: list[Any]) -> None:
+            for each in parameters:
+                observe('parameter', name, each.name, each.value)
+
+        ros.add_post_set_parameters_callback(tell)
     return live

@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +22,11 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
+    from composer.simulation.events import EventKind
     from composer.yaml_text.positions import SourceMap
+
+
+Observe: TypeAlias = 'Callable[[EventKind, str, str, Any], None]'
 
 
 class ServiceFailures:
@@ -71,6 +77,8 @@ class SystemHandle:
         topics: Hands messages over between its nodes.
         services: Hands requests over between its nodes.
         create_entity: Creates one entity more of a `LiveNode`, of a section, from its record.
+        observe: Takes what happens, with a kind of `Event`, a node, a name and a value; `None` if
+            nobody wants to know.
         is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
     """
 
@@ -92,4 +100,11 @@ class SystemHandle:
     topics: LocalTopics
     services: LocalServices
     create_entity: Callable[[Any, str, Any], LiveEntity]
+    observe: Observe | None = None
     is_outdated: Callable[[], bool] = never
+
+    def tell(self, kind: EventKind, node: str, name: str, message: Any) -> None:
+        """Tell who observes what came to its end, with a message that somebody may change."""
+        if self.observe is not None:
+            message_class: type = type(message)
+            self.observe(kind, node, name, ownership_of(message_class).copy(message))

@@ -1,0 +1,149 @@
+"""The system behind a simulation: the same as any other, without what looks after real ones."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
+from composer.errors import ExitCode
+from composer.names import expand_name
+from composer.runtime.logs import system_logger
+from composer.runtime.messages.ownership import ownership_of
+from composer.runtime.system import System
+from composer.virtual_time.simulated_executor import SimulatedExecutor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Mapping
+
+    from composer.language.specs import ConditionSpec, NodeSpec, SystemSpec
+    from composer.runtime.messages.local_delivery import LocalPublisher
+    from composer.runtime.nodes.live_node import LiveNode
+    from composer.runtime.nodes.system_handle import Observe
+    from composer.runtime.rewiring.reading import Reading
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+_LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
+
+
+class SimulatedRun(System):
+    """A system whose executor runs in virtual time.
+
+    There is no guardian, nothing looks for behaviours that hang, for topics that do not match or
+    for commands from outside: all of that is in real time.
+
+    Args:
+        observe: Takes what happens.
+        on_created: Called when there are all nodes, and none of their behaviours has been called.
+    """
+
+    def __init__(
+        self,
+        reading: Reading,
+        threads: SimulatedThreads,
+        observe: Observe,
+        on_created: Callable[[], None],
+    ) -> None:
+        self._threads = threads
+        self._on_created = on_created
+        guardian: Any = _NoGuardian()
+        super().__init__(reading, guardian)
+        nothing: Any = _Nothing()
+        self._control = self._hang_watcher = self._graph_watcher = nothing
+        self._parameter_services = nothing
+        self._handle.observe = observe
+        self._handle.topics.tap(lambda publisher: _tap(publisher, observe))
+
+    def _create_executor(self, **calls: Any) -> SimulatedExecutor:
+        return SimulatedExecutor(self._threads, self._context, self._reading.spec.threads, **calls)
+
+    def _create_nodes(self) -> None:
+        super()._create_nodes()
+        self._on_created()
+
+    @property
+    def nodes(self) -> Mapping[str, LiveNode]:
+        """Its nodes, by their full names."""
+        return self._nodes
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code, once a stop is requested or made."""
+        has_code = self.stop_requested or self.state.is_stopping
+        return self._stop_request.code if has_code else None
+
+
+def _tap(publisher: LocalPublisher, observe: Observe) -> Callable[[Any], None]:
+    node = publisher.node.get_fully_qualified_name()
+    topic, copy = publisher.ros.topic_name, ownership_of(publisher.ros.msg_type).copy
+
+    def tap(message: Any) -> None:
+        observe('message', node, topic, copy(message))
+
+    return tap
+
+
+def without_processes(spec: SystemSpec, more: Mapping[str, NodeSpec]) -> SystemSpec:
+    """Return a system without its external processes, and with more nodes, which come first."""
+    own = {node.full_name for node in spec.nodes.values()}
+    nodes = {key: _without_waits(node, own) for key, node in spec.nodes.items()}
+    return replace(spec, nodes={**more, **nodes}, processes={})
+
+
+def _without_waits(node: NodeSpec, own: Collection[str]) -> NodeSpec:
+    """Return a node that waits for no process, and for no node that one would bring."""
+
+    def may_hold(condition: ConditionSpec) -> bool:
+        if condition.kind == 'node':
+            return expand_name(condition.name, node.name, node.namespace) in own
+        return condition.kind != 'process'
+
+    conditions = tuple(filter(may_hold, node.wait_for))
+    return replace(node, wait_for=conditions) if conditions != node.wait_for else node
+
+
+@contextmanager
+def observed_log(observe: Observe, *, is_shown: bool) -> Iterator[None]:
+    """Have `observe` told of the lines of all loggers meanwhile, with the nodes they belong to.
+
+    Args:
+        is_shown: Whether they go where they go otherwise, too.
+    """
+    log = _rclpy.rclpy_logging_rcutils_log
+
+    def tell(severity: Any, name: str, text: str, *place: Any) -> None:
+        if name == system_logger.name:
+            name = ''
+        node = f'/{name.replace(".", "/")}' if name else ''
+        observe('log', node, _LEVELS.get(int(severity), str(severity)), text)
+        if is_shown:
+            log(severity, name, text, *place)
+
+    _rclpy.rclpy_logging_rcutils_log = tell
+    try:
+        yield
+    finally:
+        _rclpy.rclpy_logging_rcutils_log = log
+
+
+class _NoGuardian:
+    """What ends a process that hangs; a simulation has its own limit of real time."""
+
+    owns_process = False
+    mark = 0
+
+    def allow(self, _stop_sec: float) -> None:
+        """Do nothing."""
+
+    def begin_stop(self) -> bool:
+        """Tell that the stop goes on."""
+        return True
+
+
+class _Nothing:
+    """Does nothing, whatever it is asked for."""
+
+    def __getattr__(self, _name: str) -> Any:
+        return lambda *_arguments, **_options: ExitCode.DONE

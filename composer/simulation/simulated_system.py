@@ -1,0 +1,336 @@
+"""A system in virtual time, as a test drives it."""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict
+from contextlib import ExitStack
+from dataclasses import replace
+from random import Random
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from composer.checks.checker import create_context
+from composer.cli.common.import_check import import_behaviours
+from composer.errors import ComposerError, StartError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared_packages import import_declared
+from composer.interfaces.search_paths import extend_variables
+from composer.language.pipeline import load_system_text
+from composer.planning.snapshot import take_snapshot
+from composer.python_source.module_finder import project_search_path
+from composer.runtime.behaviours.callables import project_on_path
+from composer.runtime.environment import environment_set
+from composer.runtime.rewiring.reading import Reading
+from composer.simulation.driver import DRIVER, Driver, SimulatedGoal
+from composer.simulation.events import Event
+from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
+from composer.virtual_time.clocks import to_ns
+from composer.virtual_time.replacements import replaced
+from composer.virtual_time.ros_clocks import simulated_clocks
+from composer.virtual_time.simulated_threads import SimulatedThreads
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from types import SimpleNamespace
+
+    from composer.language.loaded_system import LoadedSystem
+    from composer.simulation.events import EventKind
+
+# 2020-01-01: a time that nobody takes for none.
+START_TIME_NS: Final = 1_577_836_800_000_000_000
+_DRIVER_FILE: Final = f'nodes: {{{DRIVER}: {{parameter_services: false, rosout: false}}}}'
+
+
+class SimulatedSystem:
+    """A system that runs in virtual time, in this process.
+
+    Time passes only in `forward` and what else waits here. Only one can run at a time.
+
+    Args:
+        system: A system without errors; its external processes are left out.
+        seed: Of what is random: the bytes of the operating system, `random`, numpy's own.
+        is_shuffled: Whether the order is changed, by the seed, where another one is possible.
+        start_time_ns: What clocks show at the start, in ns since 1970.
+        on_event: Takes each event; by default they are kept in `events`.
+        real_limit_sec: How much real time a behaviour may use without a wait.
+        shows_log: Whether the lines of loggers are printed, too.
+
+    Attributes:
+        events: What has happened, if `on_event` was not given.
+    """
+
+    def __init__(
+        self,
+        system: LoadedSystem,
+        *,
+        seed: int = 0,
+        is_shuffled: bool = False,
+        start_time_ns: int | None = None,
+        on_event: Callable[[Event], None] | None = None,
+        real_limit_sec: float = 10.0,
+        shows_log: bool = False,
+    ) -> None:
+        self.events: list[Event] = []
+        self._system = system
+        self._on_event = on_event or self.events.append
+        shuffle = Random(seed) if is_shuffled else None  # noqa: S311 - no secret
+        self._threads = SimulatedThreads(shuffle, real_limit_sec)
+        self._seed = seed
+        self._start_time_ns = START_TIME_NS if start_time_ns is None else start_time_ns
+        self._shows_log = shows_log
+        self._stack = ExitStack()
+        self._run: SimulatedRun | None = None
+        self._drives: Driver | None = None
+        self._prepared: list[Callable[[Driver], None]] = []
+        self._messages: defaultdict[str, list[Any]] = defaultdict(list)
+
+    def __enter__(self) -> Self:
+        """Start it."""
+        self.start()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Stop it."""
+        self.stop()
+
+    @property
+    def now(self) -> float:
+        """The virtual time since the start, in seconds."""
+        return self._threads.now_ns / 1e9
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code, once the system has ended, by itself or by `stop`."""
+        return None if self._run is None else self._run.exit_code
+
+    def start(self) -> None:
+        """Create the nodes, and run their `on_start`; virtual time may pass.
+
+        Raises:
+            StartError: The system could not start.
+        """
+        try:
+            self._prepare()
+            with self._threads.entered():
+                self._running.start()
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _prepare(self) -> None:
+        stack, threads = self._stack, self._threads
+        if not _one_at_a_time.acquire(blocking=False):
+            message = 'another simulated system runs in this process'
+            raise StartError(message)
+        stack.callback(_one_at_a_time.release)
+        stack.enter_context(observed_log(self._observe, is_shown=self._shows_log))
+        stack.enter_context(replaced(threads, self._start_time_ns, self._seed))
+        stack.enter_context(simulated_clocks(threads, self._start_time_ns))
+        with threads.entered():
+            self._run = SimulatedRun(self._read(), threads, self._observe, self._on_created)
+
+    def _on_created(self) -> None:
+        self._drives = Driver(self._running.nodes)
+        for prepare in self._prepared:
+            prepare(self._drives)
+
+    def _read(self) -> Reading:
+        """Import the behaviours, in virtual time."""
+        context = create_context(self._system, InterfaceCatalogue())
+        if context is None:
+            message = f"'{self._system.positions.source.name}' cannot be read"
+            raise StartError(message)
+        prefixes = import_declared(context.interfaces, lambda _line: None)
+        variables = {**context.spec.environment, **extend_variables({}, prefixes)}
+        self._stack.enter_context(environment_set(variables))
+        self._stack.enter_context(project_on_path(project_search_path(self._system.files)))
+        functions, _findings = import_behaviours(context)
+        snapshot = take_snapshot(context, prefixes)
+        driver = load_system_text(_DRIVER_FILE).spec
+        spec = without_processes(snapshot.spec, driver.nodes if driver else {})
+        snapshot = replace(snapshot, spec=spec)
+        return Reading(spec, self._system.positions, functions, snapshot)
+
+    @property
+    def _running(self) -> SimulatedRun:
+        if self._run is None:
+            message = 'the simulated system does not run'
+            raise ComposerError(message)
+        return self._run
+
+    def _observe(self, kind: EventKind, node: str, name: str, value: Any) -> None:
+        if node == f'/{DRIVER}':
+            node = ''
+        if kind == 'message':
+            self._messages[name].append(value)
+        self._on_event(Event(self._threads.now_ns, kind, node, name, value))
+
+    # Time
+
+    def forward(self, seconds: float) -> None:
+        """Let so much virtual time pass, with all that is due at its end."""
+        with self._threads.entered():
+            self._wait(None, to_ns(seconds))
+
+    def _wait(self, condition: Callable[[], object] | None, timeout_ns: int) -> bool:
+        """Wait in virtual time, but not beyond the end of the system."""
+        run = self._running
+        until_ns = self._threads.now_ns + timeout_ns
+
+        def is_over() -> object:
+            return run.stop_requested or (condition is not None and condition())
+
+        self._threads.wait_until(is_over, until_ns - self._threads.now_ns, is_late=True)
+        return condition is not None and bool(condition())
+
+    def forward_until(self, condition: Callable[[], object], timeout: float = 60.0) -> bool:
+        """Let virtual time pass until a condition holds; return whether it did in time."""
+        with self._threads.entered():
+            return bool(condition()) or self._wait(condition, to_ns(timeout))
+
+    def at(self, seconds: float, function: Callable[[], None]) -> None:
+        """Have a function called at a time since the start, in a thread that may wait."""
+        self._threads.call_at(to_ns(seconds), lambda: self._begin(function))
+
+    def _begin(self, function: Callable[[], None]) -> None:
+        self._threads.start(function)
+
+    # What a test does
+
+    def publish(self, topic: str, payload: Any, type: str | None = None) -> None:  # noqa: A002
+        """Publish on a topic; who hears it does in `forward`.
+
+        Args:
+            payload: A message, a mapping of (nested) fields, or the bare value of a message with
+                one field.
+            type: Its type, if nobody in the system has the topic.
+
+        Raises:
+            SimulationError: Nobody has the topic, and no type is given.
+            PayloadError: The payload does not fit the type.
+        """
+        with self._threads.entered():
+            self._driver.publish(topic, payload, type)
+
+    def call(
+        self,
+        service: str,
+        request: Any = None,
+        timeout: float | None = 5.0,
+        type: str | None = None,  # noqa: A002
+    ) -> Any:
+        """Call a service and return its response; virtual time passes until it comes.
+
+        Raises:
+            SimulationError: Nobody has the service, and no type is given.
+            PayloadError: The payload does not fit the request.
+            CallError: There is no response; its subclasses say why.
+        """
+        with self._threads.entered():
+            return self._driver.call(service, request, timeout, type)
+
+    def send_goal(
+        self,
+        action: str,
+        goal: Any = None,
+        timeout: float | None = 5.0,
+        type: str | None = None,  # noqa: A002
+    ) -> SimulatedGoal:
+        """Send a goal, and return it when the server has accepted it.
+
+        Raises:
+            SimulationError: Nobody has the action, and no type is given.
+            PayloadError: The payload does not fit the goal.
+            ActionNotAvailableError: No server appeared in time.
+            GoalTimeoutError: It did not answer in time.
+            GoalRejectedError: It refused the goal.
+        """
+        with self._threads.entered():
+            sent = self._driver.send_goal(action, goal, timeout, type)
+        return EnteringGoal(sent, self._threads)
+
+    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
+        """Set parameters of a node.
+
+        Raises:
+            ParametersRefusedError: It refused one of them; the others may be set.
+        """
+        with self._threads.entered():
+            self._driver.set_parameters(node, values)
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """Return the values of the parameters of a node."""
+        return self._driver.get_parameters(node)
+
+    def state(self, node: str) -> SimpleNamespace:
+        """Return what the behaviours of a node share as `node.state`."""
+        return self._driver.state(node)
+
+    def messages(self, topic: str) -> list[Any]:
+        """Return what was published on a topic so far, by the system and by the test."""
+        return self._messages[topic if topic.startswith('/') else f'/{topic}']
+
+    def serve(
+        self,
+        service: str,
+        answer: Callable[[Any], Any],
+        type: str | None = None,  # noqa: A002
+    ) -> None:
+        """Serve a service that the system calls; before the start, or later.
+
+        Args:
+            answer: Returns the payload of the response for a request; it may wait, and raise.
+        """
+        self._prepare_driver(lambda driver: driver.serve(service, answer, type))
+
+    def serve_action(
+        self,
+        action: str,
+        execute: Callable[[Any], Iterator[Any]],
+        type: str | None = None,  # noqa: A002
+    ) -> None:
+        """Serve an action that the system sends goals to; before the start, or later.
+
+        Args:
+            execute: A generator: yields feedback payloads, and returns that of the result.
+        """
+        self._prepare_driver(lambda driver: driver.serve_action(action, execute, type))
+
+    def _prepare_driver(self, prepare: Callable[[Driver], None]) -> None:
+        if self._drives is None:
+            self._prepared.append(prepare)
+            return
+        with self._threads.entered():
+            prepare(self._drives)
+
+    @property
+    def _driver(self) -> Driver:
+        if self._drives is None:
+            message = 'the simulated system has not started'
+            raise ComposerError(message)
+        return self._drives
+
+    def stop(self) -> None:
+        """Stop the system, as a signal does; a second time does nothing."""
+        with self._stack:
+            if self._run is None or self._run.has_ended:
+                return
+            with self._threads.entered():
+                self._run.stop()
+                self._threads.close()
+
+
+_one_at_a_time = threading.Lock()
+
+
+class EnteringGoal(SimulatedGoal):
+    """A goal of a test, which waits in virtual time."""
+
+    def __init__(self, goal: SimulatedGoal, threads: SimulatedThreads) -> None:
+        super().__init__(goal.goal)
+        self._threads = threads
+
+    def cancel(self, timeout: float | None = 5.0) -> bool:
+        """See the base class."""
+        with self._threads.entered():
+            return super().cancel(timeout)

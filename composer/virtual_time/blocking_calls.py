@@ -1,0 +1,184 @@
+"""What Python programs wait with, in virtual time.
+
+A wait tries, without blocking, what it would block for, as long as others run.
+"""
+
+from __future__ import annotations
+
+import _queue
+import _thread
+import select
+import threading
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+from composer.virtual_time.clocks import to_ns
+from composer.virtual_time.originals import LOCK_TYPE, REAL
+from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+_NO_TIMEOUT: Final = -1
+
+
+def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..., Any]]]:
+    """Yield what blocks a thread, and what does that instead."""
+    sleep = ReplacedFunction(time.sleep)
+
+    def sleep_virtually(seconds: Any) -> None:
+        if threads.mine() is None:
+            sleep.original(seconds)
+            return
+        if seconds < 0:
+            message = 'sleep length must be non-negative'
+            raise ValueError(message)
+        threads.sleep(to_ns(seconds))
+
+    yield sleep, sleep_virtually
+    yield from _locks(threads)
+    yield from _reentrant_locks(threads)
+    yield from _queues(threads)
+    yield from _selectors(threads)
+    start = ReplacedFunction(_thread.start_new_thread)
+
+    def start_new_thread(function: Any, arguments: Any, *keywords: Any) -> Any:
+        owner = getattr(function, '__self__', None)
+        if threads.mine() is None or keywords or isinstance(owner, threading.Thread):
+            return start.original(function, arguments, *keywords)
+        run: Callable[..., Any] = threads.run
+        return start.original(run, (threads.add(), function, *arguments))
+
+    yield start, start_new_thread
+
+
+def _wait_for_turns(
+    threads: SimulatedThreads,
+    is_free: Callable[[], object],
+    take: Callable[[], Any],
+    timeout_sec: float | None,
+) -> Any:
+    """Wait until something is free and can be taken; return what was, or something false."""
+    timeout_ns = None if timeout_sec is None else to_ns(timeout_sec)
+    until_ns = None if timeout_ns is None else threads.now_ns + timeout_ns
+    while True:
+        left_ns = None if until_ns is None else until_ns - threads.now_ns
+        if not threads.wait_until(is_free, left_ns):
+            return take()
+        # Another one may have been faster.
+        if taken := take():
+            return taken
+
+
+def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+    mine, real_acquire = threads.mine, REAL.acquire
+
+    def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002 - as C has it
+        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0) and mine() is not None:
+            if real_acquire(self, False):
+                return True
+            limit = None if timeout == _NO_TIMEOUT else timeout
+            take = lambda: real_acquire(self, False)  # noqa: E731
+            return _wait_for_turns(threads, lambda: not self.locked(), take, limit)
+        return real_acquire(self, blocking, timeout)
+
+    for name in ('acquire', 'acquire_lock', '__enter__'):
+        yield ReplacedMethod(LOCK_TYPE, name), acquire
+
+
+def _reentrant_locks(
+    threads: SimulatedThreads,
+) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+    lock_type: Any = _thread.RLock
+    target = ReplacedMethod(lock_type, 'acquire')
+    entry = ReplacedMethod(lock_type, '__enter__')
+    restoring = ReplacedMethod(lock_type, '_acquire_restore')
+    real_acquire = target.original
+
+    def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002
+        if blocking and threads.mine() is not None and (timeout == _NO_TIMEOUT or timeout >= 0):
+            if real_acquire(self, False):
+                return True
+            limit = None if timeout == _NO_TIMEOUT else timeout
+            take = lambda: real_acquire(self, False)  # noqa: E731
+            # Nothing else tells whether somebody has it.
+            is_free = lambda: repr(self).startswith('<unlocked')  # noqa: E731
+            return _wait_for_turns(threads, is_free, take, limit)
+        return real_acquire(self, blocking, timeout)
+
+    def acquire_restore(self: Any, state: Any) -> None:
+        if threads.mine() is None:
+            restoring.original(self, state)
+            return
+        acquire(self)
+        for _ in range(state[0] - 1):
+            real_acquire(self)
+
+    yield target, acquire
+    yield entry, acquire
+    yield restoring, acquire_restore
+
+
+def _queues(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+    target = ReplacedMethod(_queue.SimpleQueue, 'get')
+    real_get = target.original
+
+    def get(self: Any, block: Any = True, timeout: Any = None) -> Any:  # noqa: FBT002
+        if not block or threads.mine() is None or (timeout is not None and timeout < 0):
+            return real_get(self, block, timeout)
+
+        def take() -> Any:
+            try:
+                return (real_get(self, False),)
+            except _queue.Empty:
+                return None
+
+        taken = take() or _wait_for_turns(threads, lambda: not self.empty(), take, timeout)
+        if taken is None:
+            raise _queue.Empty
+        return taken[0]
+
+    yield target, get
+
+
+def _selectors(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+    """Yield what waits for files: what another thread of the process writes comes in its turn."""
+    for owner, unit in ((select.epoll, 1.0), (type(select.poll()), 1e-3)):
+        yield _polling(threads, ReplacedMethod(owner, 'poll'), unit)
+
+
+def _polling(
+    threads: SimulatedThreads, target: ReplacedMethod, unit_sec: float
+) -> tuple[ReplacedMethod, Callable[..., Any]]:
+    real_poll = target.original
+
+    def poll(self: Any, timeout: Any = None, *arguments: Any, **keywords: Any) -> Any:
+        def look() -> Any:
+            return real_poll(self, 0, *arguments, **keywords)
+
+        if threads.mine() is None or timeout == 0:
+            return real_poll(self, timeout, *arguments, **keywords)
+        limit = None if timeout is None or timeout < 0 else timeout * unit_sec
+        return look() or _wait_for_turns(threads, look, look, limit)
+
+    return target, poll
+
+
+def virtual_select(threads: SimulatedThreads) -> Callable[..., Any]:
+    """Return what does as `select.select`."""
+    real_select: Callable[..., Any] = select.select
+
+    def select_virtually(*arguments: Any) -> Any:
+        timeout = arguments[3] if len(arguments) > 3 else None  # noqa: PLR2004
+        if threads.mine() is None or timeout == 0:
+            return real_select(*arguments)
+
+        def look() -> Any:
+            found = real_select(*arguments[:3], 0)
+            return found if any(found) else None
+
+        return look() or _wait_for_turns(threads, look, look, timeout) or ([], [], [])
+
+    return select_virtually

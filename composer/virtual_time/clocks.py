@@ -1,0 +1,123 @@
+"""Python's clocks in virtual time."""
+
+from __future__ import annotations
+
+import datetime as dt
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+# What the monotonic clocks say at the virtual time 0: some take 0 for a time that is not set.
+MONOTONIC_START_NS: Final = 1_000_000_000_000
+_SECOND_NS: Final = 1_000_000_000
+
+
+def to_ns(seconds: float) -> int:
+    """Return a duration in nanoseconds, rounded up as Python's own waits do."""
+    whole = int(seconds)
+    return whole * _SECOND_NS + -int(-(seconds - whole) * 1e9 // 1)
+
+
+def clocks(
+    threads: SimulatedThreads, start_time_ns: int
+) -> Iterator[tuple[Any, Callable[..., Any]]]:
+    """Yield what reads or shows the time, and what does that instead.
+
+    Args:
+        start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
+    """
+    mine = threads.mine
+
+    def clock_of(builtin: Any, start_ns: int, divisor: float) -> tuple[Any, Callable[..., Any]]:
+        target = ReplacedFunction(builtin)
+        original = target.original
+
+        def read_ns() -> Any:
+            return original() if mine() is None else start_ns + threads.now_ns
+
+        def read_sec() -> Any:
+            return original() if mine() is None else (start_ns + threads.now_ns) / divisor
+
+        return target, read_ns if divisor == 1 else read_sec
+
+    for name in ('monotonic', 'perf_counter'):
+        yield clock_of(getattr(time, name), MONOTONIC_START_NS, 1e9)
+        yield clock_of(getattr(time, f'{name}_ns'), MONOTONIC_START_NS, 1)
+    yield clock_of(time.time, start_time_ns, 1e9)
+    yield clock_of(time.time_ns, start_time_ns, 1)
+    for name, divisor in (('clock_gettime', 1e9), ('clock_gettime_ns', 1)):
+        yield _clock_by_identifier(threads, getattr(time, name), start_time_ns, divisor)
+    for name, place in (('localtime', 0), ('gmtime', 0), ('ctime', 0)):
+        yield _calendar(threads, getattr(time, name), place, time.time)
+    for name, place in (('strftime', 1), ('asctime', 0)):
+        yield _calendar(threads, getattr(time, name), place, time.localtime)
+    yield from _datetimes(threads)
+
+
+def _clock_by_identifier(
+    threads: SimulatedThreads, builtin: Any, start_time_ns: int, divisor: float
+) -> tuple[Any, Callable[..., Any]]:
+    target = ReplacedFunction(builtin)
+    starts = {
+        number: start
+        for name, start in (
+            ('CLOCK_REALTIME', start_time_ns),
+            ('CLOCK_MONOTONIC', MONOTONIC_START_NS),
+            ('CLOCK_MONOTONIC_RAW', MONOTONIC_START_NS),
+            ('CLOCK_BOOTTIME', MONOTONIC_START_NS),
+        )
+        if (number := getattr(time, name, None)) is not None
+    }
+
+    def read(*arguments: Any) -> Any:
+        start = starts.get(arguments[0]) if len(arguments) == 1 else None
+        if start is None or threads.mine() is None:
+            return target.original(*arguments)
+        now_ns = start + threads.now_ns
+        return now_ns if divisor == 1 else now_ns / divisor
+
+    return target, read
+
+
+def _calendar(
+    threads: SimulatedThreads, builtin: Any, place: int, now: Callable[[], Any]
+) -> tuple[Any, Callable[..., Any]]:
+    """Return what shows a time, which is now unless the argument at `place` says otherwise."""
+    target = ReplacedFunction(builtin)
+
+    def show(*arguments: Any) -> Any:
+        if threads.mine() is not None and len(arguments) <= place + 1:
+            given = arguments[place] if len(arguments) > place else None
+            if given is None and len(arguments) >= place:
+                arguments = (*arguments[:place], now())
+        return target.original(*arguments)
+
+    return target, show
+
+
+def _datetimes(threads: SimulatedThreads) -> Iterator[tuple[Any, Any]]:
+    target = ReplacedMethod(dt.datetime, 'now')
+    now_of = target.original
+
+    def now(cls: Any, tz: Any = None) -> Any:
+        if threads.mine() is None:
+            return now_of.__get__(None, cls)(tz)
+        seconds, rest_ns = divmod(time.time_ns(), _SECOND_NS)
+        return cls.fromtimestamp(seconds, tz).replace(microsecond=rest_ns // 1000)
+
+    yield target, classmethod(now)
+    utc_target = ReplacedMethod(dt.datetime, 'utcnow')
+    utc_of = utc_target.original
+
+    def utcnow(cls: Any) -> Any:
+        if threads.mine() is None:
+            return utc_of.__get__(None, cls)()
+        return now(cls, dt.UTC).replace(tzinfo=None)
+
+    yield utc_target, classmethod(utcnow)

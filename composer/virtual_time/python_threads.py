@@ -1,0 +1,61 @@
+"""`threading.Thread` in virtual time: threads that simulated ones start take turns, too."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from composer.virtual_time.clocks import to_ns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+
+def thread_methods(threads: SimulatedThreads) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the methods of `threading.Thread` that are others, by their names."""
+    start, join, is_alive = (
+        threading.Thread.start,
+        threading.Thread.join,
+        threading.Thread.is_alive,
+    )
+    bootstrap: Any = threading.Thread._bootstrap_inner  # type: ignore[attr-defined]  # noqa: SLF001
+
+    def start_in_turn(self: Any) -> None:
+        if threads.mine() is not None and not self._started.is_set():
+            self._simulated = threads.add()
+        start(self)
+
+    def bootstrap_in_turn(self: Any) -> None:
+        simulated = getattr(self, '_simulated', None)
+        if simulated is None:
+            bootstrap(self)
+        else:
+            threads.run(simulated, bootstrap, self)
+
+    def join_in_turn(self: Any, timeout: Any = None) -> None:
+        simulated = getattr(self, '_simulated', None)
+        if simulated is None or threads.mine() is None or threads.mine() is simulated:
+            join(self, timeout)
+            return
+        limit_ns = None if timeout is None else to_ns(max(timeout, 0))
+        is_over = simulated.is_over or threads.wait_until(lambda: simulated.is_over, limit_ns)
+        if is_over:
+            # Its last steps, in C, take no turns.
+            with threads.outside():
+                join(self)
+
+    def is_alive_in_turn(self: Any) -> bool:
+        simulated = getattr(self, '_simulated', None)
+        if simulated is not None and simulated.is_over and threads.mine() is not None:
+            with threads.outside():
+                join(self)
+        return is_alive(self)
+
+    yield from (
+        ('start', start_in_turn),
+        ('join', join_in_turn),
+        ('is_alive', is_alive_in_turn),
+        ('_bootstrap_inner', bootstrap_in_turn),
+    )

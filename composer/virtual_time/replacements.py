@@ -1,0 +1,80 @@
+"""What Python programs wait with, and read the time from, in virtual time.
+
+All of it asks first whether the calling thread takes turns: any other waits as before. A wait
+tries, without blocking, what it would block for, as long as others run.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import select
+import sys
+import threading
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from composer.virtual_time.blocking_calls import blocking_calls, virtual_select
+from composer.virtual_time.clocks import clocks
+from composer.virtual_time.python_threads import thread_methods
+from composer.virtual_time.replaced_functions import ReplacedFunction
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+
+@contextmanager
+def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterator[None]:
+    """Let the simulated threads wait in virtual time, and have its clocks, meanwhile.
+
+    Args:
+        start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
+        seed: Of what is random.
+    """
+    with ExitStack() as stack:
+        for each in (
+            clocks(threads, start_time_ns),
+            _entropy(threads, seed),
+            blocking_calls(threads),
+        ):
+            for target, function in each:
+                target.replace(function)
+                stack.callback(target.restore)
+        # These Python itself looks up at each call.
+        attributes = [(threading.Thread, *each) for each in thread_methods(threads)]
+        for owner, name, function in (*attributes, (select, 'select', virtual_select(threads))):
+            stack.callback(setattr, owner, name, getattr(owner, name))
+            setattr(owner, name, function)
+        stack.enter_context(_seeded(seed))
+        yield
+
+
+@contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    before = random.getstate()
+    random.seed(seed)
+    numpy = sys.modules.get('numpy')
+    state = numpy and numpy.random.get_state()
+    if numpy:
+        numpy.random.seed(seed % 2**32)
+    try:
+        yield
+    finally:
+        random.setstate(before)
+        if numpy:
+            numpy.random.set_state(state)
+
+
+def _entropy(
+    threads: SimulatedThreads, seed: int
+) -> Iterator[tuple[ReplacedFunction, Callable[..., Any]]]:
+    """Yield what makes random bytes: `uuid4`, `secrets` and numpy get theirs here."""
+    source = random.Random(seed)  # noqa: S311 - no secret
+    target = ReplacedFunction(os.urandom)
+
+    def urandom(size: Any) -> Any:
+        return target.original(size) if threads.mine() is None else source.randbytes(size)
+
+    yield target, urandom

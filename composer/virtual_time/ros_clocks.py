@@ -1,0 +1,105 @@
+"""ROS's clocks in virtual time.
+
+All nodes have one clock, of ROS time, that is overridden with the virtual time: rcl computes the
+timers' deadlines from it. What follows `/clock` otherwise, with `use_sim_time`, has it, too. Other
+clocks read the time in C; they are asked here instead.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
+
+import rclpy.node
+import rclpy.timer
+from rclpy.clock import Clock, ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.time import Time
+
+from composer.virtual_time.clocks import MONOTONIC_START_NS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rclpy.duration import Duration
+
+    from composer.virtual_time.simulated_threads import SimulatedThreads
+
+
+class SimulatedClock(ROSClock):
+    """The clock of all nodes; only virtual time sets it."""
+
+    start_ns: int
+    threads: SimulatedThreads
+
+    def now(self) -> Time:
+        """Return the virtual time."""
+        now_ns = self.start_ns + self.threads.now_ns
+        return Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME)
+
+    def set_ros_time_override(self, time: Time) -> None:
+        """Do nothing: who publishes `/clock` does not set it."""
+
+    def _set_ros_time_is_active(self, _enabled: bool) -> None:  # noqa: FBT001 - rclpy's
+        """Do nothing: it is always simulated."""
+
+    def advance(self, now_ns: int) -> None:
+        """Let rcl know the virtual time."""
+        time = Time(nanoseconds=self.start_ns + now_ns, clock_type=ClockType.ROS_TIME)
+        super().set_ros_time_override(time)
+
+
+@contextmanager
+def simulated_clocks(threads: SimulatedThreads, start_time_ns: int) -> Iterator[SimulatedClock]:
+    """Let rclpy's clocks show virtual time to simulated threads, and move its timers, meanwhile.
+
+    Args:
+        start_time_ns: What they show at the virtual time 0, in ns since 1970.
+    """
+    clock: Any = ROSClock()
+    clock.__class__ = SimulatedClock
+    clock.start_ns, clock.threads = start_time_ns, threads
+    clock.advance(threads.now_ns)
+    ROSClock._set_ros_time_is_active(clock, True)  # noqa: SLF001 - rclpy's
+    threads.on_advance = clock.advance
+    with ExitStack() as stack:
+        for owner, name, value in _replacements(threads, clock):
+            stack.callback(setattr, owner, name, getattr(owner, name))
+            setattr(owner, name, value)
+        yield clock
+
+
+def _replacements(
+    threads: SimulatedThreads, simulated: SimulatedClock
+) -> Iterator[tuple[Any, str, Callable[..., Any]]]:
+    now, sleep_until = Clock.now, Clock.sleep_until
+    create_timer = rclpy.timer.Timer.__init__
+
+    def create_ros_clock() -> Any:
+        return ROSClock() if threads.mine() is None else simulated
+
+    def now_virtually(self: Any) -> Time:
+        if threads.mine() is None or self.clock_type is ClockType.ROS_TIME:
+            return now(self)
+        is_steady = self.clock_type is ClockType.STEADY_TIME
+        start_ns = MONOTONIC_START_NS if is_steady else simulated.start_ns
+        return Time(nanoseconds=start_ns + threads.now_ns, clock_type=self.clock_type)
+
+    def sleep_virtually(self: Any, until: Time, context: Any = None) -> bool:
+        if threads.mine() is None:
+            return bool(sleep_until(self, until, context))
+        left: Duration = until - self.now()
+        if left.nanoseconds > 0:
+            threads.sleep(left.nanoseconds)
+        return True
+
+    def create_timer_on(
+        self: Any, callback: Any, group: Any, period_ns: int, clock: Any, **options: Any
+    ) -> None:
+        used = clock if threads.mine() is None else simulated
+        create_timer(self, callback, group, period_ns, used, **options)
+
+    yield rclpy.node, 'ROSClock', create_ros_clock
+    yield Clock, 'now', now_virtually
+    yield Clock, 'sleep_until', sleep_virtually
+    yield rclpy.timer.Timer, '__init__', create_timer_on

@@ -1,0 +1,369 @@
+"""Threads that take turns: one runs until it waits, and time passes only when all wait.
+
+What happens next depends on nothing but what happened before: which thread goes on, what is due,
+and what time it is then. The threads are real ones, with real stacks and thread-local data; each
+but one is parked on a lock of its own.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections import deque
+from contextlib import contextmanager
+from threading import get_ident
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+from composer.errors import ComposerError
+from composer.virtual_time.originals import REAL
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from random import Random
+
+_LOOK_SEC = 0.25
+_ON_TIME: Final = 0
+_LATE: Final = 1
+_FOREVER_SEC = 1e9
+
+# When, whether after all else at that time, a number that keeps the order, and what.
+_Due: TypeAlias = 'tuple[int, int, int, _Wait | _Call]'
+
+
+class SimulationStuckError(ComposerError):
+    """A thread used more real time than allowed, without ever waiting.
+
+    Attributes:
+        thread: The identifier of the thread.
+    """
+
+    def __init__(self, thread: int, limit_sec: float) -> None:
+        message = f'no virtual time passed within {limit_sec:g} s of real time'
+        advice = 'virtual time passes only while everything waits; a loop without waits never ends'
+        super().__init__(message, help=advice)
+        self.thread = thread
+
+
+class NothingHappensError(ComposerError):
+    """All threads wait for something that can never come, as there is no time-out."""
+
+    def __init__(self) -> None:
+        super().__init__('everything waits for something that nobody is going to do')
+
+
+class SimulatedThread:
+    """A thread that takes turns with others.
+
+    Attributes:
+        turn: A real lock that is free when it is this thread's turn.
+        ident: What `threading.get_ident` says in it; 0 before it has begun.
+        is_over: Whether it has ended.
+        is_outside: Whether waits are real ones for now.
+        on_wait: Called before it lets others run.
+        error: What is raised where it waits.
+    """
+
+    __slots__ = ('error', 'ident', 'is_outside', 'is_over', 'on_wait', 'turn')
+
+    def __init__(self) -> None:
+        self.turn = REAL.allocate_lock()
+        REAL.acquire(self.turn)
+        self.ident = 0
+        self.is_over = False
+        self.is_outside = False
+        self.on_wait: Callable[[], None] | None = None
+        self.error: BaseException | None = None
+
+
+class _Wait:
+    """A wait of a thread, until it succeeds or its time is over."""
+
+    __slots__ = ('attempt', 'has_succeeded', 'is_over', 'thread')
+
+    def __init__(self, thread: SimulatedThread, attempt: Callable[[], object] | None) -> None:
+        self.thread = thread
+        self.attempt = attempt
+        self.is_over = False
+        self.has_succeeded = False
+
+
+class _Call:
+    """A function to be called at a time; it must not wait."""
+
+    __slots__ = ('function', 'is_over')
+
+    def __init__(self, function: Callable[[], None]) -> None:
+        self.function = function
+        self.is_over = False
+
+
+class SimulatedThreads:
+    """The threads of a simulation, its clock, and what is due.
+
+    One thread from outside, that of a test, may `enter`; virtual time stands still until then.
+
+    Args:
+        shuffle: Chooses among the orders that are possible; `None` for first come, first served.
+        limit_sec: How much real time a thread may use without a wait.
+
+    Attributes:
+        now_ns: The virtual time, from 0.
+        current: The thread whose turn it is.
+        on_advance: Called with the time when it has become that.
+        turns: How many turns there have been.
+    """
+
+    def __init__(self, shuffle: Random | None = None, limit_sec: float = 30.0) -> None:
+        self.now_ns = 0
+        self.current: SimulatedThread | None = None
+        self.on_advance: Callable[[int], None] = lambda _now_ns: None
+        self.turns = 0
+        self.shuffle = shuffle
+        self.limit_sec = limit_sec
+        self._by_ident: dict[int, SimulatedThread] = {}
+        self._ready: deque[SimulatedThread] = deque()
+        self._waits: dict[_Wait, None] = {}
+        self._due: list[_Due] = []
+        self._numbers = itertools.count()
+        self._visitor: SimulatedThread | None = None
+        self._is_closing = False
+
+    def mine(self) -> SimulatedThread | None:
+        """Return the thread that calls, if it takes turns and waits in virtual time now."""
+        thread = self._by_ident.get(get_ident())
+        return None if thread is None or thread.is_outside else thread
+
+    @contextmanager
+    def entered(self) -> Iterator[None]:
+        """Let the calling thread take turns meanwhile; the first turn is its."""
+        ident = get_ident()
+        if ident in self._by_ident:
+            yield
+            return
+        thread = SimulatedThread()
+        thread.ident = ident
+        self._by_ident[ident] = self.current = self._visitor = thread
+        try:
+            yield
+        finally:
+            del self._by_ident[ident]
+            self.current = self._visitor = None
+
+    @contextmanager
+    def outside(self) -> Iterator[None]:
+        """Let the waits of the calling thread be real ones, and nobody else run meanwhile."""
+        thread = self.mine()
+        if thread is None:
+            yield
+            return
+        thread.is_outside = True
+        try:
+            yield
+        finally:
+            thread.is_outside = False
+
+    def add(self) -> SimulatedThread:
+        """Return a new thread, which `run` makes of a real one; its turn comes."""
+        thread = SimulatedThread()
+        self._ready.append(thread)
+        return thread
+
+    def run(self, thread: SimulatedThread, function: Callable[..., Any], *args: Any) -> None:
+        """Call a function when it is the turn of `thread`, which is the calling thread then."""
+        REAL.acquire(thread.turn)
+        thread.ident = get_ident()
+        self._by_ident[thread.ident] = thread
+        try:
+            if thread.error is None:
+                function(*args)
+        except SystemExit:
+            pass
+        finally:
+            thread.is_over = True
+            del self._by_ident[thread.ident]
+            self._pass_on(self._pick())
+
+    def start(self, function: Callable[..., Any], *args: Any) -> SimulatedThread:
+        """Call a function in a new thread, when its turn comes."""
+        thread = self.add()
+        REAL.start_new_thread(self.run, (thread, function, *args))
+        return thread
+
+    def call_at(self, time_ns: int, function: Callable[[], None]) -> _Call:
+        """Have a function called at a time, or now if that has passed; it must not wait.
+
+        Returns:
+            What `cancel` takes.
+        """
+        call = _Call(function)
+        heapq.heappush(self._due, (max(time_ns, self.now_ns), _ON_TIME, next(self._numbers), call))
+        return call
+
+    @staticmethod
+    def cancel(call: Any) -> None:
+        """Do not call it, if that is still to come."""
+        call.is_over = True
+
+    def wait_until(
+        self,
+        attempt: Callable[[], object] | None,
+        timeout_ns: int | None = None,
+        *,
+        is_late: bool = False,
+    ) -> bool:
+        """Let others run until an attempt succeeds; return whether one has in time.
+
+        Args:
+            attempt: Called again and again, by whichever thread waits; it must not wait itself.
+                `None` if only time is waited for.
+            timeout_ns: `None` for no limit.
+            is_late: Whether what else is due at the end of the time comes first.
+        """
+        me = self.current
+        if me is None:
+            message = 'a thread that takes no turns waits for those that do'
+            raise RuntimeError(message)
+        if self._is_closing and me is not self._visitor:
+            raise SystemExit
+        if me.on_wait is not None:
+            me.on_wait()
+        wait = _Wait(me, attempt)
+        if timeout_ns is not None:
+            until_ns = self.now_ns + max(timeout_ns, 0)
+            entry = (until_ns, _LATE if is_late else _ON_TIME, next(self._numbers), wait)
+            heapq.heappush(self._due, entry)
+        if attempt is not None:
+            self._waits[wait] = None
+        self._switch(me)
+        self._end(wait)
+        return wait.has_succeeded
+
+    def sleep(self, duration_ns: int) -> None:
+        """Let so much time pass."""
+        self.wait_until(None, duration_ns)
+
+    def pause(self) -> None:
+        """Let others run first, if any can."""
+        me = self.current
+        if me is None:
+            return
+        if me.on_wait is not None:
+            me.on_wait()
+        self._ready.append(me)
+        self._switch(me)
+
+    def close(self) -> None:
+        """End all threads that wait, where they wait; for the thread that has entered."""
+        self._is_closing = True
+        me = self.current
+        for wait in list(self._waits):
+            if wait.thread is not me:
+                self._release(wait)
+        while self._due:
+            what = heapq.heappop(self._due)[-1]
+            if isinstance(what, _Wait) and what.thread is not me:
+                self._release(what)
+        for thread in self._ready:
+            thread.error = SystemExit()
+        if me is not None:
+            while self._ready:
+                self._ready.append(me)
+                self._switch(me)
+
+    def _release(self, wait: _Wait) -> None:
+        if not wait.is_over:
+            self._end(wait)
+            self._ready.append(wait.thread)
+
+    def _switch(self, me: SimulatedThread) -> None:
+        thread = self._pick()
+        if thread is not me:
+            self._pass_on(thread)
+            self._park(me)
+        if me.error is not None:
+            error, me.error = me.error, None
+            raise error
+
+    def _pass_on(self, thread: SimulatedThread) -> None:
+        self.turns += 1
+        self.current = thread
+        thread.turn.release()
+
+    def _park(self, me: SimulatedThread) -> None:
+        """Wait for the turn of `me`; the thread from outside looks whether all goes on."""
+        if me is not self._visitor:
+            REAL.acquire(me.turn)
+            return
+        turns, since = self.turns, REAL.monotonic()
+        while not REAL.acquire(me.turn, True, _LOOK_SEC):
+            if self.turns != turns:
+                turns, since = self.turns, REAL.monotonic()
+            elif REAL.monotonic() - since > self.limit_sec:
+                stuck = self.current
+                self.current = me
+                raise SimulationStuckError(stuck.ident if stuck else 0, self.limit_sec)
+
+    def _pick(self) -> SimulatedThread:
+        """Return the thread whose turn is next, at a later time if there is none now."""
+        ready = self._ready
+        while True:
+            try:
+                if not ready:
+                    self._look()
+                if not ready:
+                    self._advance()
+                    continue
+            except BaseException as error:  # noqa: BLE001 - this thread may be any
+                self._tell(error)
+            if self.shuffle is not None:
+                ready.rotate(self.shuffle.randrange(len(ready)))
+            return ready.popleft()
+
+    def _look(self) -> None:
+        """Make ready those whose attempts succeed now."""
+        for wait in list(self._waits):
+            if wait.attempt is not None and wait.attempt():
+                wait.has_succeeded = True
+                self._release(wait)
+
+    def _advance(self) -> None:
+        """Let time pass until something is due, and do that."""
+        due = self._due
+        while due and due[0][-1].is_over:
+            heapq.heappop(due)
+        if not due:
+            self._give_up()
+            return
+        time_ns, rank = due[0][:2]
+        if time_ns > self.now_ns:
+            self.now_ns = time_ns
+            self.on_advance(time_ns)
+        now = []
+        while due and due[0][0] == time_ns and due[0][1] == rank:
+            now.append(heapq.heappop(due)[-1])
+        if self.shuffle is not None and len(now) > 1:
+            self.shuffle.shuffle(now)
+        for what in now:
+            if isinstance(what, _Wait):
+                self._release(what)
+            elif not what.is_over:
+                what.is_over = True
+                what.function()
+
+    def _give_up(self) -> None:
+        """Nothing is due, and no attempt succeeds: only the thread from outside can go on."""
+        if self._visitor is not None and self._is_closing:
+            self._ready.append(self._visitor)
+        else:
+            self._tell(NothingHappensError())
+
+    def _tell(self, error: BaseException) -> None:
+        """Raise an error where the thread from outside waits."""
+        if self._visitor is None:
+            raise error
+        self._visitor.error = error
+        self._ready.append(self._visitor)
+
+    def _end(self, wait: _Wait) -> None:
+        wait.is_over = True
+        self._waits.pop(wait, None)
