@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.checker import FurtherCheck
-    from composer.cli.common.import_check import ImportCheck
     from composer.language.loaded_system import LoadedSystem
     from composer.rules import Need
+    from composer.runtime.behaviours.import_check import ImportCheck
     from composer.stubs.types_check import TypesCheck
 
 
@@ -122,7 +122,7 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
 
 
 def _import_check() -> ImportCheck:
-    from composer.cli.common.import_check import ImportCheck
+    from composer.runtime.behaviours.import_check import ImportCheck
 
     return ImportCheck()
 

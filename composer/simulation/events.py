@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from composer.records import record
 
-EventKind: TypeAlias = Literal[
-    'message',
-    'request',
-    'response',
-    'goal',
-    'cancel',
-    'feedback',
-    'result',
-    'parameter',
-    'state',
-    'log',
-    'callback',
-    'error',
-    'exit',
-]
+if TYPE_CHECKING:
+    from composer.runtime.nodes.system_handle import EventKind
 
 
 @record

@@ -10,7 +10,6 @@ from random import Random
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from composer.checks.checker import create_context
-from composer.cli.common.import_check import import_behaviours
 from composer.errors import ComposerError, StartError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import import_declared
@@ -19,10 +18,11 @@ from composer.language.pipeline import load_system_text
 from composer.planning.snapshot import take_snapshot
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.behaviours.callables import project_on_path
+from composer.runtime.behaviours.import_check import import_behaviours
 from composer.runtime.environment import environment_set
 from composer.runtime.rewiring.reading import Reading
-from composer.simulation.driver import DRIVER, Driver, SimulatedGoal
 from composer.simulation.events import Event
+from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
 from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
 from composer.virtual_time.clocks import to_ns
 from composer.virtual_time.replacements import replaced
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from types import SimpleNamespace
 
     from composer.language.loaded_system import LoadedSystem
-    from composer.simulation.events import EventKind
+    from composer.runtime.nodes.system_handle import EventKind
+    from composer.virtual_time.unrepeatable import Notice, Watch
 
 # 2020-01-01: a time that nobody takes for none.
 START_TIME_NS: Final = 1_577_836_800_000_000_000
@@ -80,8 +81,9 @@ class SimulatedSystem:
         self._shows_log = shows_log
         self._stack = ExitStack()
         self._run: SimulatedRun | None = None
-        self._drives: Driver | None = None
-        self._prepared: list[Callable[[Driver], None]] = []
+        self._node: ScenarioNode | None = None
+        self._watch: Watch | None = None
+        self._prepared: list[Callable[[ScenarioNode], None]] = []
         self._messages: defaultdict[str, list[Any]] = defaultdict(list)
 
     def __enter__(self) -> Self:
@@ -97,6 +99,11 @@ class SimulatedSystem:
     def now(self) -> float:
         """The virtual time since the start, in seconds."""
         return self._threads.now_ns / 1e9
+
+    @property
+    def notices(self) -> list[Notice]:
+        """What behaviours do that may be otherwise in another run."""
+        return list(self._watch.notices) if self._watch else []
 
     @property
     def exit_code(self) -> int | None:
@@ -124,15 +131,15 @@ class SimulatedSystem:
             raise StartError(message)
         stack.callback(_one_at_a_time.release)
         stack.enter_context(observed_log(self._observe, is_shown=self._shows_log))
-        stack.enter_context(replaced(threads, self._start_time_ns, self._seed))
+        self._watch = stack.enter_context(replaced(threads, self._start_time_ns, self._seed))
         stack.enter_context(simulated_clocks(threads, self._start_time_ns))
         with threads.entered():
             self._run = SimulatedRun(self._read(), threads, self._observe, self._on_created)
 
     def _on_created(self) -> None:
-        self._drives = Driver(self._running.nodes)
+        self._node = ScenarioNode(self._running.nodes)
         for prepare in self._prepared:
-            prepare(self._drives)
+            prepare(self._node)
 
     def _read(self) -> Reading:
         """Import the behaviours, in virtual time."""
@@ -210,7 +217,7 @@ class SimulatedSystem:
             PayloadError: The payload does not fit the type.
         """
         with self._threads.entered():
-            self._driver.publish(topic, payload, type)
+            self._started_node.publish(topic, payload, type)
 
     def call(
         self,
@@ -227,7 +234,7 @@ class SimulatedSystem:
             CallError: There is no response; its subclasses say why.
         """
         with self._threads.entered():
-            return self._driver.call(service, request, timeout, type)
+            return self._started_node.call(service, request, timeout, type)
 
     def send_goal(
         self,
@@ -246,7 +253,7 @@ class SimulatedSystem:
             GoalRejectedError: It refused the goal.
         """
         with self._threads.entered():
-            sent = self._driver.send_goal(action, goal, timeout, type)
+            sent = self._started_node.send_goal(action, goal, timeout, type)
         return EnteringGoal(sent, self._threads)
 
     def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
@@ -256,15 +263,15 @@ class SimulatedSystem:
             ParametersRefusedError: It refused one of them; the others may be set.
         """
         with self._threads.entered():
-            self._driver.set_parameters(node, values)
+            self._started_node.set_parameters(node, values)
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the values of the parameters of a node."""
-        return self._driver.get_parameters(node)
+        return self._started_node.get_parameters(node)
 
     def state(self, node: str) -> SimpleNamespace:
         """Return what the behaviours of a node share as `node.state`."""
-        return self._driver.state(node)
+        return self._started_node.state(node)
 
     def messages(self, topic: str) -> list[Any]:
         """Return what was published on a topic so far, by the system and by the test."""
@@ -281,7 +288,7 @@ class SimulatedSystem:
         Args:
             answer: Returns the payload of the response for a request; it may wait, and raise.
         """
-        self._prepare_driver(lambda driver: driver.serve(service, answer, type))
+        self._prepare_node(lambda node: node.serve(service, answer, type))
 
     def serve_action(
         self,
@@ -294,21 +301,21 @@ class SimulatedSystem:
         Args:
             execute: A generator: yields feedback payloads, and returns that of the result.
         """
-        self._prepare_driver(lambda driver: driver.serve_action(action, execute, type))
+        self._prepare_node(lambda node: node.serve_action(action, execute, type))
 
-    def _prepare_driver(self, prepare: Callable[[Driver], None]) -> None:
-        if self._drives is None:
+    def _prepare_node(self, prepare: Callable[[ScenarioNode], None]) -> None:
+        if self._node is None:
             self._prepared.append(prepare)
             return
         with self._threads.entered():
-            prepare(self._drives)
+            prepare(self._node)
 
     @property
-    def _driver(self) -> Driver:
-        if self._drives is None:
+    def _started_node(self) -> ScenarioNode:
+        if self._node is None:
             message = 'the simulated system has not started'
             raise ComposerError(message)
-        return self._drives
+        return self._node
 
     def stop(self) -> None:
         """Stop the system, as a signal does; a second time does nothing."""

@@ -13,8 +13,14 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 
-def thread_methods(threads: SimulatedThreads) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the methods of `threading.Thread` that are others, by their names."""
+def thread_methods(
+    threads: SimulatedThreads, on_start: Callable[[], None]
+) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the methods of `threading.Thread` that are others, by their names.
+
+    Args:
+        on_start: Called when a simulated thread starts another.
+    """
     start, join, is_alive = (
         threading.Thread.start,
         threading.Thread.join,
@@ -24,6 +30,7 @@ def thread_methods(threads: SimulatedThreads) -> Iterator[tuple[str, Callable[..
 
     def start_in_turn(self: Any) -> None:
         if threads.mine() is not None and not self._started.is_set():
+            on_start()
             self._simulated = threads.add()
         start(self)
 

@@ -18,6 +18,7 @@ from composer.virtual_time.blocking_calls import blocking_calls, virtual_select
 from composer.virtual_time.clocks import clocks
 from composer.virtual_time.python_threads import thread_methods
 from composer.virtual_time.replaced_functions import ReplacedFunction
+from composer.virtual_time.unrepeatable import THREAD, Watch, begin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,29 +27,36 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterator[None]:
+def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterator[Watch]:
     """Let the simulated threads wait in virtual time, and have its clocks, meanwhile.
 
     Args:
         start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
         seed: Of what is random.
+
+    Yields:
+        What notes what cannot be replaced.
     """
+    watch = Watch(threads)
     with ExitStack() as stack:
+        stack.callback(begin(watch))
         for each in (
             clocks(threads, start_time_ns),
             _entropy(threads, seed),
             blocking_calls(threads),
+            watch.counters(),
         ):
             for target, function in each:
                 target.replace(function)
                 stack.callback(target.restore)
         # These Python itself looks up at each call.
-        attributes = [(threading.Thread, *each) for each in thread_methods(threads)]
+        methods = thread_methods(threads, lambda: watch.note(THREAD))
+        attributes = [(threading.Thread, *each) for each in methods]
         for owner, name, function in (*attributes, (select, 'select', virtual_select(threads))):
             stack.callback(setattr, owner, name, getattr(owner, name))
             setattr(owner, name, function)
         stack.enter_context(_seeded(seed))
-        yield
+        yield watch
 
 
 @contextmanager

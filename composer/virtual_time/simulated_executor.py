@@ -16,6 +16,7 @@ from composer.executor.descriptors import TimerFd
 from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Scheduler
 from composer.executor.sources.event_source import ExecutorParts
+from composer.executor.sources.qos_events import QosEvent, QosEventPoll
 from composer.executor.spinner import Spinner
 from composer.executor.wait_set_thread import WaitSetThread
 from composer.executor.worker_threads import WorkerThreads
@@ -60,6 +61,7 @@ class SimulatedExecutor(SystemExecutor):
             return _Workers(threads, *arguments)
 
         parts = ExecutorParts(self, max_running, poller, scheduler)
+        parts.qos_event_poll = _NoPoll(parts.deadlines, parts.readiness, parts.event_fds.lock)
         return Spinner(parts, wait_set, workers)
 
 
@@ -147,6 +149,13 @@ class _Poller(EventPoller):
 
     def _check(self) -> None:
         self._next_check = float('inf')
+
+
+class _NoPoll(QosEventPoll):
+    """Asks for no QoS events, which come from threads of the middleware, in real time."""
+
+    def add(self, event: QosEvent) -> None:
+        """Do nothing."""
 
 
 class _WaitSet(WaitSetThread):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from composer.checks.checker import check_system
-from composer.cli.common.import_check import ImportCheck
+from composer.runtime.behaviours.import_check import ImportCheck
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_combinations
 from composer.reports.text import render_finding

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, TypeAlias
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
 from composer.cli.common.file_selection import create_loader
-from composer.cli.common.import_check import import_behaviours
 from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -18,6 +17,7 @@ from composer.language.paths import PathError, resolve_path
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import list_named_files
 from composer.records import record
+from composer.runtime.behaviours.import_check import import_behaviours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from composer.language.specs import ActionSpec
     from composer.runtime.behaviours.calls import BehaviourCall
     from composer.runtime.nodes.live_node import LiveNode
-    from composer.simulation.events import EventKind
+    from composer.runtime.nodes.system_handle import EventKind
 
 _POLL_SEC = 0.005
 # A request to cancel takes effect right after its callback; this only bounds an error of rclpy.

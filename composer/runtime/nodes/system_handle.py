@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.runtime.messages.ownership import ownership_of
 
@@ -22,10 +22,25 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
-    from composer.simulation.events import EventKind
     from composer.yaml_text.positions import SourceMap
 
 
+# What may happen in a system that is observed; see `Event`.
+EventKind: TypeAlias = Literal[
+    'message',
+    'request',
+    'response',
+    'goal',
+    'cancel',
+    'feedback',
+    'result',
+    'parameter',
+    'state',
+    'log',
+    'callback',
+    'error',
+    'exit',
+]
 Observe: TypeAlias = 'Callable[[EventKind, str, str, Any], None]'
 
 

@@ -67,7 +67,7 @@ class SimulatedGoal:
         return self.goal.cancel(timeout)
 
 
-class Driver:
+class ScenarioNode:
     """Publishes, calls and serves for a test, through a node of the simulated system.
 
     Args:
