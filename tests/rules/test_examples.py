@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from composer.checks.checker import check_system
-from composer.runtime.behaviours.import_check import ImportCheck
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_combinations
 from composer.reports.text import render_finding
 from composer.rules import RULES_FOLDER, list_rule_names, load_rule
 from composer.rules.examples import load_example
+from composer.runtime.behaviours.import_check import ImportCheck
 
 WITHOUT = {
     # Only a ROS that remaps no actions shows it.
