@@ -73,12 +73,14 @@ def _wait_for_turns(
 
 
 def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
-    mine, real_acquire = threads.mine, REAL.acquire
+    real_acquire = REAL.acquire
 
     def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002 - as C has it
-        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0) and mine() is not None:
+        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0):
             if real_acquire(self, False):
                 return True
+            if threads.mine() is None:
+                return real_acquire(self, blocking, timeout)
             limit = None if timeout == _NO_TIMEOUT else timeout
             take = lambda: real_acquire(self, False)  # noqa: E731
             return _wait_for_turns(threads, lambda: not self.locked(), take, limit)
@@ -98,9 +100,11 @@ def _reentrant_locks(
     real_acquire = target.original
 
     def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002
-        if blocking and threads.mine() is not None and (timeout == _NO_TIMEOUT or timeout >= 0):
+        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0):
             if real_acquire(self, False):
                 return True
+            if threads.mine() is None:
+                return real_acquire(self, blocking, timeout)
             limit = None if timeout == _NO_TIMEOUT else timeout
             take = lambda: real_acquire(self, False)  # noqa: E731
             # Nothing else tells whether somebody has it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import time
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
@@ -32,17 +33,20 @@ def clocks(
     Args:
         start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
     """
-    mine = threads.mine
+    # Each callback reads the time several times.
+    by_ident = threads.by_ident
 
     def clock_of(builtin: Any, start_ns: int, divisor: float) -> tuple[Any, Callable[..., Any]]:
         target = ReplacedFunction(builtin)
         original = target.original
 
         def read_ns() -> Any:
-            return original() if mine() is None else start_ns + threads.now_ns
+            return start_ns + threads.now_ns if get_ident() in by_ident else original()
 
         def read_sec() -> Any:
-            return original() if mine() is None else (start_ns + threads.now_ns) / divisor
+            if get_ident() in by_ident:
+                return (start_ns + threads.now_ns) / divisor
+            return original()
 
         return target, read_ns if divisor == 1 else read_sec
 

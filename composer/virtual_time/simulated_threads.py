@@ -58,19 +58,17 @@ class SimulatedThread:
         turn: A real lock that is free when it is this thread's turn.
         ident: What `threading.get_ident` says in it; 0 before it has begun.
         is_over: Whether it has ended.
-        is_outside: Whether waits are real ones for now.
         on_wait: Called before it lets others run.
         error: What is raised where it waits.
     """
 
-    __slots__ = ('error', 'ident', 'is_outside', 'is_over', 'on_wait', 'turn')
+    __slots__ = ('error', 'ident', 'is_over', 'on_wait', 'turn')
 
     def __init__(self) -> None:
         self.turn = REAL.allocate_lock()
         REAL.acquire(self.turn)
         self.ident = 0
         self.is_over = False
-        self.is_outside = False
         self.on_wait: Callable[[], None] | None = None
         self.error: BaseException | None = None
 
@@ -111,6 +109,7 @@ class SimulatedThreads:
         current: The thread whose turn it is.
         on_advance: Called with the time when it has become that.
         turns: How many turns there have been.
+        by_ident: The threads that wait in virtual time now, by what `threading.get_ident` says.
     """
 
     def __init__(self, shuffle: Random | None = None, limit_sec: float = 30.0) -> None:
@@ -120,7 +119,7 @@ class SimulatedThreads:
         self.turns = 0
         self.shuffle = shuffle
         self.limit_sec = limit_sec
-        self._by_ident: dict[int, SimulatedThread] = {}
+        self.by_ident: dict[int, SimulatedThread] = {}
         self._ready: deque[SimulatedThread] = deque()
         self._waits: dict[_Wait, None] = {}
         self._due: list[_Due] = []
@@ -130,37 +129,34 @@ class SimulatedThreads:
 
     def mine(self) -> SimulatedThread | None:
         """Return the thread that calls, if it takes turns and waits in virtual time now."""
-        thread = self._by_ident.get(get_ident())
-        return None if thread is None or thread.is_outside else thread
+        return self.by_ident.get(get_ident())
 
     @contextmanager
     def entered(self) -> Iterator[None]:
         """Let the calling thread take turns meanwhile; the first turn is its."""
         ident = get_ident()
-        if ident in self._by_ident:
+        if ident in self.by_ident:
             yield
             return
         thread = SimulatedThread()
         thread.ident = ident
-        self._by_ident[ident] = self.current = self._visitor = thread
+        self.by_ident[ident] = self.current = self._visitor = thread
         try:
             yield
         finally:
-            del self._by_ident[ident]
+            del self.by_ident[ident]
             self.current = self._visitor = None
 
     @contextmanager
     def outside(self) -> Iterator[None]:
         """Let the waits of the calling thread be real ones, and nobody else run meanwhile."""
-        thread = self.mine()
-        if thread is None:
-            yield
-            return
-        thread.is_outside = True
+        ident = get_ident()
+        thread = self.by_ident.pop(ident, None)
         try:
             yield
         finally:
-            thread.is_outside = False
+            if thread is not None:
+                self.by_ident[ident] = thread
 
     def add(self) -> SimulatedThread:
         """Return a new thread, which `run` makes of a real one; its turn comes."""
@@ -172,7 +168,7 @@ class SimulatedThreads:
         """Call a function when it is the turn of `thread`, which is the calling thread then."""
         REAL.acquire(thread.turn)
         thread.ident = get_ident()
-        self._by_ident[thread.ident] = thread
+        self.by_ident[thread.ident] = thread
         try:
             if thread.error is None:
                 function(*args)
@@ -180,7 +176,7 @@ class SimulatedThreads:
             pass
         finally:
             thread.is_over = True
-            del self._by_ident[thread.ident]
+            del self.by_ident[thread.ident]
             self._pass_on(self._pick())
 
     def start(self, function: Callable[..., Any], *args: Any) -> SimulatedThread:
