@@ -1,0 +1,1 @@
+"""Expectations of a case, as functions over what happened: no ROS is needed."""

@@ -1,0 +1,125 @@
+"""Expectations on the log, on errors of behaviours, and on the end of the system."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from composer.scenarios.expectations.diffs import show_value
+from composer.scenarios.expectations.failures import Failure
+from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
+from composer.scenarios.specs import ErrorExpectationSpec, ExitExpectationSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.scenarios.expectations.happenings import Happenings
+    from composer.scenarios.specs import CaseSpec, LogExpectationSpec
+    from composer.simulation.events import Event
+
+_LEVELS = {name: rank for rank, name in enumerate(('debug', 'info', 'warn', 'error', 'fatal'))}
+# What rclpy calls it.
+_LEVELS['warning'] = _LEVELS['warn']
+# Of a longer traceback, the last lines are shown.
+_MOST_LINES = 24
+
+
+def check_log(expected: LogExpectationSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check how many lines there are in the log."""
+    lowest = _LEVELS[expected.level or 'debug']
+    found = [
+        each
+        for each in happened.of_kind('log', expected.window)
+        if _LEVELS.get(each.name, 0) >= lowest and _is_meant(expected, each)
+    ]
+    what = 'line' if expected.level is None else f'{expected.level} line'
+    yield from _check_count(expected, found, what, happened)
+
+
+def check_error(expected: ErrorExpectationSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check how many errors behaviours raise."""
+    errors = happened.of_kind('error', expected.window)
+    found = [each for each in errors if _is_meant(expected, each)]
+    yield from _check_count(expected, found, 'error', happened)
+
+
+def _is_meant(expected: LogExpectationSpec | ErrorExpectationSpec, event: Event) -> bool:
+    text = str(event.value)
+    return (
+        expected.node in (None, event.node)
+        and (expected.text is None or expected.text in text)
+        and (expected.regex is None or re.search(expected.regex, text) is not None)
+    )
+
+
+def _check_count(
+    expected: LogExpectationSpec | ErrorExpectationSpec,
+    found: list[Event],
+    noun: str,
+    happened: Happenings,
+) -> Iterator[Failure]:
+    if expected.least <= len(found) and (expected.most is None or len(found) <= expected.most):
+        return
+    wanted = expected_count(expected.least, expected.most, noun)
+    message = f'expected {wanted} of {expected.node or "any node"}'
+    message += f' with {show_value(expected.text)}' if expected.text is not None else ''
+    message += f' that matches {show_value(expected.regex)}' if expected.regex is not None else ''
+    message += f'{in_window(expected.window)}, got {count_of(len(found), noun)}'
+    names = (expected.node,) if expected.node else ()
+    time, diff = expected.window.end_ns or happened.end_ns, ''
+    if len(found) > expected.least:
+        culprit = found[min(expected.most or 0, len(found) - 1)]
+        message += at_time(culprit.time_ns) if len(found) == 1 else ''
+        time, diff = culprit.time_ns, f'+ {_last_line(culprit)}'
+    yield Failure(expected.path, message, diff, time, names)
+
+
+def check_unexpected_errors(case: CaseSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check that no behaviour raises an error that no expectation names; each is told once."""
+    expected = [each for each in case.expectations if isinstance(each, ErrorExpectationSpec)]
+    unexpected: dict[tuple[str, str, str], list[Event]] = {}
+    for event in happened.of_kind('error'):
+        is_expected = any(
+            _is_meant(each, event) and each.window.has(event.time_ns) for each in expected
+        )
+        if not is_expected:
+            key = event.node, event.name, _last_line(event)
+            unexpected.setdefault(key, []).append(event)
+    for (node, name, line), events in unexpected.items():
+        more = f', and {len(events) - 1} more times' if len(events) > 1 else ''
+        message = f'{name} of {node} raised {line}{at_time(events[0].time_ns)}{more}'
+        lines = str(events[0].value).rstrip().splitlines()
+        cut = ['  …', *lines[-_MOST_LINES:]] if len(lines) > _MOST_LINES else lines
+        yield Failure(case.path, message, '\n'.join(cut), events[0].time_ns, (node,))
+
+
+def _last_line(event: Event) -> str:
+    return str(event.value).rstrip().rpartition('\n')[2]
+
+
+def check_exit(expected: ExitExpectationSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check that the system ends by itself, with a code."""
+    exits = happened.of_kind('exit')
+    wanted = (
+        f'expected the system to end with exit code {expected.code}{in_window(expected.window)}'
+    )
+    at = (*expected.path, 'exit_code')
+    if not exits:
+        yield Failure(at, f'{wanted}, but it ran on', '', happened.end_ns)
+        return
+    found = exits[0]
+    if found.value != expected.code:
+        message = f'{wanted}, got {found.value}{at_time(found.time_ns)}'
+        yield Failure(at, message, f'- {expected.code}\n+ {found.value}', found.time_ns)
+    elif not expected.window.has(found.time_ns):
+        yield Failure(at, f'{wanted}, but it ended{at_time(found.time_ns)}', '', found.time_ns)
+
+
+def check_unexpected_exit(case: CaseSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check that the system does not fail without an expectation that says so."""
+    if any(isinstance(each, ExitExpectationSpec) for each in case.expectations):
+        return
+    for event in happened.of_kind('exit')[:1]:
+        if event.value:
+            message = f'the system ended with exit code {event.value}{at_time(event.time_ns)}'
+            yield Failure(case.path, message, '', event.time_ns)
