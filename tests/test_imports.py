@@ -55,6 +55,7 @@ SHARED_NAMES = {
     'parameters.py',  # their checks, and their life in a node
     'plan.py',  # what an edit does, and the command that shows it
     'qos.py',  # profiles and policies, and their checks
+    'evaluation.py',  # of expressions, and of expectations
     'specs.py',  # the records that a file is parsed into
     'reading.py',  # what was read: of a behaviour, and of a system
     'json_document.py',  # the same form, of findings, plans and drawings

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.scenarios.expectations.happenings import sort_events
+from composer.scenarios.expectations.like_expectations import check_like
 from composer.scenarios.expectations.log_expectations import (
     check_error,
     check_exit,
@@ -13,7 +14,6 @@ from composer.scenarios.expectations.log_expectations import (
     check_unexpected_exit,
 )
 from composer.scenarios.expectations.node_expectations import check_parameters, check_state
-from composer.scenarios.expectations.recorded_topics import check_like
 from composer.scenarios.expectations.step_expectations import check_outcome
 from composer.scenarios.expectations.topic_expectations import (
     check_messages,

@@ -6,10 +6,10 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from composer.scenarios.expectations.conditions import ConditionError, condition_of
 from composer.scenarios.expectations.diffs import render_differences, show_value
 from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.matching import Comparison
+from composer.scenarios.expectations.message_conditions import ConditionError, condition_of
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
 from composer.scenarios.specs import WindowSpec
 from composer.scenarios.times import NANOSECONDS, to_fraction
