@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from composer.errors import ComposerError
 from composer.virtual_time.originals import REAL
+from composer.virtual_time.preemption import Preemption
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -126,6 +127,7 @@ class SimulatedThreads:
         self._numbers = itertools.count()
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
+        self._preemption = Preemption(shuffle, self.pause) if shuffle is not None else None
 
     def mine(self) -> SimulatedThread | None:
         """Return the thread that calls, if it takes turns and waits in virtual time now."""
@@ -170,6 +172,8 @@ class SimulatedThreads:
         thread.ident = get_ident()
         self.by_ident[thread.ident] = thread
         try:
+            if self._preemption is not None:
+                self._preemption.begin()
             if thread.error is None:
                 function(*args)
         except SystemExit:
@@ -241,7 +245,7 @@ class SimulatedThreads:
     def pause(self) -> None:
         """Let others run first, if any can."""
         me = self.current
-        if me is None:
+        if me is None or me.ident != get_ident():
             return
         if me.on_wait is not None:
             me.on_wait()
@@ -304,7 +308,7 @@ class SimulatedThreads:
         ready = self._ready
         while True:
             try:
-                if not ready:
+                if not ready or self.shuffle is not None:
                     self._look()
                 if not ready:
                     self._advance()

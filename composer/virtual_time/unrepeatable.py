@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 import socket
 import sys
-import sysconfig
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.records import record
+from composer.virtual_time.preemption import is_own_code
 from composer.virtual_time.replaced_functions import ReplacedFunction
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 _PACKAGE = str(Path(__file__).resolve().parents[1])
-_LIBRARY = sysconfig.get_paths()['stdlib']
 THREAD: Final = 'starts a thread of its own, whose turns come only where others wait'
 _PROCESS = 'starts a process, which takes real time'
 _SOCKET = 'uses a socket: what others send comes in real time'
@@ -113,7 +112,7 @@ def _user_frame() -> FrameType | None:
         if path.startswith(_PACKAGE) or f'{os.sep}rclpy{os.sep}' in path:
             if not path.startswith(f'{_PACKAGE}{os.sep}virtual_time'):
                 return None
-        elif not (path.startswith((_LIBRARY, '<frozen')) or 'site-packages' in path):
+        elif is_own_code(path):
             return frame
         frame = frame.f_back
     return None
