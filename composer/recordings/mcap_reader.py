@@ -106,9 +106,9 @@ def _describe_topic(channel: Channel, schema: Schema | None, count: int) -> Reco
         channel.topic,
         type_name or (schema.name if schema else ''),
         count,
-        metadata.read_qos(channel.metadata.get('offered_qos_profiles', '')),
+        metadata.read_qos(channel.metadata.get(metadata.QOS_KEY, '')),
         schema.data.decode(errors='replace') if schema is not None and is_text else '',
-        channel.metadata.get('topic_type_hash', ''),
+        channel.metadata.get(metadata.HASH_KEY, ''),
         problem,
     )
 

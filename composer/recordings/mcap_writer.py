@@ -28,7 +28,7 @@ from mcap.records import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 MAGIC: Final = b'\x89MCAP0\r\n'
 # Larger chunks are written at once.
@@ -47,15 +47,22 @@ class Channel:
     """A topic of one type in a file.
 
     Attributes:
+        number: As its messages refer to it.
+        describe: Returns the name of the type, the encoding of its definition, the definition,
+            and the metadata of the topic; called once, before its first message is written.
+        record: Its record in the file; `None` until then.
+        schema: That of its type.
         count: How many messages it has.
         index: Times and places of its messages in the current chunk, one after the other.
     """
 
-    record: ChannelRecord
-    schema: Schema
+    number: int
+    topic: str
+    describe: Callable[[], tuple[str, str, bytes, Mapping[str, str]]]
+    record: ChannelRecord | None = None
+    schema: Schema | None = None
     count: int = 0
     index: list[int] = field(default_factory=list)
-    is_written: bool = False
 
 
 class McapWriter:
@@ -98,37 +105,25 @@ class McapWriter:
         return min(starts, default=0), max(ends, default=0)
 
     def add_channel(
-        self, topic: str, schema: tuple[str, str, bytes], metadata: Mapping[str, str]
+        self, topic: str, describe: Callable[[], tuple[str, str, bytes, Mapping[str, str]]]
     ) -> Channel:
-        """Add a topic; it is written before its first message.
-
-        Args:
-            schema: The name of the type, the encoding of its definition, and the definition.
-        """
-        name, encoding, data = schema
-        known = self._schemas.get((name, data))
-        if known is None:
-            known = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
-            self._schemas[name, data] = known
-        number = len(self.channels) + 1
-        record = ChannelRecord(number, topic, 'cdr', dict(metadata), known.id)
-        channel = Channel(record, known)
+        """Add a topic; see `Channel`."""
+        channel = Channel(len(self.channels) + 1, topic, describe)
         self.channels.append(channel)
         return channel
 
     def add_messages(self, entries: Iterable[tuple[Channel, int, int, bytes]]) -> None:
         """Add messages: for each its channel, when it was received and published, and its data."""
         for channel, log_ns, publish_ns, data in entries:
-            if not channel.is_written:
-                self._add_definition(channel)
-            record = channel.record
+            if channel.record is None:
+                self._define(channel)
             channel.index += (log_ns, self._size)
             self._times.append(log_ns)
             channel.count += 1
             size = len(data)
             self._parts += (
                 # As rosbag2, without a sequence number.
-                _MESSAGE.pack(5, _LENGTH_OF_HEADER + size, record.id, 0, log_ns, publish_ns),
+                _MESSAGE.pack(5, _LENGTH_OF_HEADER + size, channel.number, 0, log_ns, publish_ns),
                 data,
             )
             self._size += _MESSAGE.size + size
@@ -147,7 +142,7 @@ class McapWriter:
         used = [each for each in self.channels if each.index]
         for channel in used:
             packed = _pack_index(channel)
-            offsets[channel.record.id] = place
+            offsets[channel.number] = place
             place += len(packed)
             indices.append(packed)
         index = ChunkIndex(
@@ -161,7 +156,7 @@ class McapWriter:
             message_start_time=start_ns,
             uncompressed_size=size,
         )
-        counts = {each.record.id: len(each.index) // 2 for each in used}
+        counts = {each.number: len(each.index) // 2 for each in used}
         self._forget_chunk()
         self._write([head, records, *indices])
         self._chunks.append((index, counts))
@@ -174,10 +169,19 @@ class McapWriter:
         self._write([data])
         self._metadata.append(index)
 
+    def define_all(self) -> None:
+        """Write the topics without messages: the summary may only repeat."""
+        self.flush()
+        for channel in self.channels:
+            if channel.record is None:
+                self._define(channel)
+        parts = self._parts
+        self._forget_chunk()
+        self._write(parts)
+
     def finish(self) -> None:
         """Write what is left, and the summary, by which readers find messages."""
-        self.flush()
-        self._define_unused()
+        self.define_all()
         self._write_end()
 
     def give_up(self) -> None:
@@ -201,22 +205,20 @@ class McapWriter:
             else:
                 return
 
-    def _add_definition(self, channel: Channel) -> None:
+    def _define(self, channel: Channel) -> None:
         """Add the records of a channel to the chunk of its first message."""
-        known = any(each.is_written and each.schema is channel.schema for each in self.channels)
-        data = _serialize([channel.record] if known else [channel.schema, channel.record])
-        channel.is_written = True
-        self._parts.append(data)
-        self._size += len(data)
-
-    def _define_unused(self) -> None:
-        """Write the channels without messages: the summary may only repeat."""
-        for channel in self.channels:
-            if not channel.is_written:
-                self._add_definition(channel)
-        parts = self._parts
-        self._forget_chunk()
-        self._write(parts)
+        name, encoding, data, metadata = channel.describe()
+        schema = self._schemas.get((name, data))
+        records: list[Any] = []
+        if schema is None:
+            schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
+            self._schemas[name, data] = schema
+            records.append(schema)
+        record = ChannelRecord(channel.number, channel.topic, 'cdr', dict(metadata), schema.id)
+        channel.record, channel.schema = record, schema
+        written = _serialize([*records, record])
+        self._parts.append(written)
+        self._size += len(written)
 
     def _forget_chunk(self) -> None:
         self._parts, self._times, self._size = [], [], 0
@@ -226,7 +228,7 @@ class McapWriter:
     def _recount(self) -> None:
         """Count only the messages of complete chunks, and only the channels with any."""
         for channel in self.channels:
-            channel.count = sum(counts.get(channel.record.id, 0) for _, counts in self._chunks)
+            channel.count = sum(counts.get(channel.number, 0) for _, counts in self._chunks)
         self.channels = [each for each in self.channels if each.count]
 
     def _write_end(self) -> None:
@@ -241,12 +243,12 @@ class McapWriter:
         self._write([data_end, summary, _serialize([footer]), MAGIC])
 
     def _summarize(self, start: int) -> tuple[bytes, list[SummaryOffset]]:
-        used = {each.schema.id: each.schema for each in self.channels}
+        used = {each.schema.id: each.schema for each in self.channels if each.schema}
         start_ns, end_ns = self.time_range
         statistics = Statistics(
             attachment_count=0,
             channel_count=len(self.channels),
-            channel_message_counts={each.record.id: each.count for each in self.channels},
+            channel_message_counts={each.number: each.count for each in self.channels},
             chunk_count=len(self._chunks),
             message_count=self.message_count,
             message_end_time=end_ns,
@@ -288,6 +290,4 @@ def _serialize(records: Iterable[Any]) -> bytes:
 def _pack_index(channel: Channel) -> bytes:
     index = channel.index
     size = 8 * len(index)
-    return _INDEX.pack(7, 6 + size, channel.record.id, size) + struct.pack(
-        f'<{len(index)}Q', *index
-    )
+    return _INDEX.pack(7, 6 + size, channel.number, size) + struct.pack(f'<{len(index)}Q', *index)

@@ -13,10 +13,13 @@ import yaml
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from composer.recordings.mcap_writer import McapWriter
+    from composer.recordings.mcap_writer import Channel, McapWriter
 
 FILE_NAME: Final = 'metadata.yaml'
 RECORD_NAME: Final = 'rosbag2'
+# Of a channel's metadata.
+QOS_KEY: Final = 'offered_qos_profiles'
+HASH_KEY: Final = 'topic_type_hash'
 ROOT: Final = 'rosbag2_bagfile_information'
 _VERSION: Final = 9
 _NANOSECONDS: Final = 10**9
@@ -109,18 +112,7 @@ def describe_recording(writer: McapWriter, file_name: str) -> dict[str, Any]:
         'storage_identifier': 'mcap',
         **times,
         'topics_with_message_count': [
-            {
-                'topic_metadata': {
-                    'name': each.record.topic,
-                    'type': each.schema.name,
-                    'serialization_format': each.record.message_encoding,
-                    'offered_qos_profiles': yaml.safe_load(
-                        each.record.metadata['offered_qos_profiles']
-                    ),
-                    'type_description_hash': each.record.metadata['topic_type_hash'],
-                },
-                'message_count': each.count,
-            }
+            {'topic_metadata': _describe_topic(each), 'message_count': each.count}
             for each in writer.channels
         ],
         'compression_format': '',
@@ -129,6 +121,17 @@ def describe_recording(writer: McapWriter, file_name: str) -> dict[str, Any]:
         'files': [{'path': file_name, **times}],
         'custom_data': None,
         'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
+    }
+
+
+def _describe_topic(channel: Channel) -> dict[str, Any]:
+    about = channel.record.metadata if channel.record else {}
+    return {
+        'name': channel.topic,
+        'type': channel.schema.name if channel.schema else '',
+        'serialization_format': 'cdr',
+        'offered_qos_profiles': yaml.safe_load(about.get(QOS_KEY, '')) or [],
+        'type_description_hash': about.get(HASH_KEY, ''),
     }
 
 

@@ -1,5 +1,6 @@
 """Recordings to read, and messages with something in each field."""
 
+from functools import partial
 from itertools import count
 
 import pytest
@@ -49,6 +50,14 @@ def _value(field, numbers):
     return value[: field.string_bound] if field.string_bound else value
 
 
+def described(kind):
+    from composer.recordings import metadata
+    from composer.recordings.definitions import full_definition, type_hash
+
+    about = {metadata.QOS_KEY: metadata.render_qos([QOS]), metadata.HASH_KEY: type_hash(kind)}
+    return interface_name(kind), 'ros2msg', full_definition(kind).encode(), about
+
+
 def write_recording(path, topics, *, chunks=1, closes=True):
     """Write an MCAP file, and return it.
 
@@ -59,8 +68,6 @@ def write_recording(path, topics, *, chunks=1, closes=True):
     """
     from rclpy.serialization import serialize_message
 
-    from composer.recordings import metadata
-    from composer.recordings.definitions import full_definition, type_hash
     from composer.recordings.mcap_writer import McapWriter
 
     with path.open('wb', buffering=0) as stream:
@@ -68,12 +75,7 @@ def write_recording(path, topics, *, chunks=1, closes=True):
         entries = []
         for topic, messages in topics.items():
             kind = type(messages[0])
-            schema = (interface_name(kind), 'ros2msg', full_definition(kind).encode())
-            about = {
-                'offered_qos_profiles': metadata.render_qos([QOS]),
-                'topic_type_hash': type_hash(kind),
-            }
-            channel = writer.add_channel(topic, schema, about)
+            channel = writer.add_channel(topic, partial(described, kind))
             entries += [(channel, serialize_message(each)) for each in messages]
         size = -(-len(entries) // chunks)
         for number, (channel, data) in enumerate(entries):
