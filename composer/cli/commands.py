@@ -20,7 +20,10 @@ from composer.cli.common.argument_types import (
     split_words,
     takes_settings,
     takes_system,
+    takes_topics,
 )
+from composer.cli.common.recording_options import RecordingOptions
+from composer.cli.recording.recording_commands import COMMANDS as RECORDING_COMMANDS
 from composer.cli.running.declarations import COMMANDS as RUNNING_COMMANDS
 from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
@@ -102,6 +105,13 @@ def cli(context: click.Context) -> int:
     flag_value=False,
     help="Leave out the services that 'composer reload', 'down' and the like use.",
 )
+@click.option(
+    '--record',
+    type=click.Path(path_type=Path),
+    metavar='FILE',
+    help='Record its topics to this MCAP file; a name without .mcap is a folder of rosbag2.',
+)
+@takes_topics
 # What a system that must start again asks of another process before.
 @click.option('--rehearse', 'rehearses', is_flag=True, hidden=True)
 @click.option(
@@ -117,6 +127,8 @@ def up_command(  # noqa: PLR0913 - one for each option
     watches: bool,
     detaches: bool,
     is_asked: bool,
+    record: Path | None,
+    topics: tuple[str, ...],
     rehearses: bool,
     wants_help: bool,
 ) -> int:
@@ -141,6 +153,8 @@ def up_command(  # noqa: PLR0913 - one for each option
         options = [f'--set={each}' for each in set_values]
         options += [f'--log-level={each}' for each in log_levels]
         options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
+        options += [f'--record={record}'] * (record is not None)
+        options += [f'--topics={each}' for each in topics]
         return start_detached(paths[0], [*options, *words, '--ros-args', *context.obj, '--'])
     return up(
         paths,
@@ -150,6 +164,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         set_values,
         watches=watches,
         is_asked=is_asked,
+        recording=RecordingOptions(record, topics),
         ends_process=True,
         rehearses=rehearses,
     )
@@ -568,5 +583,5 @@ def interfaces_show_command(name: str) -> int:
     return show(name)
 
 
-for _command in RUNNING_COMMANDS:
+for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS):
     cli.add_command(_command)

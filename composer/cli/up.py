@@ -12,6 +12,7 @@ import click
 
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
+from composer.cli.common.recording_options import RecordingOptions
 from composer.cli.common.system_reader import SystemReader, import_reading
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
@@ -40,6 +41,7 @@ def up(  # noqa: PLR0913 - one for each option
     *,
     watches: bool = False,
     is_asked: bool = True,
+    recording: RecordingOptions | None = None,
     ends_process: bool = False,
     rehearses: bool = False,
 ) -> int:
@@ -53,6 +55,7 @@ def up(  # noqa: PLR0913 - one for each option
         set_values: Values to change, as in `nodes.talker.log_level=debug`.
         watches: Whether edits of the files change the running system.
         is_asked: Whether the system serves what `composer reload` and the like ask.
+        recording: What is recorded of it; `None` for nothing.
         ends_process: Whether the process exits afterwards.
         rehearses: Whether to do only what comes before the system is created, and to print only
             what keeps it from that.
@@ -103,6 +106,7 @@ def up(  # noqa: PLR0913 - one for each option
             log_levels,
             watches=watches,
             is_asked=is_asked,
+            recording=recording or RecordingOptions(),
             ends_process=ends_process,
             rehearses=rehearses,
         )
@@ -121,6 +125,7 @@ def _run(  # noqa: PLR0913 - as above
     *,
     watches: bool,
     is_asked: bool,
+    recording: RecordingOptions,
     ends_process: bool,
     rehearses: bool,
 ) -> int:
@@ -144,14 +149,16 @@ def _run(  # noqa: PLR0913 - as above
         if reading is None:
             return ExitCode.FAILED
         reloader = create_reloader(prefixes)
-        return run_system(
-            reading,
-            watch=reloader.watching if watches else None,
-            commands=reloader if is_asked else None,
-            ros_arguments=ros_arguments,
-            log_level_requests=log_levels,
-            ends_process=ends_process,
-        )
+        with recording.recorder() as recorder:
+            return run_system(
+                reading,
+                watch=reloader.watching if watches else None,
+                commands=reloader if is_asked else None,
+                ros_arguments=ros_arguments,
+                log_level_requests=log_levels,
+                recorder=recorder,
+                ends_process=ends_process,
+            )
 
 
 def describe_file_arguments(paths: Sequence[Path]) -> str:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from composer.language.specs import SystemSpec
     from composer.runtime.control.control_services import Commands
     from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.system import SystemRecorder
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
@@ -44,6 +45,7 @@ def run_system(
     commands: Commands | None = None,
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
+    recorder: SystemRecorder | None = None,
     ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
@@ -60,6 +62,7 @@ def run_system(
         watch: Entered with the system once it is up; left before it stops.
         commands: What the system does with its files when it is asked; `None` if it is not to be
             asked.
+        recorder: Records the topics of the system; `None` if nothing does.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it. Only then can the
             system start again.
@@ -85,6 +88,7 @@ def run_system(
             log_level_requests,
             stop_request=stop,
             commands=commands,
+            recorder=recorder,
         )
         guardian.wait_until_begun()
         # A program that runs a system in itself tells its own parent.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.errors import ExitCode
 from composer.planning.differences import compare
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
     from contextlib import AbstractContextManager
 
+    from rclpy.context import Context
+
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
@@ -55,6 +57,16 @@ if TYPE_CHECKING:
 _EXECUTOR_STOP_SEC = 1.0
 
 
+class SystemRecorder(Protocol):
+    """Records the topics of a system."""
+
+    def start(self, context: Context, topics: LocalTopics) -> None:
+        """Begin, before there are nodes."""
+
+    def stop(self, *, goes_on: bool) -> None:
+        """End, when all nodes have stopped; `goes_on` if the system starts again."""
+
+
 class System:
     """A system that can be started once and stopped once.
 
@@ -66,6 +78,7 @@ class System:
         log_levels: The log levels of the command line.
         stop_request: The request to stop it; by default a new one.
         commands: What it does with its files when it is asked; `None` if it is not to be asked.
+        recorder: Records its topics; `None` if nothing does.
 
     Attributes:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
@@ -82,7 +95,9 @@ class System:
         *,
         stop_request: StopRequest | None = None,
         commands: Commands | None = None,
+        recorder: SystemRecorder | None = None,
     ) -> None:
+        self._recorder = recorder
         self._reading = reading
         spec = reading.spec
         self.state = SystemState(spec.name, reading.positions.source.name)
@@ -191,6 +206,8 @@ class System:
         """
         try:
             self._control.start(self._context, self._handle.ros_arguments)
+            if self._recorder is not None:
+                self._recorder.start(self._context, self._handle.topics)
             self._create_nodes()
             self._executor.start()
             self._hang_watcher.start()
@@ -374,6 +391,8 @@ class System:
             none_killed &= end_marked(self._guardian.mark, timeout_sec, system_logger)
         if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
+        if self._recorder is not None:
+            self._recorder.stop(goes_on=self._stop_request.starts_again)
         for node in self._nodes.values():
             node.flush_counts()
         self._executor.errors.flush()

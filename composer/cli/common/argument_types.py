@@ -46,6 +46,18 @@ def takes_settings(command: _Command) -> _Command:
     return set_option(command)
 
 
+def takes_topics(command: _Command) -> _Command:
+    """Add `--topics` to a command."""
+    topics_option = click.option(
+        '--topics',
+        multiple=True,
+        metavar='PATTERN',
+        help="Only topics of these names; '*' stands for any characters, as in '/camera/*'. "
+        'Can be repeated.',
+    )
+    return topics_option(command)
+
+
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Split the words of the current command into files and the arguments that follow them.
 

@@ -270,6 +270,25 @@ class LocalTopics:
             topic.connect()
         return subscription
 
+    def add_listener(self, node: Any, ros: RosSubscription) -> LocalSubscription:
+        """Take in a subscription that needs no messages: a tap has them.
+
+        Nothing is handed over to it, and nothing is sent for its sake.
+        """
+        subscription = LocalSubscription(node, ros, None, '', read_only=True)
+        with self._lock:
+            topic = self._topic(ros)
+            topic.subscriptions.append(subscription)
+            topic.connect()
+        return subscription
+
+    def count_publishers(self, name: str) -> int:
+        """Return how many publishers a topic has in this system, of any type."""
+        with self._lock:
+            return sum(
+                len(topic.publishers) for (each, _), topic in self._topics.items() if each == name
+            )
+
     def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:
         """Let a subscription share messages with others, or have its own."""
         with self._lock:

@@ -1,0 +1,1 @@
+"""The commands that record a ROS graph, and publish a recording to it."""

@@ -1,0 +1,72 @@
+"""Declare the commands that record and replay: see `composer.cli.commands`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from composer.cli.common.argument_types import takes_topics
+
+
+@click.command('record')
+@click.option(
+    '-o',
+    '--output',
+    type=click.Path(path_type=Path),
+    metavar='FILE',
+    help='The MCAP file to write; a name without .mcap is a folder of rosbag2. '
+    'Default: a folder rosbag2_ with the time.',
+)
+@takes_topics
+def record_command(output: Path | None, topics: tuple[str, ...]) -> int:
+    """Record the ROS graph until it is interrupted.
+
+    All topics that are not hidden are recorded, those that come later included, as rosbag2 does.
+    """
+    from composer.cli.recording.record import record
+
+    return record(output, topics)
+
+
+@click.command('replay')
+@click.argument('file', type=click.Path(path_type=Path))
+@click.option(
+    '--rate',
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar='R',
+    help='How many times as fast.',
+)
+@click.option(
+    '--start',
+    'start_sec',
+    type=click.FloatRange(min=0),
+    default=0.0,
+    metavar='SEC',
+    help='Leave out so much of the beginning.',
+)
+@click.option('--loop', 'loops', is_flag=True, help='Begin again at the end.')
+@takes_topics
+@click.pass_context
+def replay_command(
+    context: click.Context,
+    file: Path,
+    *,
+    rate: float,
+    start_sec: float,
+    loops: bool,
+    topics: tuple[str, ...],
+) -> int:
+    """Publish the recording FILE to the ROS graph.
+
+    Its messages come at their times and with their QoS. FILE is an MCAP file, or a folder that
+    rosbag2 made of such files. ROS arguments follow --ros-args, as in --ros-args -r /scan:=/raw.
+    """
+    from composer.cli.recording.replay import replay
+
+    return replay(file, topics, context.obj, rate=rate, start_sec=start_sec, loops=loops)
+
+
+COMMANDS = (record_command, replay_command)
