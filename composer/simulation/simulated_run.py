@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+from weakref import WeakSet
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.publisher import Publisher
 
 from composer.errors import ExitCode
 from composer.names import expand_name
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
+_INFO: Final = 20
+_PARAMETER_EVENTS: Final = '/parameter_events'
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
 
 
@@ -54,7 +58,8 @@ class SimulatedRun(System):
         self._control = self._hang_watcher = self._graph_watcher = nothing
         self._parameter_services = nothing
         self._handle.observe = observe
-        self._handle.topics.tap(lambda publisher: _tap(publisher, observe))
+        self._tapped: WeakSet[Publisher] = WeakSet()
+        self._handle.topics.tap(self._tap)
 
     def _create_executor(self, **calls: Any) -> SimulatedExecutor:
         return SimulatedExecutor(self._threads, self._context, self._reading.spec.threads, **calls)
@@ -62,6 +67,40 @@ class SimulatedRun(System):
     def _create_nodes(self) -> None:
         super()._create_nodes()
         self._on_created()
+
+    def _tap(self, publisher: LocalPublisher) -> Callable[[Any], None]:
+        observe: Any = self._handle.observe
+        node = publisher.node.get_fully_qualified_name()
+        topic, copy = publisher.ros.topic_name, ownership_of(publisher.ros.msg_type).copy
+        self._tapped.add(publisher.ros)
+
+        def tap(message: Any) -> None:
+            observe('message', node, topic, copy(message))
+
+        return tap
+
+    @contextmanager
+    def observed_publishers(self) -> Iterator[None]:
+        """Observe also what behaviours publish with publishers of rclpy, meanwhile."""
+        publish: Any = Publisher.publish
+
+        def observed(ros: Publisher, message: Any) -> None:
+            if self._threads.mine() is not None and ros not in self._tapped:
+                self._tell_of(ros, message)
+            publish(ros, message)
+
+        Publisher.publish = observed
+        try:
+            yield
+        finally:
+            Publisher.publish = publish
+
+    def _tell_of(self, ros: Publisher, message: Any) -> None:
+        for node in self._nodes.values():
+            if ros in node.ros.publishers and type(message) is ros.msg_type:
+                name = ros.topic_name
+                if name != _PARAMETER_EVENTS:
+                    self._handle.tell('message', node.full_name, name, message)
 
     @property
     def nodes(self) -> Mapping[str, LiveNode]:
@@ -73,16 +112,6 @@ class SimulatedRun(System):
         """The exit code, once a stop is requested or made."""
         has_code = self.stop_requested or self.state.is_stopping
         return self._stop_request.code if has_code else None
-
-
-def _tap(publisher: LocalPublisher, observe: Observe) -> Callable[[Any], None]:
-    node = publisher.node.get_fully_qualified_name()
-    topic, copy = publisher.ros.topic_name, ownership_of(publisher.ros.msg_type).copy
-
-    def tap(message: Any) -> None:
-        observe('message', node, topic, copy(message))
-
-    return tap
 
 
 def without_processes(spec: SystemSpec, more: Mapping[str, NodeSpec]) -> SystemSpec:
@@ -116,6 +145,8 @@ def observed_log(observe: Observe, *, is_shown: bool) -> Iterator[None]:
     def tell(severity: Any, name: str, text: str, *place: Any) -> None:
         if name == system_logger.name:
             name = ''
+            if int(severity) <= _INFO:
+                return  # It counts the node of the scenario.
         node = f'/{name.replace(".", "/")}' if name else ''
         observe('log', node, _LEVELS.get(int(severity), str(severity)), text)
         if is_shown:

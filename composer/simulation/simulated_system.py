@@ -22,6 +22,7 @@ from composer.runtime.behaviours.import_check import import_behaviours
 from composer.runtime.environment import environment_set
 from composer.runtime.rewiring.reading import Reading
 from composer.simulation.events import Event
+from composer.simulation.missed_deadlines import MissedDeadlines
 from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
 from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
 from composer.virtual_time.clocks import to_ns
@@ -83,6 +84,7 @@ class SimulatedSystem:
         self._run: SimulatedRun | None = None
         self._node: ScenarioNode | None = None
         self._watch: Watch | None = None
+        self._deadlines: MissedDeadlines | None = None
         self._prepared: list[Callable[[ScenarioNode], None]] = []
         self._messages: defaultdict[str, list[Any]] = defaultdict(list)
 
@@ -135,9 +137,12 @@ class SimulatedSystem:
         stack.enter_context(simulated_clocks(threads, self._start_time_ns))
         with threads.entered():
             self._run = SimulatedRun(self._read(), threads, self._observe, self._on_created)
+        stack.enter_context(self._run.observed_publishers())
 
     def _on_created(self) -> None:
-        self._node = ScenarioNode(self._running.nodes)
+        nodes = self._running.nodes
+        self._node = ScenarioNode(nodes)
+        self._deadlines = MissedDeadlines(nodes.values(), self._threads)
         for prepare in self._prepared:
             prepare(self._node)
 
@@ -166,10 +171,12 @@ class SimulatedSystem:
         return self._run
 
     def _observe(self, kind: EventKind, node: str, name: str, value: Any) -> None:
-        if node == f'/{DRIVER}':
-            node = ''
         if kind == 'message':
             self._messages[name].append(value)
+            if self._deadlines is not None:
+                self._deadlines.on_message(node, name)
+        if node == f'/{DRIVER}':
+            node = ''
         self._on_event(Event(self._threads.now_ns, kind, node, name, value))
 
     # Time

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakKeyDictionary
 
+from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
+
 from composer.executor.deadlines import Deadlines
 from composer.executor.descriptors import TimerFd
 from composer.executor.event_poller import EventPoller
@@ -28,10 +30,17 @@ if TYPE_CHECKING:
 
     from composer.executor.deadlines import Timed
     from composer.executor.scheduler import QueuedSource
+    from composer.executor.sources.waitable_sources import WaitSetSource
     from composer.executor.worker_threads import Worker
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 _HALF: Final = 0.5
+_IN_REAL_TIME: Final = (
+    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
+    QoSPublisherEventType.RCL_PUBLISHER_LIVELINESS_LOST,
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_LIVELINESS_CHANGED,
+)
 
 
 class SimulatedExecutor(SystemExecutor):
@@ -159,14 +168,15 @@ class _NoPoll(QosEventPoll):
 
 
 class _WaitSet(WaitSetThread):
-    """Looks for what only a wait set sees, without a thread; QoS events are left out.
+    """Looks for what only a wait set sees, without a thread.
 
-    Those come from threads of the middleware, in real time.
+    QoS events that threads of the middleware bring, in real time, are left out.
     """
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self._events_from = float('inf')
+    def add(self, source: WaitSetSource) -> None:
+        """See the base class."""
+        if getattr(source.entity, 'event_type', None) not in _IN_REAL_TIME:
+            super().add(source)
 
     def add_user(self, user: object) -> None:
         """Do nothing: there is no thread."""

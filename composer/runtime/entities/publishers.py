@@ -22,18 +22,20 @@ class Publisher:
 
     Attributes:
         publish: Publishes a payload on it.
+        ros: The rclpy publisher.
+        events: Its behaviours for QoS events.
     """
 
     __slots__ = (
         '_endpoint',
-        '_events',
         '_has_dropped',
         '_local',
         '_node',
         '_publish',
-        '_ros',
         '_spec',
+        'events',
         'publish',
+        'ros',
     )
 
     def __init__(self, node: LiveNode, spec: PublisherSpec) -> None:
@@ -42,19 +44,19 @@ class Publisher:
         self._node = node
         self._spec = spec
         self._endpoint = TopicEndpoint(node.ros, 'publisher', spec, profile, node.placing(spec))
-        self._events = EventBehaviours(node, 'publisher', spec.name)
-        self._ros = node.ros.create_publisher(
+        self.events = EventBehaviours(node, 'publisher', spec.name)
+        self.ros = node.ros.create_publisher(
             message_class,
             spec.topic,
             profile,
             callback_group=node.events,
             event_callbacks=self._endpoint.publisher_events(
-                self._events.callbacks(events_of(spec))
+                self.events.callbacks(events_of(spec))
             ),
         )
         node.endpoints.append(self._endpoint)
         self._local = node.system.topics.add_publisher(
-            node.ros, self._ros, is_local=spec.local_delivery
+            node.ros, self.ros, is_local=spec.local_delivery
         )
         send, convert = self._local.publish, converter_for(message_class).convert
 
@@ -93,12 +95,12 @@ class Publisher:
 
     def bind_events(self) -> None:
         """Call its behaviours for QoS events from now on; until then, these wait."""
-        self._events.change(events_of(self._spec))
+        self.events.change(events_of(self._spec))
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
-        self._events.destroy()
+        self.events.destroy()
         self._node.endpoints.remove(self._endpoint)
         self._node.overrides.drop(self._spec, publishes=True)
         self._node.system.topics.remove_publisher(self._local)
-        self._node.ros.destroy_publisher(self._ros)
+        self._node.ros.destroy_publisher(self.ros)

@@ -26,22 +26,27 @@ if TYPE_CHECKING:
 
 
 class Subscription:
-    """A subscription."""
+    """A subscription.
+
+    Attributes:
+        ros: The rclpy subscription.
+        events: Its behaviours for QoS events.
+    """
 
     def __init__(self, node: LiveNode, spec: SubscriptionSpec) -> None:
         self._node, self._spec = node, spec
         self._owner = Owner('subscription', spec.name)
         profile = node.overrides.profile(spec, node.system.profiles, publishes=False)
         self._endpoint = TopicEndpoint(node.ros, 'subscription', spec, profile, node.placing(spec))
-        self._events = EventBehaviours(node, 'subscription', spec.name)
-        self._ros = node.ros.create_subscription(
+        self.events = EventBehaviours(node, 'subscription', spec.name)
+        self.ros = node.ros.create_subscription(
             import_interface(spec.type),
             spec.topic,
             self._create_callback(spec),
             profile,
             callback_group=node.group(spec.group),
             event_callbacks=self._endpoint.subscription_events(
-                self._events.callbacks(events_of(spec))
+                self.events.callbacks(events_of(spec))
             ),
             raw=spec.raw,
             **_filter_options(spec),
@@ -49,35 +54,35 @@ class Subscription:
         node.endpoints.append(self._endpoint)
         self._rest(spec)
         self._local = node.system.topics.add_subscription(
-            node.ros, self._ros, read_only=spec.read_only, reason=_why_sent(spec)
+            node.ros, self.ros, read_only=spec.read_only, reason=_why_sent(spec)
         )
-        self._events.change(events_of(spec), spec)
-        node.count_missed(self._owner, self._ros, self._local.inbox)
+        self.events.change(events_of(spec), spec)
+        node.count_missed(self._owner, self.ros, self._local.inbox)
 
     def change(self, spec: SubscriptionSpec) -> None:
         """See `LiveEntity`."""
         topics = self._node.system.topics
         topics.change_subscription(self._local, read_only=spec.read_only)
         self._rest(spec)
-        self._ros.callback = self._create_callback(spec)
-        self._events.change(events_of(spec), spec)
+        self.ros.callback = self._create_callback(spec)
+        self.events.change(events_of(spec), spec)
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
-        self._events.destroy()
+        self.events.destroy()
         self._node.endpoints.remove(self._endpoint)
         self._node.overrides.drop(self._spec, publishes=False)
         self._node.system.topics.remove_subscription(self._local)
-        self._node.ros.destroy_subscription(self._ros)
+        self._node.ros.destroy_subscription(self.ros)
 
     def _rest(self, spec: SubscriptionSpec) -> None:
         """Have messages kept or dropped while the node is not active."""
         gate = self._node.gate
         if isinstance(gate, LifecycleGate):
             # What is latched is meant for those who come later.
-            latched = self._ros.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+            latched = self.ros.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
             fitting = 'keep' if latched else 'drop'
-            gate.drop(self._ros, is_dropped=(spec.while_inactive or fitting) == 'drop')
+            gate.drop(self.ros, is_dropped=(spec.while_inactive or fitting) == 'drop')
 
     def _create_callback(self, spec: SubscriptionSpec) -> Callable[..., Any]:
         node, behaviour = self._node, spec.behaviour

@@ -73,7 +73,7 @@ class _Game:
         registry = system._executor._spinner.registry
         registry.refresh()
         self._sources = {
-            name: registry._nodes[node.ros].sources[node.entities['subscriptions'][name]._ros]
+            name: registry._nodes[node.ros].sources[node.entities['subscriptions'][name].ros]
             for node in self._nodes.values()
             for name in node.entities['subscriptions']
         }
@@ -239,7 +239,7 @@ class _Game:
         }
 
     def _ros_of(self, section, name, end):
-        return self._nodes[end.node].entities[section][name]._ros
+        return self._nodes[end.node].entities[section][name].ros
 
     def _met_from_outside(self, topic):
         """Return the subscriptions that match a publisher of another process."""
