@@ -117,8 +117,24 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
             nodes = len(system.spec.nodes) if system.spec else None
             checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
         files += name_combinations(checked)
+    files += [
+        _check_scenarios(path, catalogue, absent, options.ignored) for path in selection.scenarios
+    ]
     unchecked = _list_unchecked(catalogue, imports, absent)
     return Report(tuple(files), unchecked, options.is_strict)
+
+
+def _check_scenarios(
+    path: Path, catalogue: InterfaceCatalogue, absent: AbsentPackages, ignored: Sequence[str]
+) -> CheckedFile:
+    # Most runs check no scenarios.
+    from composer.scenarios.checks import check_scenarios
+    from composer.scenarios.scenario_files import load_scenarios
+
+    loaded = load_scenarios(path)
+    findings = absent.leave_out(check_scenarios(loaded, catalogue))
+    kept = tuple(finding for finding in findings if finding.rule not in ignored)
+    return CheckedFile(str(path), kept, cases=len(loaded.spec.cases) if loaded.spec else None)
 
 
 def _import_check() -> ImportCheck:

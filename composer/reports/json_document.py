@@ -26,6 +26,7 @@ def render_report(report: Report) -> str:
             {
                 'file': relative_path(file.name),
                 'nodes': file.nodes,
+                'cases': file.cases,
                 'given': file.given,
                 'combination': file.combination,
             }

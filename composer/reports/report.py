@@ -33,6 +33,7 @@ class CheckedFile:
         nodes: How many nodes it declares; `None` if it could not be read.
         given: The layers, arguments and settings that the command line gives it.
         combination: The name of the combination that it was checked with, if any.
+        cases: How many cases a scenario file has; `None` for a system.
     """
 
     name: str
@@ -40,6 +41,7 @@ class CheckedFile:
     nodes: int | None = None
     given: str = ''
     combination: str | None = None
+    cases: int | None = None
 
     @property
     def variant(self) -> str:

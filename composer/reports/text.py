@@ -14,7 +14,7 @@ from composer.terminal import escape
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
-    from composer.reports.report import Report
+    from composer.reports.report import CheckedFile, Report
 
 # Of a longer line, only the part around the finding is shown.
 _WIDEST_LINE = 160
@@ -35,10 +35,17 @@ def render_files(report: Report, *, colour: bool, is_quiet: bool = False) -> str
         fresh = [finding for finding in file.findings if finding.sort_key not in shown]
         shown |= {finding.sort_key for finding in fresh}
         blocks += [f'{render_finding(finding, colour=colour)}\n\n' for finding in fresh]
-        if not file.findings and file.nodes is not None and not is_quiet:
+        counted = _count_content(file)
+        if not file.findings and counted and not is_quiet:
             name = f'{file.name} ({file.variant})' if file.variant else file.name
-            blocks.append(f'{escape(name)}: ok, {count(file.nodes, "node")}\n')
+            blocks.append(f'{escape(name)}: ok, {counted}\n')
     return ''.join(blocks)
+
+
+def _count_content(file: CheckedFile) -> str:
+    if file.cases is not None:
+        return count(file.cases, 'case')
+    return '' if file.nodes is None else count(file.nodes, 'node')
 
 
 def summarize(findings: list[Diagnostic]) -> str:

@@ -101,7 +101,7 @@ def find_file(document: Document, at: DataPath, text: str) -> Path | None:
         return path
     help_text = explain_absent(path, span)
     message = f"there is no file '{path}'"
-    document.diagnostics.append(diagnostic_at(span, 'missing-file', message, help=help_text))
+    document.diagnostics.append(diagnostic_at(span, 'unreadable-file', message, help=help_text))
     return None
 
 
@@ -119,6 +119,6 @@ def _load_system(loaded: LoadedScenarios, reference: SystemReferenceSpec) -> Loa
         message = str(error).removeprefix('--set ')
         help_text = error.help and ' '.join(error.help.split())
         loaded.document.diagnostics.append(
-            diagnostic_at(span, 'bad-argument', message, help=help_text)
+            diagnostic_at(span, 'bad-system-argument', message, help=help_text)
         )
         return None

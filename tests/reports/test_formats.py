@@ -111,8 +111,8 @@ def test_a_json_report_is_of_its_documented_form():
 def test_a_json_report_says_it_all():
     document = json.loads(render_report(REPORT, 'json'))
     assert document['files'] == [
-        {'file': 'robots/rover.yaml', 'nodes': 1, 'given': '', 'combination': None},
-        {'file': 'lander.yaml', 'nodes': None, 'given': '', 'combination': None},
+        {'file': 'robots/rover.yaml', 'nodes': 1, 'cases': None, 'given': '', 'combination': None},
+        {'file': 'lander.yaml', 'nodes': None, 'cases': None, 'given': '', 'combination': None},
         {'file': 'fine.yaml', 'nodes': 2, 'given': '', 'combination': None},
     ]
     assert document['findings'][1] == {

@@ -12,6 +12,8 @@ from composer.reports.text import render_finding
 from composer.rules import RULES_FOLDER, list_rule_names, load_rule
 from composer.rules.examples import load_example
 from composer.runtime.behaviours.import_check import ImportCheck
+from composer.scenarios.checks import check_scenarios
+from composer.scenarios.scenario_files import load_scenarios
 
 WITHOUT = {
     # Only a ROS that remaps no actions shows it.
@@ -24,6 +26,8 @@ WITHOUT = {
     'changes-nothing',
     # Only an installation without `rosidl_adapter` shows it.
     'unreadable-interfaces',
+    # It takes a recording, which is no text.
+    'unrecorded-topic',
     # It takes a module of more than 2 MB.
     'unread-module',
     # The net below the other rules of definitions; nothing is known that falls through them.
@@ -44,6 +48,8 @@ EXAMPLES = [
 def find(rule, kind, monkeypatch):
     """Return what is found in an example, with paths as they are in its folder."""
     monkeypatch.chdir(RULES_FOLDER / rule)
+    if load_rule(rule).family == 'scenarios':
+        return check_scenarios(load_scenarios(Path(f'{kind}.yaml')), InterfaceCatalogue())
     # Modules of the examples are no part of this process.
     monkeypatch.setattr(sys, 'dont_write_bytecode', True)
     further = {'import': ImportCheck()} if rule in ONLY_WHEN_IMPORTED else None

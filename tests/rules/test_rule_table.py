@@ -28,8 +28,10 @@ SPEAKING = (
     'interfaces',
     'inference',
     'checks',
+    'scenarios',
     'cli',
 )
+SPEAKING_FILES = ('entity_kinds.py', 'runtime/behaviours/import_check.py')
 # Words of the same form that are no rules.
 NO_RULES = {'find-pkg-share', 'nodl-xml', 'x-expected', 'site-packages', 'dist-packages'}
 # Names of which the code has one half, and a table the other.
@@ -41,7 +43,7 @@ COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
 def names_in_the_code():
     found = set()
     paths = [path for room in SPEAKING for path in (PACKAGE / room).rglob('*.py')]
-    for path in [*paths, PACKAGE / 'entity_kinds.py']:
+    for path in [*paths, *(PACKAGE / each for each in SPEAKING_FILES)]:
         for node in ast.walk(ast.parse(path.read_text())):
             text = node.value if isinstance(node, ast.Constant) else None
             if isinstance(text, str) and re.fullmatch('[a-z0-9]+(-[a-z0-9]+)+', text):

@@ -206,12 +206,12 @@ def test_what_is_wrong_leaves_the_rest(load):
 @pytest.mark.parametrize(
     ('system', 'finding'),
     [
-        ('{file: robto.yaml}', "2:16 missing-file: there is no file 'robto.yaml' "
+        ('{file: robto.yaml}', "2:16 unreadable-file: there is no file 'robto.yaml' "
          "(did you mean 'robot.yaml'?)"),
-        ('{file: robot.yaml, layers: [a.yaml]}', "2:37 missing-file: there is no file 'a.yaml' (there are: drive.scenario.yaml, robot.yaml)"),
-        ('{file: robot.yaml, args: {simulatoin: true}}', '2:28 bad-argument: there is no argument '
+        ('{file: robot.yaml, layers: [a.yaml]}', "2:37 unreadable-file: there is no file 'a.yaml' (there are: drive.scenario.yaml, robot.yaml)"),
+        ('{file: robot.yaml, args: {simulatoin: true}}', '2:28 bad-system-argument: there is no argument '
          "'simulatoin' (did you mean 'simulation'?) (the file declares simulation (bool, default false))"),
-        ('{file: robot.yaml, set: {nodes.x.y: 1}}', '2:28 bad-argument: nodes.x.y=1: there is no '
+        ('{file: robot.yaml, set: {nodes.x.y: 1}}', '2:28 bad-system-argument: nodes.x.y=1: there is no '
          "'x' in nodes (there are: governor)"),
         ('{}', "2:1 missing-key: the key 'file' is missing in system"),
     ],

@@ -1,4 +1,4 @@
-"""Find the systems to check: those named on the command line, by a pattern, or in a folder."""
+"""Find the files to check: those named on the command line, by a pattern, or in a folder."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from composer.entity_kinds import WORK_KEYS
 from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, read_file
 from composer.language.pipeline import load_system
 from composer.records import record
+from composer.scenarios.recognition import is_scenario_file
 from composer.schema.structure import known_keys
 from composer.yaml_text.reader import read_document
 
@@ -63,11 +64,13 @@ class Selection:
 
     Attributes:
         systems: Each once, in the order of the command line.
+        scenarios: The scenario files, each once.
         findings: An error for each pattern or folder without a file to check.
     """
 
     systems: tuple[SelectedSystem, ...]
     findings: tuple[Diagnostic, ...] = ()
+    scenarios: tuple[Path, ...] = ()
 
 
 def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Selection:
@@ -83,6 +86,7 @@ def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Sel
             a tool that names all files of a project says nothing by their order.
     """
     systems: list[SelectedSystem] = []
+    scenarios: dict[str, Path] = {}
     findings = []
     may_have_layer = False
     for word in words:
@@ -93,6 +97,8 @@ def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Sel
         for path, is_named in _expand(word):
             if path is None:
                 nothing = _explain_nothing(word)
+            elif is_scenario_file(path):
+                scenarios.setdefault(_identity(path), path)
             elif not (is_named and skip_other_files) or looks_like_system(path):
                 systems.append(SelectedSystem(path))
         findings += [nothing] if nothing else []
@@ -100,12 +106,12 @@ def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Sel
     once: dict[tuple[str, ...], SelectedSystem] = {}
     for system in systems:
         once.setdefault(tuple(map(_identity, (system.path, *system.layers))), system)
-    return Selection(tuple(once.values()), tuple(findings))
+    return Selection(tuple(once.values()), tuple(findings), tuple(scenarios.values()))
 
 
 def list_systems(folder: Path) -> list[Path]:
     """Return the files in a folder, or in one below it, that look like systems."""
-    return [path for path in _walk(folder) if looks_like_system(path)]
+    return [path for path in walk_yaml_files(folder) if looks_like_system(path)]
 
 
 def has_arguments(words: Sequence[str]) -> bool:
@@ -221,7 +227,7 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
     if word == _STANDARD_INPUT or os.path.lexists(word) or (word and not glob.has_magic(word)):
         matches = [word]
     else:
-        matches = _match(word)
+        matches = match_pattern(word)
         if not matches:
             yield None, False
     for match in matches:
@@ -229,13 +235,17 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
         if word == _STANDARD_INPUT or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
             yield path, word != _STANDARD_INPUT
             continue
-        found = list_systems(path)
+        found = [
+            each
+            for each in walk_yaml_files(path)
+            if is_scenario_file(each) or looks_like_system(each)
+        ]
         yield from ((inside, False) for inside in found)
         if not found:
             yield None, False
 
 
-def _match(pattern: str) -> list[str]:
+def match_pattern(pattern: str) -> list[str]:
     """Return what a pattern matches, without what is hidden."""
     path = Path(pattern)
     parts = set(path.parts)
@@ -253,7 +263,8 @@ def _is_hidden(part: str) -> bool:
     return part.startswith('.') and part not in ('.', '..')
 
 
-def _walk(folder: Path) -> Iterator[Path]:
+def walk_yaml_files(folder: Path) -> Iterator[Path]:
+    """Yield the YAML files in a folder, or in one below it, but not in those of others."""
     for at, folders, files in os.walk(folder):
         folders[:] = sorted(
             name for name in folders if not name.startswith('.') and name not in _SKIPPED_FOLDERS
