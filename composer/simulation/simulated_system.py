@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 # 2020-01-01: a time that nobody takes for none.
 START_TIME_NS: Final = 1_577_836_800_000_000_000
+# The middleware sends nothing, and has no shared memory.
+_ALONE: Final = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
 _DRIVER_FILE: Final = f'nodes: {{{DRIVER}: {{parameter_services: false, rosout: false}}}}'
 
 
@@ -154,7 +156,7 @@ class SimulatedSystem:
             raise StartError(message)
         prefixes = import_declared(context.interfaces, lambda _line: None)
         variables = {**context.spec.environment, **extend_variables({}, prefixes)}
-        self._stack.enter_context(environment_set(variables))
+        self._stack.enter_context(environment_set({**variables, **_ALONE}))
         self._stack.enter_context(project_on_path(project_search_path(self._system.files)))
         functions, _findings = import_behaviours(context)
         snapshot = take_snapshot(context, prefixes)
