@@ -4,7 +4,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -14,6 +13,8 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
+
+from tests.fork_server import start_composer
 
 ROOT = Path(__file__).resolve().parent.parent
 DEADLINE_SEC = 40.0
@@ -78,14 +79,7 @@ class Child:
         self.lines = []
         self._grown = threading.Condition()
         self._ended = False
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', 'composer', *map(str, arguments)],
-            cwd=folder,
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        self._process = start_composer(map(str, arguments), folder, environment)
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
