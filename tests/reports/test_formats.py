@@ -113,7 +113,7 @@ def test_a_json_report_says_it_all():
     assert document['files'] == [
         {'file': 'robots/rover.yaml', 'nodes': 1, 'cases': None, 'given': '', 'combination': None},
         {'file': 'lander.yaml', 'nodes': None, 'cases': None, 'given': '', 'combination': None},
-        {'file': 'fine.yaml', 'nodes': 2, 'given': '', 'combination': None},
+        {'file': 'fine.yaml', 'nodes': 2, 'cases': None, 'given': '', 'combination': None},
     ]
     assert document['findings'][1] == {
         'rule': 'bad-name',
