@@ -67,6 +67,13 @@ class SimulatedGoal:
         return self.goal.cancel(timeout)
 
 
+class _Refusal:
+    """Accepts no goal."""
+
+    async def complete(self, _goal: Any) -> bool:
+        return False
+
+
 class ScenarioNode:
     """Publishes, calls and serves for a test, through a node of the simulated system.
 
@@ -78,6 +85,8 @@ class ScenarioNode:
         self._nodes = nodes
         self._node = nodes[f'/{DRIVER}']
         self._made: dict[tuple[str, str], Any] = {}
+        # Others may ask it before anything else has started.
+        self._node.serve_at_once()
 
     # Topics, services, actions
 
@@ -139,7 +148,12 @@ class ScenarioNode:
         self._make('services', data, lambda _node, request: answer(request))
 
     def serve_action(
-        self, action: str, execute: Callable[[Any], Iterator[Any]], of_type: str | None
+        self,
+        action: str,
+        execute: Callable[[Any], Iterator[Any]],
+        of_type: str | None,
+        *,
+        accepts: bool,
     ) -> None:
         """Serve an action: `execute` yields feedback payloads, and returns that of the result."""
 
@@ -148,7 +162,9 @@ class ScenarioNode:
 
         name = _full(action)
         type_name = of_type or self._type_of(name, 'action', ('action_clients',))
-        self._make('actions', {'type': type_name, 'action': name}, behave)
+        server = self._make('actions', {'type': type_name, 'action': name}, behave)
+        if not accepts:
+            server._accept = _Refusal()  # noqa: SLF001 - as the behaviour `accept` would be
 
     # Nodes
 

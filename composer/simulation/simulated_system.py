@@ -42,7 +42,10 @@ if TYPE_CHECKING:
 START_TIME_NS: Final = 1_577_836_800_000_000_000
 # The middleware sends nothing, and has no shared memory.
 _ALONE: Final = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
-_DRIVER_FILE: Final = f'nodes: {{{DRIVER}: {{parameter_services: false, rosout: false}}}}'
+_DRIVER_FILE: Final = f"""
+version: 1
+nodes: {{{DRIVER}: {{parameter_services: false, rosout: false}}}}
+"""
 
 
 class SimulatedSystem:
@@ -206,7 +209,8 @@ class SimulatedSystem:
 
     def at(self, seconds: float, function: Callable[[], None]) -> None:
         """Have a function called at a time since the start, in a thread that may wait."""
-        self._threads.call_at(to_ns(seconds), lambda: self._begin(function))
+        # The nearest: 1.1 is a little more than the decimal that was written.
+        self._threads.call_at(round(seconds * 1e9), lambda: self._begin(function))
 
     def _begin(self, function: Callable[[], None]) -> None:
         self._threads.start(function)
@@ -304,13 +308,16 @@ class SimulatedSystem:
         action: str,
         execute: Callable[[Any], Iterator[Any]],
         type: str | None = None,  # noqa: A002
+        *,
+        accepts: bool = True,
     ) -> None:
         """Serve an action that the system sends goals to; before the start, or later.
 
         Args:
             execute: A generator: yields feedback payloads, and returns that of the result.
+            accepts: Whether goals are accepted.
         """
-        self._prepare_node(lambda node: node.serve_action(action, execute, type))
+        self._prepare_node(lambda node: node.serve_action(action, execute, type, accepts=accepts))
 
     def _prepare_node(self, prepare: Callable[[ScenarioNode], None]) -> None:
         if self._node is None:
