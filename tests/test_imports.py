@@ -43,11 +43,12 @@ ROOMS = (
     ),
     *('virtual_time', 'recordings', 'simulation', 'scenarios'),
     'stubs',
-    *('cli', 'api', '__init__', '__main__'),
+    *('cli', 'pytest_plugin', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.
 SHARED_NAMES = {
     '__init__.py',
+    'declarations.py',  # of commands
     'environment.py',  # variables, and their checks
     'differences.py',  # between definitions, and between systems
     'names.py',  # the rules for names, and their checks
@@ -58,6 +59,8 @@ SHARED_NAMES = {
     'evaluation.py',  # of expressions, and of expectations
     'specs.py',  # the records that a file is parsed into
     'reading.py',  # what was read: of a behaviour, and of a system
+    'github.py',  # a form of reports: of findings, and of test runs
+    'junit.py',  # the same
     'json_document.py',  # the same form, of findings, plans and drawings
     'text.py',  # the same
 }

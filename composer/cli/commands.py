@@ -25,6 +25,7 @@ from composer.cli.common.argument_types import (
 from composer.cli.common.recording_options import RecordingOptions
 from composer.cli.recording.recording_commands import COMMANDS as RECORDING_COMMANDS
 from composer.cli.running.declarations import COMMANDS as RUNNING_COMMANDS
+from composer.cli.testing.declarations import test_command
 from composer.drawing import FORMATS as PICTURE_FORMATS
 from composer.errors import ExitCode
 from composer.reports import FORMATS
@@ -583,5 +584,5 @@ def interfaces_show_command(name: str) -> int:
     return show(name)
 
 
-for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS):
+for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS, test_command):
     cli.add_command(_command)

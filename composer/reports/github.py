@@ -12,31 +12,42 @@ from composer.reports.report import relative_path
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
     from composer.reports.report import Report
 
 
 def render_report(report: Report) -> str:
     """Return a command for each finding, a line each."""
-    return ''.join(f'{_command(finding)}\n' for finding in report.findings)
+    return ''.join(f'{render_finding(finding)}\n' for finding in report.findings)
 
 
-def _command(finding: Diagnostic) -> str:
-    properties = {'file': escape(relative_path(finding.file))}
-    if finding.span:
-        end = finding.span.column + max(finding.span.length, 1)
-        properties |= {
-            'line': str(finding.span.line),
-            'endLine': str(finding.span.line),
-            'col': str(finding.span.column),
-            'endColumn': str(end),
-        }
-    properties['title'] = finding.rule
-    listed = ','.join(f'{key}={_escape_property(value)}' for key, value in properties.items())
+def render_finding(finding: Diagnostic) -> str:
+    """Return the command for a finding."""
     message = escape(finding.message)
     if finding.help:
         message += f'\nhelp: {escape(finding.help)}'
-    return f'::{finding.severity.value} {listed}::{_escape_data(message)}'
+    return annotate(finding.severity.value, finding.file, finding.span, finding.rule, message)
+
+
+def annotate(kind: str, file: str, span: Span | None, title: str, message: str) -> str:
+    """Return the command that annotates a place.
+
+    Args:
+        kind: `error`, `warning` or `notice`.
+        message: Without characters that are not printable; may have several lines.
+    """
+    properties = {'file': escape(relative_path(file))}
+    if span:
+        end = span.column + max(span.length, 1)
+        properties |= {
+            'line': str(span.line),
+            'endLine': str(span.line),
+            'col': str(span.column),
+            'endColumn': str(end),
+        }
+    properties['title'] = escape(title)
+    listed = ','.join(f'{key}={_escape_property(value)}' for key, value in properties.items())
+    return f'::{kind} {listed}::{_escape_data(message)}'
 
 
 def _escape_data(text: str) -> str:

@@ -32,7 +32,7 @@ def render_report(report: Report) -> str:
             }
             for file in report.files
         ],
-        'findings': [_describe(finding) for finding in report.findings],
+        'findings': [describe_finding(finding) for finding in report.findings],
         'errors': errors,
         'warnings': warnings,
         'failed': report.has_failed,
@@ -41,21 +41,23 @@ def render_report(report: Report) -> str:
     return json.dumps(document, indent=2) + '\n'
 
 
-def _describe(finding: Diagnostic) -> dict[str, Any]:
+def describe_finding(finding: Diagnostic) -> dict[str, Any]:
+    """Return a finding as plain data."""
     return {
         'rule': finding.rule,
         'severity': finding.severity.value,
         'message': finding.message,
         'help': finding.help,
-        **_place(finding.span, finding.file),
+        **describe_place(finding.span, finding.file),
         'related': [
-            {'message': related.message, **_place(related.span, related.span.source.name)}
+            {'message': related.message, **describe_place(related.span, related.span.source.name)}
             for related in finding.related
         ],
     }
 
 
-def _place(span: Span | None, file: str) -> dict[str, Any]:
+def describe_place(span: Span | None, file: str) -> dict[str, Any]:
+    """Return a place as plain data: the file, the line and columns."""
     return {
         'file': relative_path(file),
         'line': span.line if span else None,

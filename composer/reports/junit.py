@@ -43,25 +43,27 @@ def _has_failed(file: CheckedFile, report: Report) -> bool:
 
 def _render_case(file: CheckedFile, report: Report) -> Iterator[str]:
     path = relative_path(file.name)
-    name = _attribute(f'{path} ({file.variant})' if file.variant else path)
-    case = f'    <testcase classname="composer" name={name} file={_attribute(path)} time="0"'
+    name = attribute(f'{path} ({file.variant})' if file.variant else path)
+    case = f'    <testcase classname="composer" name={name} file={attribute(path)} time="0"'
     if not file.findings:
         yield f'{case}/>'
         return
-    text = escape(_clean('\n\n'.join(map(render_finding, file.findings))))
+    text = escape(clean('\n\n'.join(map(render_finding, file.findings))))
     yield f'{case}>'
     if _has_failed(file, report):
-        message = _attribute(summarize(list(file.findings)))
-        rules = _attribute(', '.join(dict.fromkeys(f.rule for f in file.findings)))
+        message = attribute(summarize(list(file.findings)))
+        rules = attribute(', '.join(dict.fromkeys(f.rule for f in file.findings)))
         yield f'      <failure message={message} type={rules}>{text}</failure>'
     else:
         yield f'      <system-out>{text}</system-out>'
     yield '    </testcase>'
 
 
-def _attribute(text: str) -> str:
-    return quoteattr(_clean(text))
+def attribute(text: str) -> str:
+    """Return a text in quotes, as the value of an attribute."""
+    return quoteattr(clean(text))
 
 
-def _clean(text: str) -> str:
+def clean(text: str) -> str:
+    """Return a text without the characters that XML does not allow."""
     return _NOT_XML.sub('\N{REPLACEMENT CHARACTER}', text)

@@ -71,7 +71,7 @@ def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
     rule = style(f'{finding.severity.value}[{finding.rule}]', fg=hue, bold=True)
     lines = [f'{style(f"{escape(place)}:", bold=True)} {rule}: {escape(finding.message)}']
     if span:
-        shown, carets = _render_excerpt(span) or ('', '')
+        shown, carets = render_excerpt(span) or ('', '')
         lines += [shown, style(carets, fg=hue)] if shown else []
     lines += [
         f'  {escape(str(related.span))}: {escape(related.message)}' for related in finding.related
@@ -85,7 +85,8 @@ def _plain(text: str, **_style: object) -> str:
     return text
 
 
-def _render_excerpt(span: Span) -> tuple[str, str] | None:
+def render_excerpt(span: Span) -> tuple[str, str] | None:
+    """Return the line of a span and the line that marks it; `None` if it must not be shown."""
     text, start = _cropped(span.source.line(span.line), span.column - 1)
     if not text.strip() or not may_show_lines(span.source.name):
         return None

@@ -1,0 +1,1 @@
+"""`composer test`: find scenario files, check them, run their cases and report."""

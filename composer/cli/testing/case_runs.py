@@ -1,0 +1,111 @@
+"""The runs of cases: each in the default order, and in as many others as are asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from composer.scenarios.reports.run_report import Attempt, CaseReport
+from composer.scenarios.running.case_results import CaseRequest, CaseResult
+from composer.scenarios.running.orders import compare_orders
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from composer.cli.testing.case_plan import PlannedCase
+    from composer.cli.testing.run_options import RunOptions
+    from composer.scenarios.running.case_client import CaseClient
+
+
+class CaseRuns:
+    """Runs cases, and puts the results of their orders together.
+
+    Args:
+        folder: For the traces of runs.
+
+    Attributes:
+        reports: What came of the cases so far, in their order.
+    """
+
+    def __init__(
+        self,
+        client: CaseClient,
+        cases: Sequence[PlannedCase],
+        options: RunOptions,
+        folder: Path,
+    ) -> None:
+        self._client = client
+        self._cases = cases
+        self._options = options
+        self._folder = folder
+        self._results: dict[int, dict[int, CaseResult]] = {}
+        self.reports: list[CaseReport] = []
+
+    def run(self) -> Iterator[CaseReport]:
+        """Yield what came of each case, in their order, as soon as it is known."""
+        yield from self._list_finished()
+        for (index, attempt), result in self._client.run_all(self._requests(), self._options.jobs):
+            self._results.setdefault(index, {})[attempt] = result
+            yield from self._list_finished()
+
+    def write_trace(self, path: Path) -> None:
+        """Write the events of all cases, in the default orders, to one file."""
+        with path.open('wb') as trace:
+            for index, report in enumerate(self.reports):
+                if report.name:
+                    trace.write(f'# {report.title} seed {report.result.seed}\n'.encode())
+                    part = self._trace(index, 0)
+                    trace.write(part.read_bytes() if part.exists() else b'')
+
+    def _requests(self) -> dict[tuple[int, int], CaseRequest]:
+        return {
+            (index, attempt): self._request(index, attempt)
+            for index, case in enumerate(self._cases)
+            if case.name
+            for attempt in range(1 + self._options.shuffles)
+        }
+
+    def _request(self, index: int, attempt: int) -> CaseRequest:
+        options, case = self._options, self._cases[index]
+        wants_trace = options.trace is not None or options.shuffles
+        return CaseRequest(
+            file=case.file,
+            case=case.name,
+            seed=options.seed,
+            shuffle=attempt,
+            real_time_limit_sec=options.limit_sec,
+            trace=str(self._trace(index, attempt)) if wants_trace else '',
+            captures=not options.shows_output,
+        )
+
+    def _trace(self, index: int, attempt: int) -> Path:
+        return self._folder / f'{index}-{attempt}'
+
+    def _list_finished(self) -> Iterator[CaseReport]:
+        """Yield the cases that are next in order and complete."""
+        while len(self.reports) < len(self._cases):
+            index = len(self.reports)
+            case, results = self._cases[index], self._results.get(index, {})
+            if case.name and len(results) < 1 + self._options.shuffles:
+                return
+            report = self._report(index, case, results)
+            self._results.pop(index, None)
+            self.reports.append(report)
+            yield report
+
+    def _report(self, index: int, case: PlannedCase, results: dict[int, CaseResult]) -> CaseReport:
+        attempts = []
+        for attempt in range(1, 1 + self._options.shuffles if case.name else 1):
+            traces = self._trace(index, 0), self._trace(index, attempt)
+            difference = compare_orders(*traces, results[attempt].seed)
+            attempts.append(Attempt(results[attempt], difference, differs=bool(difference)))
+            traces[1].unlink(missing_ok=True)
+        return CaseReport(
+            file=case.file,
+            name=case.name,
+            span=case.span,
+            result=results.get(0) or CaseResult(),
+            attempts=tuple(attempts),
+            limit_sec=self._options.limit_sec,
+            findings=case.findings,
+        )

@@ -1,0 +1,123 @@
+"""`composer test`: run the cases of scenario files."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import click
+
+from composer import signals
+from composer.cli.common.output import wants_colour, write_file
+from composer.cli.testing.case_plan import plan_cases
+from composer.cli.testing.case_runs import CaseRuns
+from composer.cli.testing.name_expressions import parse_name_expression
+from composer.cli.testing.scenario_selection import DEFAULT_PATTERN, select_scenarios
+from composer.errors import ExitCode
+from composer.reports.text import render_finding
+from composer.runtime.environment import check_ros, find_colour
+from composer.scenarios.reports import render_report
+from composer.scenarios.reports.run_report import RunReport
+from composer.scenarios.reports.text import render_case, render_end
+from composer.scenarios.running.case_client import CaseClient
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.cli.testing.case_plan import CasePlan
+    from composer.cli.testing.name_expressions import Condition
+    from composer.cli.testing.run_options import RunOptions
+    from composer.scenarios.reports.run_report import CaseReport
+
+
+def run_tests(words: Sequence[str], options: RunOptions) -> int:
+    """Run cases and report what came of them; return the exit code.
+
+    Args:
+        words: Files, folders, patterns, and cases as `FILE::case`.
+
+    Raises:
+        UsageError: A file or a case is not there, or the expression is none.
+        ComposerError: A report cannot be written.
+    """
+    started = monotonic()
+    is_meant: Condition = lambda _: True  # noqa: E731 - the type
+    if options.expression is not None:
+        is_meant = parse_name_expression(options.expression)
+    files = select_scenarios(words)
+    check_ros()
+    folder = Path(tempfile.mkdtemp(prefix='composer-traces-'))
+    try:
+        with signals.interrupting(), CaseClient(find_colour()) as client:
+            client.start()
+            plan = plan_cases(files, is_meant)
+            runs = CaseRuns(client, plan.cases, options, folder)
+            try:
+                return _run(runs, plan, options, started)
+            except KeyboardInterrupt:
+                _report(runs.reports, plan, options, started, 'interrupted')
+                raise
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _run(runs: CaseRuns, plan: CasePlan, options: RunOptions, started: float) -> int:
+    _show_warnings(plan, options)
+    end = ''
+    for case in runs.run():
+        _show_case(case, options)
+        if options.ends_early and case.outcome != 'passed':
+            end = 'ended at the first failure'
+            break
+    if options.trace:
+        runs.write_trace(options.trace)
+    report = _report(runs.reports, plan, options, started, end)
+    if not plan.cases:
+        _explain_nothing(plan)
+        return ExitCode.NOTHING_COLLECTED
+    return ExitCode.FAILED if report.has_failed else ExitCode.DONE
+
+
+def _show_warnings(plan: CasePlan, options: RunOptions) -> None:
+    """Print the findings of files without errors; errors are shown as failures."""
+    failed = {finding.sort_key for case in plan.cases for finding in case.findings}
+    colour = wants_colour(is_error=True)
+    for finding in plan.findings:
+        if finding.sort_key not in failed and not options.is_quiet:
+            click.echo(render_finding(finding, colour=colour) + '\n', err=True, color=colour)
+
+
+def _show_case(report: CaseReport, options: RunOptions) -> None:
+    if options.format == 'json' or options.is_quiet:
+        return
+    colour = wants_colour()
+    text = render_case(report, colour=colour, is_verbose=options.is_verbose)
+    click.echo(text, color=colour)
+
+
+def _report(
+    cases: Sequence[CaseReport], plan: CasePlan, options: RunOptions, started: float, end: str
+) -> RunReport:
+    """Write all reports at the end; return what they show."""
+    report = RunReport(tuple(cases), plan.findings, plan.deselected, monotonic() - started, end)
+    if options.format == 'json':
+        click.echo(render_report(report, 'json'), nl=False)
+    else:
+        colour = wants_colour()
+        click.echo('\n'.join(render_end(report, colour=colour)), color=colour)
+    if options.format == 'github':
+        from composer.scenarios.reports.github import list_commands
+
+        for line in list_commands(report):
+            click.echo(line, color=False)
+    if options.junit:
+        write_file(options.junit, render_report(report, 'junit'), 'the report')
+    return report
+
+
+def _explain_nothing(plan: CasePlan) -> None:
+    what = 'no case has such a name' if plan.deselected else f'no file matches {DEFAULT_PATTERN}'
+    click.echo(what, err=True)

@@ -1,0 +1,1 @@
+"""Runs cases of scenario files, each in a process of its own."""

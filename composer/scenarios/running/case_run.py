@@ -1,0 +1,161 @@
+"""Runs a case: what it is given, what happens, and whether that is what is expected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+from composer.recordings.reading import read_recording
+from composer.scenarios.expectations.evaluation import evaluate
+from composer.scenarios.running.case_results import CaseFailure, CaseResult
+from composer.scenarios.running.case_steps import CaseSteps
+from composer.scenarios.running.failure_reports import (
+    describe_error,
+    describe_failure,
+    list_log,
+)
+from composer.scenarios.running.recording_input import RecordingInput
+from composer.scenarios.running.stand_in_servers import is_of_stand_in, serve_stand_ins
+from composer.scenarios.specs import ParametersExpectationSpec
+from composer.scenarios.times import NANOSECONDS
+from composer.simulation.events import Event
+from composer.simulation.simulated_system import SimulatedSystem
+from composer.simulation.trace import render_event
+
+if TYPE_CHECKING:
+    from composer.language.loaded_system import LoadedSystem
+    from composer.scenarios.running.case_results import CaseRequest
+    from composer.scenarios.scenario_files import LoadedScenarios
+    from composer.scenarios.specs import CaseSpec, ValuesByNode
+    from composer.virtual_time.unrepeatable import Notice
+
+
+def run_case(loaded: LoadedScenarios, case: CaseSpec, request: CaseRequest) -> CaseResult:
+    """Run a case in this process; return what came of it.
+
+    Raises:
+        ComposerError: The trace cannot be written.
+    """
+    seed = (case.seed if request.seed is None else request.seed) + max(0, request.shuffle - 1)
+    try:
+        run = _CaseRun(loaded, case, seed, is_shuffled=request.shuffle > 0)
+    except ComposerError as error:
+        return CaseResult((CaseFailure('start', str(error)),), seed)
+    failures = run.run()
+    simulated = run.simulated
+    if request.trace:
+        _write_trace(request.trace, simulated)
+    if not any(failure.kind in ('start', 'stuck') for failure in failures):
+        found = evaluate(case, run.events, run.steps.outcomes(), parameters=run.parameters)
+        failures += [describe_failure(loaded, each, run.events) for each in found]
+    return CaseResult(
+        failures=tuple(failures),
+        seed=seed,
+        simulated_sec=round(run.simulated_sec, 9),
+        notices=tuple(map(_describe_notice, simulated.notices)),
+        log=tuple(list_log(simulated.events)),
+    )
+
+
+class _CaseRun:
+    """One run of a case."""
+
+    def __init__(
+        self, loaded: LoadedScenarios, case: CaseSpec, seed: int, *, is_shuffled: bool
+    ) -> None:
+        if loaded.system is None:
+            message = f'{loaded.path}: its system cannot be read'
+            raise ComposerError(message)
+        given = case.given
+        recording = read_recording(given.recording) if given.recording else None
+        self._case = case
+        self.simulated_sec = 0.0
+        self.events: list[Event] = []
+        self.parameters: dict[str, dict[str, Any]] = {}
+        self.simulated = SimulatedSystem(
+            with_parameters(loaded.system, given.parameters),
+            seed=seed,
+            is_shuffled=is_shuffled,
+            start_time_ns=recording.start_ns if recording else None,
+        )
+        self.steps = CaseSteps(self.simulated, loaded, case)
+        self._input = (
+            RecordingInput(self.simulated, recording, loaded.system) if recording else None
+        )
+
+    def run(self) -> list[CaseFailure]:
+        """Let it all happen; return what went wrong beside expectations that are not met."""
+        simulated, case = self.simulated, self._case
+        try:
+            serve_stand_ins(simulated, case.given)
+            self.steps.schedule()
+            if self._input:
+                self._input.schedule()
+            simulated.start()
+            self._note_parameters()
+            simulated.forward(max(0.0, case.until_ns / NANOSECONDS - simulated.now))
+            self._stop()
+        except ComposerError as error:
+            # Nothing more is done with a system that is stuck: its process ends.
+            return [describe_error(error, simulated.events)]
+        return self.steps.failures
+
+    def _stop(self) -> None:
+        """Stop the system: what its behaviours do then counts, states of lifecycles do not."""
+        simulated = self.simulated
+        self.simulated_sec = simulated.now
+        if simulated.exit_code is not None:
+            time_ns = round(simulated.now * NANOSECONDS)
+            simulated.events.append(Event(time_ns, 'exit', '', '', simulated.exit_code))
+        number = len(simulated.events)
+        simulated.stop()
+        happened = [each for each in simulated.events if not is_of_stand_in(each)]
+        at_stop = simulated.events[number:]
+        left_out = {id(each) for each in at_stop if each.kind == 'state'}
+        self.events = [each for each in happened if id(each) not in left_out]
+
+    def _note_parameters(self) -> None:
+        for expected in self._case.expectations:
+            if isinstance(expected, ParametersExpectationSpec):
+                for node in expected.values:
+                    self.parameters[node] = self.simulated.parameters(node)
+
+
+def with_parameters(system: LoadedSystem, values: ValuesByNode) -> LoadedSystem:
+    """Return a system whose nodes start with other values of parameters.
+
+    Args:
+        values: By full names of nodes.
+    """
+    if not values or system.spec is None:
+        return system
+    nodes = dict(system.spec.nodes)
+    for key, node in nodes.items():
+        given = values.get(node.full_name, {})
+        parameters = {
+            name: replace(spec, value=_converted(spec.type, given[name]))
+            if name in given
+            else spec
+            for name, spec in node.parameters.items()
+        }
+        nodes[key] = replace(node, parameters=parameters)
+    return replace(system, spec=replace(system.spec, nodes=nodes))
+
+
+def _converted(type_name: str | None, value: object) -> object:
+    """Return a value as its type has it: YAML writes a double without a point as an integer."""
+    if type_name == 'double' and isinstance(value, int):
+        return float(value)
+    if type_name == 'double_array' and isinstance(value, list):
+        return [float(each) for each in value]
+    return value
+
+
+def _write_trace(path: str, simulated: SimulatedSystem) -> None:
+    with open(path, 'w', encoding='utf-8') as trace:  # noqa: PTH123 - as quick as it gets
+        trace.writelines(f'{render_event(event)}\n' for event in simulated.events)
+
+
+def _describe_notice(notice: Notice) -> str:
+    return f'{notice.file}:{notice.line}: {notice.what}'
