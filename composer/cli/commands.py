@@ -507,7 +507,7 @@ def import_command(
 def new_command(name: str) -> int:
     """Create a project in a new folder NAME.
 
-    The project has a system, its behaviours, tests, a CI workflow, and the schema for editors.
+    The project has a system, its behaviours, tests, a CI workflow, and the schemas for editors.
     """
     from composer.cli.new import create_project
 

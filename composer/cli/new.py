@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
-from composer.schema import SCHEMA_NAME, schema_path
+from composer.schema import SCENARIO_SCHEMA_NAME, SCHEMA_NAME, schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +42,7 @@ def create_project(name: str) -> int:
     click.echo(f'created {folder}:')
     for path in sorted(written):
         click.echo(f'  {path.relative_to(folder)}')
-    click.echo(f'run it:\n  cd {name}\n  composer up configs/{name}.yaml\n  python -m pytest')
+    click.echo(f'run it:\n  cd {name}\n  composer up configs/{name}.yaml\n  composer test')
     return ExitCode.DONE
 
 
@@ -82,7 +82,8 @@ def _project_files(name: str) -> Iterator[tuple[Path, str]]:
         parts = path.relative_to(template).parts
         named = [re.sub('^dot_', '.', part).replace(_TEMPLATE_NAME, name) for part in parts]
         yield Path(*named), path.read_text(encoding='utf-8').replace(_TEMPLATE_NAME, name)
-    yield Path('schemas', SCHEMA_NAME), schema_path().read_text(encoding='utf-8')
+    for schema in (SCHEMA_NAME, SCENARIO_SCHEMA_NAME):
+        yield Path('schemas', schema), schema_path(schema).read_text(encoding='utf-8')
 
 
 def _write(path: Path, text: str) -> Path:

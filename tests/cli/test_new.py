@@ -11,6 +11,7 @@ import yaml
 
 from composer.cli.main import run
 from composer.schema import schema_path
+from tests.plugin import PLUGIN_OPTIONS
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = {
@@ -23,6 +24,8 @@ FILES = {
     'pyproject.toml',
     'requirements.txt',
     'schemas/composer.schema.json',
+    'schemas/scenario.schema.json',
+    'tests/my_robot.scenario.yaml',
     'tests/test_my_robot.py',
 }
 
@@ -65,7 +68,7 @@ def test_it_creates_all_that_a_project_needs(folder, capsys):
     said = capsys.readouterr().out
     assert all(f'  {path}\n' in said for path in FILES)
     assert said.endswith(
-        'run it:\n  cd my_robot\n  composer up configs/my_robot.yaml\n  python -m pytest\n'
+        'run it:\n  cd my_robot\n  composer up configs/my_robot.yaml\n  composer test\n'
     )
 
 
@@ -103,25 +106,29 @@ def test_files_for_other_tools_are_what_these_read(project):
 def test_it_names_no_host(project):
     for path, text in texts(project).items():
         # The schema has the address of its own format.
-        assert path == 'schemas/composer.schema.json' or '://' not in text
+        assert path.startswith('schemas/') or '://' not in text
+
+
+def run_tests_in(project):
+    return run_in(project, 'pytest', '-p', 'no:cacheprovider', *PLUGIN_OPTIONS)
 
 
 @pytest.mark.ros
-def test_its_own_tests_pass(project, domain_id):
-    done = run_in(project, 'pytest', '-p', 'no:cacheprovider')
+def test_its_own_tests_pass(project):
+    done = run_tests_in(project)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert '2 passed' in done.stdout
+    assert '4 passed' in done.stdout
 
 
 @pytest.mark.ros
-def test_its_tests_fail_if_the_system_does_not_work(project, domain_id):
+def test_its_tests_fail_if_the_system_does_not_work(project):
     behaviours = project / 'behaviours' / 'my_robot.py'
-    behaviours.write_text(behaviours.read_text().replace('I heard', 'I missed'))
-    test = project / 'tests' / 'test_my_robot.py'
-    test.write_text(test.read_text().replace('DEADLINE_SEC = 30.0', 'DEADLINE_SEC = 4.0'))
-    done = run_in(project, 'pytest', '-p', 'no:cacheprovider')
+    behaviours.write_text(behaviours.read_text().replace('Hello', 'Goodbye'))
+    done = run_tests_in(project)
     assert done.returncode == 1, done.stdout + done.stderr
-    assert 'no greeting:' in done.stdout
+    assert '3 failed, 1 passed' in done.stdout
+    assert "assert ['Goodbye Alice!'] == ['Hello Alice!']" in done.stdout
+    assert 'tests/my_robot.scenario.yaml:8:' in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,89 @@
+"""Scenario files as collectors of pytest, and their cases as tests."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from composer.checks.absent_packages import AbsentPackages
+from composer.diagnostics import has_errors
+from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.pytest_plugin.case_clients import find_client
+from composer.reports.text import render_finding
+from composer.scenarios.checks import check_scenarios
+from composer.scenarios.reports.run_report import CaseReport
+from composer.scenarios.reports.text import render_failures
+from composer.scenarios.running.case_results import CaseRequest
+from composer.scenarios.scenario_files import load_scenarios
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from composer.diagnostics import Span
+
+
+class CaseFailedError(ComposerError):
+    """A case failed; its only argument is the report."""
+
+
+class ScenarioFile(pytest.File):
+    """A scenario file."""
+
+    def collect(self) -> Iterator[ScenarioCase]:
+        """Yield its cases.
+
+        Raises:
+            CollectError: The file, or the system that it names, has errors.
+        """
+        loaded = load_scenarios(self.path)
+        findings = AbsentPackages().leave_out(check_scenarios(loaded, InterfaceCatalogue()))
+        if has_errors(findings):
+            raise self.CollectError('\n\n'.join(map(render_finding, findings)))
+        for name, case in (loaded.spec.cases if loaded.spec else {}).items():
+            span = loaded.positions.key(case.path)
+            yield ScenarioCase.from_parent(self, name=name, span=span)
+
+
+class ScenarioCase(pytest.Item):
+    """A case of a scenario file.
+
+    Args:
+        span: Where it stands.
+    """
+
+    def __init__(self, *, span: Span, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self._span = span
+
+    def runtest(self) -> None:
+        """Run the case in a process of its own.
+
+        Raises:
+            CaseFailedError: It failed.
+        """
+        captures = self.config.getoption('capture') != 'no'
+        request = CaseRequest(str(self.path), self.name, captures=captures)
+        result = find_client(self.config).run(request)
+        report = CaseReport(_shown(self.path), self.name, self._span, result)
+        if not result.has_passed:
+            raise CaseFailedError(render_failures(report))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """Return our own report for a case that failed."""
+        if isinstance(excinfo.value, CaseFailedError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Return where it stands, and its name."""
+        return self.path, self._span.line - 1, self.name
+
+
+def _shown(path: Path) -> str:
+    """Return a path as the command line takes it from here."""
+    relative = os.path.relpath(path)
+    return str(path) if relative.startswith('..') else relative
