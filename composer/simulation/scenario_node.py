@@ -22,8 +22,16 @@ DRIVER: Final = 'scenario'
 _DEPTH: Final = 1000
 
 
+# pytest shows where a test failed, and nothing of this module.
+__tracebackhide__ = True
+
+
 class SimulationError(ComposerError):
     """A test asks for something that the simulated system does not have."""
+
+    def __str__(self) -> str:
+        """Return the message with its help: a failed test shows only this."""
+        return f'{super().__str__()}: {self.help}' if self.help else super().__str__()
 
 
 class SimulatedGoal:

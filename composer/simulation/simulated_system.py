@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.system_handle import EventKind
     from composer.virtual_time.unrepeatable import Notice, Watch
 
+# pytest shows where a test failed, and nothing of this module.
+__tracebackhide__ = True
+
 # 2020-01-01: a time that nobody takes for none.
 START_TIME_NS: Final = 1_577_836_800_000_000_000
 # The middleware sends nothing, and has no shared memory.
@@ -128,6 +131,8 @@ class SimulatedSystem:
             with self._threads.entered():
                 self._running.start()
         except BaseException:
+            with self._threads.entered():
+                self._threads.close()
             self._stack.close()
             raise
 
