@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -29,6 +30,15 @@ _TITLES = {
     'process_restart': 'A restart policy',
     'process_stop': 'A stop policy',
     'condition': 'A condition',
+    'system': 'The system',
+    'case': 'A case',
+    'given': 'What is given',
+    'service_stand_in': 'A stand-in for a service',
+    'action_stand_in': 'A stand-in for an action',
+    'feedback': 'Feedback of a stand-in',
+    'step': 'A step',
+    'expectation': 'An expectation',
+    'pattern': 'A message of an order',
     'qos': 'QoS',
     'qos_profile': 'A QoS profile',
 }
@@ -43,16 +53,33 @@ _TYPE_WORDS = {
 
 
 def reference_page(schema: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines of the reference page.
+    """Yield the lines of the reference of system files.
 
     Args:
-        schema: The JSON Schema of system files.
+        schema: Their JSON Schema.
     """
     yield '# Reference'
     yield ''
     yield 'Every key of a file. Generated from `schemas/composer.schema.json` by `make docs`.'
     yield ''
     yield 'Any scalar can be an expression, in quotes: `"{{ name }}"`.'
+    yield from _sections(schema)
+
+
+def scenario_reference_page(schema: dict[str, Any]) -> Iterator[str]:
+    """Yield the lines of the reference of scenario files.
+
+    Args:
+        schema: Their JSON Schema.
+    """
+    yield '# Reference of scenario files'
+    yield ''
+    yield 'Every key. Generated from `schemas/scenario.schema.json` by `make docs`.'
+    yield 'Times are seconds since the start of the system, unless a key says otherwise.'
+    yield from _sections(schema)
+
+
+def _sections(schema: dict[str, Any]) -> Iterator[str]:
     yield ''
     yield '## A file'
     yield ''
@@ -170,7 +197,7 @@ def _describe(value: dict[str, Any], schema: dict[str, Any]) -> str:
     if 'enum' in value:
         return _join(f'`{option}`' for option in value['enum'])
     if 'const' in value:
-        return f'`{value["const"]}`'
+        return f'`{json.dumps(value["const"])}`'
     if 'x-expected' in value:
         return str(value['x-expected'])
     return _describe_type(value, schema)

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 
 import composer
 from composer.cli import main as cli
-from composer.schema import schema_path
+from composer.schema import SCENARIO_SCHEMA_NAME, schema_path
 
 ROOT = Path(composer.__file__).parents[1]
 SCHEMA = json.loads(schema_path().read_text())
@@ -34,7 +34,7 @@ def sections_of(text):
     }
 
 
-@pytest.mark.parametrize('name', ['reference.md', 'rules.md'])
+@pytest.mark.parametrize('name', ['reference.md', 'rules.md', 'testing_reference.md'])
 def test_a_generated_page_is_current(name):
     current = (ROOT / 'docs' / name).read_text() == generated()[name]
     assert current, f"docs/{name} is not current: run 'make docs'"
@@ -45,8 +45,15 @@ def test_the_links_of_a_page_lead_to_its_sections():
         assert set(re.findall(r'\]\(#([^)]*)\)', text)) <= sections_of(text)
 
 
-def test_every_key_has_its_row():
-    page = generated()['reference.md']
+@pytest.mark.parametrize(
+    ('name', 'schema'),
+    [
+        ('reference.md', SCHEMA),
+        ('testing_reference.md', json.loads(schema_path(SCENARIO_SCHEMA_NAME).read_text())),
+    ],
+)
+def test_every_key_has_its_row(name, schema):
+    page = generated()[name]
 
     def keys(schema):
         if isinstance(schema, dict):
@@ -58,7 +65,7 @@ def test_every_key_has_its_row():
             for value in schema:
                 yield from keys(value)
 
-    assert [key for key in keys(SCHEMA) if f'| `{key}` |' not in page] == []
+    assert [key for key in keys(schema) if f'| `{key}` |' not in page] == []
 
 
 @pytest.mark.parametrize(

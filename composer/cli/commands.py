@@ -301,12 +301,13 @@ def explain_command(rule: str | None) -> int:
 @cli.command('schema')
 @click.option('--path', 'path_only', is_flag=True, help='Print the path of the schema file.')
 @click.option('--matrix', is_flag=True, help='Print the schema of the files of check --matrix.')
-def schema_command(*, path_only: bool, matrix: bool) -> int:
+@click.option('--scenarios', is_flag=True, help='Print the schema of scenario files.')
+def schema_command(*, path_only: bool, matrix: bool, scenarios: bool) -> int:
     """Print the JSON Schema of system files, for editors."""
     from composer.cli.editors import print_schema
 
     refuse_together({'--path': path_only, '--matrix': matrix})
-    return print_schema(path_only=path_only, matrix=matrix)
+    return print_schema(path_only=path_only, matrix=matrix, scenarios=scenarios)
 
 
 @cli.command('show', context_settings=NUMBERS_ARE_VALUES)

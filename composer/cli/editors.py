@@ -14,7 +14,7 @@ from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.schema import schema_path
+from composer.schema import SCENARIO_SCHEMA_NAME, SCHEMA_NAME, schema_path
 from composer.stubs.system_stubs import module_of, stubs_of
 
 if TYPE_CHECKING:
@@ -26,10 +26,10 @@ class ConflictingSystemsError(ComposerError):
     """Two files would have their nodes in one module."""
 
 
-def print_schema(*, path_only: bool, matrix: bool) -> int:
-    """Print the schema of systems or of matrix files, or the path of the first."""
-    path = schema_path()
-    if matrix:
+def print_schema(*, path_only: bool, matrix: bool, scenarios: bool = False) -> int:
+    """Print the schema of systems, matrix files or scenario files, or the path of a schema."""
+    path = schema_path(SCENARIO_SCHEMA_NAME if scenarios else SCHEMA_NAME)
+    if matrix and not scenarios:
         schema = json.loads(path.read_text(encoding='utf-8'))
         definitions = {name: schema['$defs'][name] for name in ('combinations', 'combination')}
         part = {'$schema': schema['$schema'], '$ref': '#/$defs/combinations'}

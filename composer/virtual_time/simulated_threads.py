@@ -294,10 +294,10 @@ class SimulatedThreads:
         if me is not self._visitor:
             REAL.acquire(me.turn)
             return
-        turns, since = self.turns, REAL.monotonic()
+        seen, since = (self.turns, self.now_ns), REAL.monotonic()
         while not REAL.acquire(me.turn, True, _LOOK_SEC):
-            if self.turns != turns:
-                turns, since = self.turns, REAL.monotonic()
+            if (self.turns, self.now_ns) != seen:
+                seen, since = (self.turns, self.now_ns), REAL.monotonic()
             elif REAL.monotonic() - since > self.limit_sec:
                 stuck = self.current
                 self.current = me
