@@ -46,14 +46,14 @@ def test_the_links_of_a_page_lead_to_its_sections():
 
 
 @pytest.mark.parametrize(
-    ('name', 'schema'),
+    ('page_name', 'schema'),
     [
         ('reference.md', SCHEMA),
         ('testing_reference.md', json.loads(schema_path(SCENARIO_SCHEMA_NAME).read_text())),
     ],
 )
-def test_every_key_has_its_row(name, schema):
-    page = generated()[name]
+def test_every_key_has_its_row(page_name, schema):
+    page = generated()[page_name]
 
     def keys(schema):
         if isinstance(schema, dict):

@@ -12,7 +12,7 @@ from composer.cli.check import select_systems
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.schema import SCENARIO_SCHEMA_NAME, SCHEMA_NAME, schema_path
 from composer.stubs.system_stubs import module_of, stubs_of
@@ -27,9 +27,16 @@ class ConflictingSystemsError(ComposerError):
 
 
 def print_schema(*, path_only: bool, matrix: bool, scenarios: bool = False) -> int:
-    """Print the schema of systems, matrix files or scenario files, or the path of a schema."""
+    """Print the schema of systems, matrix files or scenario files, or the path of a schema.
+
+    Raises:
+        UsageError: Two of them are wanted.
+    """
+    if matrix and scenarios:
+        message = '--matrix and --scenarios cannot be used together'
+        raise UsageError(message)
     path = schema_path(SCENARIO_SCHEMA_NAME if scenarios else SCHEMA_NAME)
-    if matrix and not scenarios:
+    if matrix:
         schema = json.loads(path.read_text(encoding='utf-8'))
         definitions = {name: schema['$defs'][name] for name in ('combinations', 'combination')}
         part = {'$schema': schema['$schema'], '$ref': '#/$defs/combinations'}

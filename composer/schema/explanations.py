@@ -158,8 +158,14 @@ _BOUNDS = {
     'minItems': 'at least',
     'maxItems': 'at most',
     'minLength': 'at least',
+    'minProperties': 'at least',
 }
-_BOUND_UNITS = {'minItems': ' item', 'maxItems': ' item', 'minLength': ' character'}
+_BOUND_UNITS = {
+    'minItems': ' item',
+    'maxItems': ' item',
+    'minLength': ' character',
+    'minProperties': ' key',
+}
 
 
 def _explain_bound(error: ValidationError) -> Iterator[Violation]:

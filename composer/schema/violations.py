@@ -155,7 +155,7 @@ def show_value(value: Any) -> str:
     if isinstance(value, bool):
         return 'true' if value else 'false'
     if isinstance(value, dict):
-        return 'a mapping'
+        return 'a mapping' if value else 'an empty mapping'
     if isinstance(value, list):
         return 'a list' if value else 'an empty list'
     text = repr(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.names import with_article
 from composer.scenarios.times import format_seconds
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def count_of(number: int, noun: str) -> str:
 def expected_count(least: int, most: int | None, noun: str) -> str:
     """Return `no message`, `a message`, `2 messages`, `1 to 3 messages`."""
     if most is None:
-        return f'a {noun}' if least == 1 else f'at least {count_of(least, noun)}'
+        return with_article(noun) if least == 1 else f'at least {count_of(least, noun)}'
     return count_of(least, noun) if least == most else f'{least} to {most} {noun}s'
 
 

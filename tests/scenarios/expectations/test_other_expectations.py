@@ -3,8 +3,6 @@
 import pytest
 
 from composer.scenarios.expectations.evaluation import evaluate
-from composer.scenarios.expectations.event_excerpts import render_excerpt
-from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.happenings import sort_events
 from composer.scenarios.expectations.like_expectations import compare_messages
 from composer.scenarios.outcomes import Outcome
@@ -39,6 +37,10 @@ LOG = [
             {'log': '*', 'matches': 'a', 'count': 1},
             [('expected 1 line of any node that matches "a", got 2 lines',
               '+ battery at 3 %')],
+        ),
+        (
+            {'log': '/n', 'level': 'error'},
+            [('expected an error line of /n, got no error line', '')],
         ),
         ({'error': '*', 'text': 'too far', 'count': 2},
          [('expected 2 errors of any node with "too far", got 1 error', '')]),
@@ -194,22 +196,3 @@ def test_a_topic_is_like_its_recording():
         ('/a has 2 messages, and 3 messages in the recording',
          '- {origin: {x: 3.0, y: 0.0}, ranges: [], frame: "laser"}')
     ]  # fmt: skip
-
-
-def test_the_events_around_a_moment_are_shown_in_their_order():
-    events = [
-        *(at(time, 'message', '/a', number(float(time))) for time in range(10)),
-        at(9, 'message', '/b', number(0.0)),
-        at(9, 'error', 'x', TRACEBACK, node='/other'),
-        at(9, 'callback', '/a', None),
-    ]
-    failure = Failure(('cases',), '', '', 8 * 10**9, ('/a',))
-    assert render_excerpt(events, failure, most=3) == [
-        '7.000000000 message /n /a {data: 7.0}',
-        '8.000000000 message /n /a {data: 8.0}',
-        '9.000000000 message /n /a {data: 9.0}',
-    ]
-    assert (
-        render_excerpt(events, failure)[-1] == '9.000000000 error /other x "ValueError: too far"'
-    )
-    assert render_excerpt(events, Failure((), '')) == []
