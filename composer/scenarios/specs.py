@@ -86,14 +86,12 @@ class PublishStepSpec:
     Attributes:
         message: Plain data of the fields.
         type: `None` for the type that the topic has in the system.
-        qos: The name of a profile, or policies; `None` for those that fit the subscriptions.
     """
 
     schedule: ScheduleSpec
     topic: str
     message: Any
     type: str | None
-    qos: str | int | Mapping[str, Any] | None
     path: DataPath
 
 

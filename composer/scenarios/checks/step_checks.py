@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.language.qos import BUILTIN_PROFILES
 from composer.scenarios.checks.channels_of_cases import check_type, explain_unknown, is_known
 from composer.scenarios.checks.message_fields import check_message, part_of
 from composer.scenarios.checks.node_values import check_given_parameters
-from composer.scenarios.checks.time_checks import value_at
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
     PublishStepSpec,
     SetParametersStepSpec,
 )
-from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -24,7 +21,6 @@ if TYPE_CHECKING:
     from composer.entity_kinds import ChannelKind
     from composer.scenarios.checks.scenario_context import ScenarioContext
     from composer.scenarios.specs import CaseSpec
-    from composer.yaml_text.positions import DataPath
 
 
 def check_steps(context: ScenarioContext, case: CaseSpec) -> Iterator[Diagnostic]:
@@ -59,7 +55,6 @@ def _check_publish(
         )
     description = part_of(context, 'topic', step.topic, 'message', step.type)
     yield from check_message(context, description, (*step.path, 'message'))
-    yield from _check_qos(context, step)
 
 
 def _near_alone(context: ScenarioContext, kind: ChannelKind, name: str) -> str | None:
@@ -67,19 +62,6 @@ def _near_alone(context: ScenarioContext, kind: ChannelKind, name: str) -> str |
         return None
     help_text = context.suggest_channel(kind, name) or ''
     return help_text if help_text.startswith('did you mean') else None
-
-
-def _check_qos(context: ScenarioContext, step: PublishStepSpec) -> Iterator[Diagnostic]:
-    path: DataPath = (*step.path, 'qos')
-    profile = value_at(context, path)
-    if isinstance(profile, dict):
-        path = (*path, 'profile')
-        profile = profile.get('profile')
-    known = {*BUILTIN_PROFILES, *context.system.spec.qos}
-    if isinstance(profile, str) and profile not in known:
-        message = f"there is no QoS profile '{profile}'"
-        help_text = suggest(profile, known, 'there are')
-        yield context.at_value(path, 'unknown-qos-profile', message, help=help_text)
 
 
 def _check_call(

@@ -53,7 +53,6 @@ def _parse_publish(data: Mapping[str, Any], path: DataPath) -> PublishStepSpec:
         topic=absolute(data['publish']),
         message=data.get('message', {}),
         type=data.get('type'),
-        qos=data.get('qos'),
         path=path,
     )
 

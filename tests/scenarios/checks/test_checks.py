@@ -5,7 +5,7 @@ import pytest
 pytestmark = pytest.mark.ros
 
 RIGHT = [
-    {'when': '{at: 1, publish: /scan, message: {ranges: [0.2]}, qos: sensor_data}'},
+    {'when': '{at: 1, publish: /scan, message: {ranges: [0.2]}}'},
     {'when': '{publish: scan, message: {header: {frame_id: laser}}, type: sensor_msgs/msg/LaserScan}'},
     {'when': '{call: /reset, request: {data: true}, response: {success: true}, timeout: 2}'},
     {'when': '{call: /lab/robot/get_parameters, request: {names: [limit]}}'},
@@ -54,8 +54,6 @@ WRONG = [
     ({'when': '{publish: /x, type: std_srvs/srv/Empty}'},
      'std_srvs/srv/Empty bad-value: expected a message type, as in package/msg/Name; got '
      "'std_srvs/srv/Empty'", 'no-subscription'),
-    ({'when': '{publish: /scan, qos: sensor}'},
-     "sensor unknown-qos-profile: there is no QoS profile 'sensor' (did you mean 'sensor_data'?)"),
     ({'when': '{call: /rest}'},
      "/rest unknown-topic: the system has no service '/rest' (did you mean '/reset'?)"),
     ({'when': '{call: /dock}'}, "/dock no-server: no node of this system serves '/dock' "
