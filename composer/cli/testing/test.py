@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
 from time import monotonic
@@ -49,19 +48,19 @@ def run_tests(words: Sequence[str], options: RunOptions) -> int:
         is_meant = parse_name_expression(options.expression)
     files = select_scenarios(words)
     check_ros()
-    folder = Path(tempfile.mkdtemp(prefix='composer-traces-'))
-    try:
-        with signals.interrupting(), CaseClient(find_colour()) as client:
-            client.start()
-            plan = plan_cases(files, is_meant)
-            runs = CaseRuns(client, plan.cases, options, folder)
-            try:
-                return _run(runs, plan, options, started)
-            except KeyboardInterrupt:
-                _report(runs.reports, plan, options, started, 'interrupted')
-                raise
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with (
+        signals.interrupting(),
+        tempfile.TemporaryDirectory(prefix='composer-traces-') as folder,
+        CaseClient(find_colour()) as client,
+    ):
+        client.start()
+        plan = plan_cases(files, is_meant)
+        runs = CaseRuns(client, plan.cases, options, Path(folder))
+        try:
+            return _run(runs, plan, options, started)
+        except KeyboardInterrupt:
+            _report(runs.reports, plan, options, started, 'interrupted')
+            raise
 
 
 def _run(runs: CaseRuns, plan: CasePlan, options: RunOptions, started: float) -> int:
