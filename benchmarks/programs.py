@@ -134,12 +134,12 @@ def running(*commands: list[str]) -> Iterator[list[Program]]:
 
 
 @contextmanager
-def composed(text: str) -> Iterator[Program]:
-    """Run `composer up` with a file of this text."""
+def composed(text: str, *options: str) -> Iterator[Program]:
+    """Run `composer up` with a file of this text, and these options."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'system.yaml'
         path.write_text(text)
-        with running(['-m', 'composer', 'up', str(path)]) as (program,):
+        with running(['-m', 'composer', 'up', str(path), *options]) as (program,):
             yield program
 
 

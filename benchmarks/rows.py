@@ -143,6 +143,14 @@ def _overhead() -> list[Row]:
     return [Row('us a message, more than by hand', ours, by_hand, more, '<=', 5)]
 
 
+def _recording() -> list[Row]:
+    def row(what: str, key: str) -> Row:
+        ours, other = (_side('recording', side, 0, key) for side in ('recorded', 'alone'))
+        return Row(f'us to record a message of 1 kB, {what}', ours, other, more, '<=', 10)
+
+    return [row('all in all', 'cpu_us'), row('in the behaviour', 'publish_us')]
+
+
 def _forty() -> list[Row]:
     def side(name: str, key: str) -> Side:
         return _side('forty', name, 40, key)
@@ -288,6 +296,7 @@ ROWS: list[Row] = [
     *_calls(),
     *_large_messages(),
     *_overhead(),
+    *_recording(),
     *_forty(),
     *_further_node(),
     *_thousand(),

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
 
 # What hypothesis tries is the same in each run, and no test fails for the time that it takes.
@@ -173,3 +174,17 @@ def graph(request, shared_compose, shared_peer):
     """Return a plain node in the domain where the module's `SYSTEM` runs with its `CODE`."""
     shared_compose(request.module.SYSTEM, request.module.CODE).wait_until_ready()
     return shared_peer.node
+
+
+@pytest.fixture
+def all_messages():
+    """Return filled messages of each type of test_msgs and of some nested deeply, by topic."""
+    from composer.interfaces.catalogue import InterfaceCatalogue
+    from composer.interfaces.classes import import_interface
+
+    catalogue = InterfaceCatalogue()
+    names = [*catalogue.names('msg', 'test_msgs'), 'nav_msgs/msg/Odometry', 'std_msgs/msg/Char']
+    return {
+        f'/{name.replace("/", "_").lower()}': [filled(import_interface(name)) for _ in range(3)]
+        for name in names
+    }

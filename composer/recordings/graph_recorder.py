@@ -202,11 +202,14 @@ class GraphRecorder:
     def _take_all(self, listener: _Listener) -> None:
         recorder, own = self._recorder, self._own
         while (message := self._taker.take(listener.ros)) is not None:
-            if own.has(message.publisher) or not recorder.has_room():
+            if own.has(message.publisher):
+                continue
+            if len(recorder.queue) >= recorder.room:
+                recorder.lost += 1
                 continue
             received_ns = message.received_ns or time_ns()
             published_ns = message.published_ns or received_ns
-            recorder.add((listener.channel, received_ns, published_ns, message.data))
+            recorder.queue.append((listener.channel, received_ns, published_ns, message.data))
 
 
 def read_offer(profile: QoSProfile) -> dict[str, Any]:

@@ -34,8 +34,8 @@ MAGIC: Final = b'\x89MCAP0\r\n'
 # Larger chunks are written at once.
 CHUNK_SIZE: Final = 1 << 20
 _MESSAGE: Final = struct.Struct('<BQHIQQ')
-# What of a message's header its length counts.
-_LENGTH_OF_HEADER: Final = _MESSAGE.size - 9
+# Of the type and length of a record, which its length does not count.
+_RECORD_START: Final = 9
 _CHUNK: Final = struct.Struct('<BQQQQIIQ')
 _INDEX: Final = struct.Struct('<BQHI')
 _FOOTER_START: Final = struct.Struct('<BQQQ')
@@ -52,7 +52,7 @@ class Channel:
             and the metadata of the topic; called once, before its first message is written.
         record: Its record in the file; `None` until then.
         schema: That of its type.
-        count: How many messages it has.
+        count: How many messages the complete chunks have of it.
         index: Times and places of its messages in the current chunk, one after the other.
     """
 
@@ -86,9 +86,9 @@ class McapWriter:
         self._schemas: dict[tuple[str, bytes], Schema] = {}
         self._chunks: list[tuple[ChunkIndex, dict[int, int]]] = []
         self._metadata: list[MetadataIndex] = []
-        self._parts: list[bytes] = []
+        # The current chunk, of this size; the same memory is used again and again.
+        self._chunk = bytearray(CHUNK_SIZE)
         self._size = 0
-        self._times: list[int] = []
         self._end = 0
         self._write([MAGIC, _serialize([Header('ros2', library)])])
 
@@ -114,32 +114,40 @@ class McapWriter:
 
     def add_messages(self, entries: Iterable[tuple[Channel, int, int, bytes]]) -> None:
         """Add messages: for each its channel, when it was received and published, and its data."""
+        pack_into, chunk, size = _MESSAGE.pack_into, self._chunk, self._size
         for channel, log_ns, publish_ns, data in entries:
             if channel.record is None:
+                self._size = size
                 self._define(channel)
-            channel.index += (log_ns, self._size)
-            self._times.append(log_ns)
-            channel.count += 1
-            size = len(data)
-            self._parts += (
-                # As rosbag2, without a sequence number.
-                _MESSAGE.pack(5, _LENGTH_OF_HEADER + size, channel.number, 0, log_ns, publish_ns),
-                data,
+                size = self._size
+            channel.index += (log_ns, size)
+            length, begin = len(data), size + _MESSAGE.size
+            end = begin + length
+            if end > len(chunk):
+                chunk.extend(bytes(end - len(chunk)))
+            # As rosbag2, without a sequence number.
+            pack_into(
+                chunk, size, 5, end - size - _RECORD_START, channel.number, 0, log_ns, publish_ns
             )
-            self._size += _MESSAGE.size + size
-            if self._size >= CHUNK_SIZE:
+            chunk[begin:end] = data
+            size = end
+            if size >= CHUNK_SIZE:
+                self._size = size
                 self.flush()
+                size = 0
+        self._size = size
 
     def flush(self) -> None:
         """Write the current chunk, if there are messages in it."""
-        if not self._times:
-            return
-        start_ns, end_ns = min(self._times), max(self._times)
-        size, records = self._size, b''.join(self._parts)
-        crc = zlib.crc32(records)
-        head = _CHUNK.pack(6, 40 + size, start_ns, end_ns, size, crc, 0, size)
-        indices, offsets, place = [], {}, self._end + len(head) + size
         used = [each for each in self.channels if each.index]
+        if not used:
+            return
+        times = [time for each in used for time in each.index[::2]]
+        start_ns, end_ns = min(times), max(times)
+        size = self._size
+        records = memoryview(self._chunk)[:size]
+        head = _CHUNK.pack(6, 40 + size, start_ns, end_ns, size, zlib.crc32(records), 0, size)
+        indices, offsets, place = [], {}, self._end + len(head) + size
         for channel in used:
             packed = _pack_index(channel)
             offsets[channel.number] = place
@@ -158,8 +166,11 @@ class McapWriter:
         )
         counts = {each.number: len(each.index) // 2 for each in used}
         self._forget_chunk()
-        self._write([head, records, *indices])
+        with records:
+            self._write([head, records, *indices])
         self._chunks.append((index, counts))
+        for channel in used:
+            channel.count += counts[channel.number]
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record after what was added so far."""
@@ -175,9 +186,9 @@ class McapWriter:
         for channel in self.channels:
             if channel.record is None:
                 self._define(channel)
-        parts = self._parts
+        defined = bytes(self._chunk[: self._size])
         self._forget_chunk()
-        self._write(parts)
+        self._write([defined])
 
     def finish(self) -> None:
         """Write what is left, and the summary, by which readers find messages."""
@@ -217,11 +228,11 @@ class McapWriter:
         record = ChannelRecord(channel.number, channel.topic, 'cdr', dict(metadata), schema.id)
         channel.record, channel.schema = record, schema
         written = _serialize([*records, record])
-        self._parts.append(written)
+        self._chunk[self._size : self._size + len(written)] = written
         self._size += len(written)
 
     def _forget_chunk(self) -> None:
-        self._parts, self._times, self._size = [], [], 0
+        self._size = 0
         for channel in self.channels:
             channel.index.clear()
 
@@ -271,7 +282,7 @@ class McapWriter:
             summary += data
         return summary, offsets
 
-    def _write(self, parts: list[bytes]) -> None:
+    def _write(self, parts: list[bytes | memoryview]) -> None:
         for part in parts:
             left = memoryview(part)
             while left:

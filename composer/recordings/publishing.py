@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _NANOSECONDS: Final = 10**9
 _POLL_SEC: Final = 0.05
 # The graph is complete when nothing was new for so long.
-_SETTLED_SEC: Final = 0.5
+_SETTLED_SEC: Final = 1.0
 _LONGEST_SEARCH_SEC: Final = 5.0
 _ACKNOWLEDGED: Final = Duration(seconds=2)
 _LEAST_DEPTH: Final = 10
@@ -59,11 +59,18 @@ class RecordingPublisher:
                 )
         self.topics = sorted({name for name, _ in self._publishers})
 
-    def wait_for_subscriptions(self) -> None:
-        """Wait until those that are on the graph are found, as far as that can be known."""
+    def wait_for_subscriptions(self, *, of_all: bool) -> None:
+        """Wait until those that are on the graph are found, as far as that can be known.
+
+        Args:
+            of_all: Whether to wait until each topic has one, for as long as that takes.
+        """
         begun = settled = monotonic()
         shape: Any = None
-        while monotonic() < min(settled + _SETTLED_SEC, begun + _LONGEST_SEARCH_SEC):
+        counts: list[int] = []
+        while monotonic() < min(settled + _SETTLED_SEC, begun + _LONGEST_SEARCH_SEC) or (
+            of_all and not all(counts)
+        ):
             counts = [each.get_subscription_count() for each in self._publishers.values()]
             latest = counts, sorted(self._node.get_node_names_and_namespaces())
             if latest != shape:

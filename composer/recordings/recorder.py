@@ -20,7 +20,7 @@ from composer.recordings.mcap_writer import Channel, McapWriter
 from composer.version import find_version
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
 
     from composer.recordings.recording_place import RecordingPlace
 
@@ -58,9 +58,9 @@ class Recorder:
         log: Gets what ends the recording too early, and what was recorded.
 
     Attributes:
-        add: Takes an `Entry`; the thread of whoever has it calls this, if `has_room`.
+        queue: Who has a message appends it, unless it has `room` messages.
         room: How many messages may wait; 0 if nothing is recorded any more.
-        lost: How many were not added as there was no room.
+        lost: How many were not appended as there was no room.
 
     Raises:
         UsageError: The place is taken, or not there.
@@ -76,8 +76,7 @@ class Recorder:
         except OSError as error:
             message = f"'{place.file}' cannot be written: {error.strerror or error}"
             raise ComposerError(message) from error
-        self._queue: deque[Entry] = deque()
-        self.add: Callable[[Entry], None] = self._queue.append
+        self.queue: deque[Entry] = deque()
         self.room = _AT_FIRST
         self.lost = 0
         self._offers: dict[tuple[str, type], list[Mapping[str, Any]]] = {}
@@ -87,13 +86,6 @@ class Recorder:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-recorder', daemon=True)
         self._thread.start()
-
-    def has_room(self) -> bool:
-        """Return whether a message may be added; if not, it is counted as lost."""
-        if len(self._queue) < self.room:
-            return True
-        self.lost += self.room > 0
-        return False
 
     def open_channel(
         self, topic: str, message_class: type, offers: Iterable[Mapping[str, Any]]
@@ -133,7 +125,7 @@ class Recorder:
         with suppress(OSError):
             target = self._place.make_room() if goes_on else target
         self._log.info(f"recorded {self._describe_content()} to '{target}'")
-        if self.lost:
+        if self.lost and self.room:
             self._log.error(f'the disk was too slow: {self.lost} more were not recorded')
         for remark in remarks:
             self._log.warning(remark)
@@ -162,7 +154,7 @@ class Recorder:
 
     def _drain(self) -> None:
         """Write what waits in the queue; what comes meanwhile waits."""
-        queue = self._queue
+        queue = self.queue
         entries = [queue.popleft() for _ in range(len(queue))]
         if not entries:
             return
@@ -182,7 +174,7 @@ class Recorder:
     def _fail(self, error: Exception) -> None:
         """End the recording: the file has what was written so far."""
         self.room = 0
-        self._queue.clear()
+        self.queue.clear()
         with suppress(OSError):
             self._writer.give_up()
         self._stream.close()

@@ -103,10 +103,11 @@ def create_tap(
     report: Callable[[str], object],
 ) -> Callable[[Any], None]:
     """Return what records a message of a publisher, in the thread that publishes it."""
-    serialize, add, has_room = _rclpy.rclpy_serialize, recorder.add, recorder.has_room
+    serialize, queue, append = _rclpy.rclpy_serialize, recorder.queue, recorder.queue.append
 
     def tap(message: Any) -> None:
-        if not has_room():
+        if len(queue) >= recorder.room:
+            recorder.lost += 1
             return
         try:
             data = serialize(message, message_class)
@@ -114,7 +115,7 @@ def create_tap(
             report(f"a message of '{channel.topic}' is not recorded: {error}")
             return
         now_ns = time_ns()
-        add((channel, now_ns, now_ns, data))
+        append((channel, now_ns, now_ns, data))
 
     return tap
 

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
 
 _PART: Final = re.compile(r'^=+\nMSG: *(\S+) *\n', re.MULTILINE)
-_FIELD: Final = re.compile(r'^[ \t]*([\w/]+)(\S*)[ \t]+(\w+)[ \t]*(?!=)(?:[^=\w]|$)', re.MULTILINE)
+_FIELD: Final = re.compile(r'^[ \t]*([\w/]+)(\S*)[ \t]+(\w+)\b(?![ \t]*=)', re.MULTILINE)
+# By its other name, as `full_definition` has it.
+_OTHER_NAMES: Final = {'char': 'uint8'}
 
 
 class MessageTypes:
@@ -98,7 +100,7 @@ def _fields_by_type(definition: str, root: str) -> dict[str, list[tuple[str, ...
     """Return the types and names of fields, with short names of types, whatever else differs."""
     return {
         name: [
-            (kind.rpartition('/')[2], bounds, field)
+            (_OTHER_NAMES.get(kind, kind.rpartition('/')[2]), bounds, field)
             for kind, bounds, field in _FIELD.findall(text)
         ]
         for name, text in split_definition(definition, root).items()

@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 
 from composer.recordings.reading import read_recording
 from composer.recordings.recorded_topics import RecordingError
-from tests.recordings.conftest import QOS, write_recording
+from tests.recorded import QOS, write_recording
 
 pytestmark = pytest.mark.ros
 STRING = 'string data\n'

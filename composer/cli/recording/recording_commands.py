@@ -47,6 +47,12 @@ def record_command(output: Path | None, topics: tuple[str, ...]) -> int:
     metavar='SEC',
     help='Leave out so much of the beginning.',
 )
+@click.option(
+    '--wait',
+    'waits',
+    is_flag=True,
+    help='Begin when each topic has a subscription, however long that takes.',
+)
 @click.option('--loop', 'loops', is_flag=True, help='Begin again at the end.')
 @takes_topics
 @click.pass_context
@@ -56,6 +62,7 @@ def replay_command(
     *,
     rate: float,
     start_sec: float,
+    waits: bool,
     loops: bool,
     topics: tuple[str, ...],
 ) -> int:
@@ -66,7 +73,9 @@ def replay_command(
     """
     from composer.cli.recording.replay import replay
 
-    return replay(file, topics, context.obj, rate=rate, start_sec=start_sec, loops=loops)
+    return replay(
+        file, topics, context.obj, rate=rate, start_sec=start_sec, waits=waits, loops=loops
+    )
 
 
 COMMANDS = (record_command, replay_command)

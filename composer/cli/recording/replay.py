@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer import signals
 from composer.cli.recording.graph_node import Terminal, graph_node
 from composer.errors import ComposerError, ExitCode
 from composer.recordings.reading import read_recording
@@ -26,6 +27,7 @@ def replay(
     *,
     rate: float,
     start_sec: float,
+    waits: bool,
     loops: bool,
 ) -> int:
     """Publish a recording; return the exit code.
@@ -37,6 +39,7 @@ def replay(
         topics: Patterns of the topics; all if there are none.
         rate: How many times as fast as it was recorded.
         start_sec: How much of the beginning is left out.
+        waits: Whether to begin only when each topic has a subscription.
         loops: Whether to begin again at the end, until it is interrupted.
 
     Raises:
@@ -52,7 +55,7 @@ def replay(
     wanted = [each for each in recording.topics if patterns.has(each.name)]
     for remark in patterns.describe_unused([each.name for each in recording.topics]):
         terminal.warning(remark)
-    with graph_node('_composer_replay', ros_arguments) as node:
+    with signals.interrupting(), graph_node('_composer_replay', ros_arguments) as node:
         # These import rclpy, which the node has found.
         from composer.recordings.publishing import RecordingPublisher
         from composer.recordings.types import MessageTypes
@@ -66,10 +69,10 @@ def replay(
             message = f"'{path}' has nothing to publish"
             raise ComposerError(message, help="see 'composer replay --help' for --topics")
         duration_sec = (recording.end_ns - recording.start_ns) / _NANOSECONDS
-        terminal.info(
-            f"replaying {len(publisher.topics)} topics of '{path}', {duration_sec:.1f} s"
-        )
-        publisher.wait_for_subscriptions()
+        count = len(publisher.topics)
+        topics_word = 'topic' if count == 1 else 'topics'
+        terminal.info(f"replaying {count} {topics_word} of '{path}', {duration_sec:.1f} s")
+        publisher.wait_for_subscriptions(of_all=waits)
         since_ns = recording.start_ns + round(start_sec * _NANOSECONDS)
         count = publisher.publish(recording, since_ns, rate)
         while loops:

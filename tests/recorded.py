@@ -3,8 +3,6 @@
 from functools import partial
 from itertools import count
 
-import pytest
-
 from composer.interfaces.class_fields import describe_class
 from composer.interfaces.classes import import_interface, interface_name
 
@@ -85,16 +83,3 @@ def write_recording(path, topics, *, chunks=1, closes=True):
         if closes:
             writer.finish()
     return path
-
-
-@pytest.fixture
-def all_messages():
-    """Return a filled message of each type of test_msgs and of some nested deeply, by topic."""
-    from composer.interfaces.catalogue import InterfaceCatalogue
-
-    catalogue = InterfaceCatalogue()
-    names = [*catalogue.names('msg', 'test_msgs'), 'nav_msgs/msg/Odometry', 'std_msgs/msg/Char']
-    return {
-        f'/{name.replace("/", "_").lower()}': [filled(import_interface(name)) for _ in range(3)]
-        for name in names
-    }
