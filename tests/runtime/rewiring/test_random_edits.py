@@ -25,7 +25,7 @@ def test_edits(tmp_path, domain_id, other_domain_id):
     with playing(tmp_path, 1, (domain_id, other_domain_id)) as game:
         for _ in range(100):
             game.play()
-    assert game.applied > 20
+    assert game.applied > 30
 
 
 def test_each_key_of_the_schema_is_edited(tmp_path):
