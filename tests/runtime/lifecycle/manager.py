@@ -1,4 +1,4 @@
-"""A lifecycle manager that does as that of nav2: its order, its calls, its bonds and time-outs."""
+"""A lifecycle manager that does as that of nav2: its order, its calls, its bonds and most time-outs."""
 
 import threading
 from time import monotonic, sleep
@@ -21,6 +21,8 @@ GOALS = {
 }
 SERVICE_TIMEOUT_SEC = 5.0
 RESPAWN_SEC = 20.0
+# nav2's takes half of the time-out of a bond, here too short for DDS to find a new topic's ends.
+BOND_FORMING_SEC = 20.0
 
 
 class NotAvailableError(Exception):
@@ -137,7 +139,7 @@ class Manager:
         if name not in self._bonds:
             short = name.rpartition('/')[2]
             self._bonds[name] = Bond(self.node, short, self._bond_timeout_sec, self._group)
-            deadline = monotonic() + self._bond_timeout_sec / 2
+            deadline = monotonic() + BOND_FORMING_SEC
             while not self._bonds[name].is_formed and monotonic() < deadline:
                 sleep(0.01)
             return self._bonds[name].is_formed
